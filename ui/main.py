@@ -83,7 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         from app.cli.cli import main as run_command
         from app.evaluation.speed.window_drawing import draw_with
 
-        draw_with("ui.gl.frame_rate")
+        draw_with("ui.frame_rate")
         return int(run_command(arguments) or 0)
     if arguments and arguments[0] == "demo":
         use_kernel_cache()

@@ -51,9 +51,10 @@ def _table() -> dict[str, Column]:
                 words = base.definition + part_words + fit_words
                 name = base.name + fit + part
                 found.append(Column(name, base.unit, base.is_higher_better, base.is_quick, words))
-    words = f"{_BASES[0].definition}, after gsplat's affine colour correction: per channel the gain and offset that "
-    words += "lead from the truth to the picture, undone; less generous than the colour fit"
-    found.append(Column("cc_psnr", "dB", True, True, words))
+        if base.name == "psnr":
+            words = f"{base.definition}, after gsplat's affine colour correction: per channel the gain and offset that "
+            words += "lead from the truth to the picture, undone; less generous than the colour fit"
+            found.append(Column("cc_psnr", "dB", True, True, words))
     words = f"{_BASES[0].definition}, after the colour fit and a fit of smooth local brightness: a factor per block of "
     words += "a grid of 16 blocks across the picture, from pixels that do not move"
     found.append(Column("psnr_light", "dB", True, True, words))

@@ -84,7 +84,7 @@ def write_report(
         on_stage: Told what is done.
         say: Told what the user should know, see app.evaluation.evaluation.evaluate_project.
         measuring, make_pictures: Tests bring quick ones.
-        rates_of: Measures how fast a project is rendered; nothing is said of that by default.
+        rates_of: Measures how fast a project is rendered; left out by default.
     Returns:
         The page.
     Raises:

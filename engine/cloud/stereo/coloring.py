@@ -65,7 +65,7 @@ def colored_by_neighbors(points: np.ndarray, colors: np.ndarray, seen_colors: np
         colors: Where no point at all was seen. [P, 3]
         seen_colors: NaN where not seen. [P, 3]
     """
-    is_colored = np.isfinite(seen_colors).all(axis=1)
+    is_colored = np.asarray(np.isfinite(seen_colors).all(axis=1))
     colors = np.where(is_colored[:, None], seen_colors, colors)
     if is_colored.any() and not is_colored.all():
         n_neighbors = min(4, int(is_colored.sum()))

@@ -16,9 +16,9 @@ from engine.cloud.background.gains import gains_from_pictures
 from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.stereo.consistency import Agreement, check_depths
 from engine.cloud.stereo.fill import fill_inverse_depth
-from engine.cloud.stereo.slanted import refine_slanted
+from engine.cloud.stereo.slanted import N_SCANS, refine_slanted
 from engine.cloud.stereo.smoothing import smooth_inverse_depth
-from engine.cloud.stereo.sweep import matching_costs, plane_inverse_depths
+from engine.cloud.stereo.sweep import UNKNOWN_COST, matching_costs, plane_inverse_depths
 from engine.images.image_filters import block_mean, erode
 from engine.parallel import map_ordered
 
@@ -102,7 +102,13 @@ class DepthScene:
         return np.where(is_second & ~is_first, second, first)
 
     def refined(
-        self, seeds: np.ndarray, prior: np.ndarray, keep: Keep = do_now, is_wanted: np.ndarray | None = None
+        self,
+        seeds: np.ndarray,
+        prior: np.ndarray,
+        keep: Keep = do_now,
+        *,
+        is_wanted: np.ndarray | None = None,
+        n_scans: int = N_SCANS,
     ) -> np.ndarray:
         """Inverse depths [C, h, w] by slanted patches.
 
@@ -110,6 +116,7 @@ class DepthScene:
             seeds: Inverse depths to begin with. [N, C, h, w]
             prior: Inverse depth that pixels without texture stay near. [C, h, w]
             is_wanted: Pixels to be refined; the others stay what the first seed says. None for all. [C, h, w] bool
+            n_scans: Passes over each picture.
         """
 
         def refine_one(camera: int) -> np.ndarray:
@@ -124,6 +131,7 @@ class DepthScene:
                 low=1.0 / self.far[camera],
                 high=min(NEARER / self.near[camera], 1.0 / near_plane(self.rig)),
                 is_wanted=None if is_wanted is None else is_wanted[camera],
+                n_scans=n_scans,
             )[0]
 
         parts = []
@@ -206,12 +214,32 @@ def sweep_all(
     near: np.ndarray,
     far: np.ndarray,
     keep: Keep = do_now,
+    *,
+    known: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[int]]:
-    """Smoothed inverse depth of every camera [C, h, w] float64 and the planes each one used."""
+    """Smoothed inverse depth of every camera [C, h, w] float64 and the planes each one used.
+
+    Args:
+        known: Inverse depths that need not be found; NaN where they are wanted. None for all. [C, h, w]
+    """
 
     def sweep_one(camera: int) -> tuple[np.ndarray, int]:
         planes = plane_inverse_depths(rig, camera, sources[camera], near[camera], far[camera])
-        costs = matching_costs(greys, is_usable, rig, camera=camera, sources=sources[camera], inverse_depths=planes)
+        is_wanted = None if known is None else np.isnan(known[camera])
+        costs = matching_costs(
+            greys,
+            is_usable,
+            rig,
+            camera=camera,
+            sources=sources[camera],
+            inverse_depths=planes,
+            is_wanted=is_wanted,
+        )
+        if known is not None and is_wanted is not None:
+            nearest = np.rint((known[camera] - planes[0]) / (planes[1] - planes[0]))  # they are uniform
+            y, x = np.nonzero(~is_wanted)
+            costs[~is_wanted] = UNKNOWN_COST
+            costs[y, x, np.clip(nearest[y, x], 0, len(planes) - 1).astype(np.int64)] = 0.0
         return smooth_inverse_depth(costs, greys[camera], planes), len(planes)
 
     def sweep(cameras: range) -> Arrays:

@@ -53,7 +53,7 @@ def fill_inverse_depth(
         solution = np.asarray(spsolve(system, trust * data, permc_spec="MMD_AT_PLUS_A"))
         trust = data_weights / (1.0 + ((solution - data) / scale) ** 2)
     coarse = np.clip(solution, low, high).reshape(height // HALF, width // HALF)
-    return enlarged(coarse, height, width)
+    return _enlarge(coarse, height, width)
 
 
 def _smoothness(grey: np.ndarray) -> sparse.csr_matrix:
@@ -80,7 +80,7 @@ def _differences(
     return sparse.csr_matrix((values, (rows, np.concatenate([c.ravel() for c in columns]))), shape=(n_rows, n_unknowns))
 
 
-def enlarged(coarse: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Twice as large, bilinear and aligned to pixel areas; an odd last row or column repeats its neighbour. [H, W]"""
+def _enlarge(coarse: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Bilinear, aligned to pixel areas; an odd last row or column repeats its neighbour."""
     fine: np.ndarray = np.asarray(zoom(coarse, HALF, order=1, mode="nearest", grid_mode=True))
     return np.pad(fine, ((0, height - fine.shape[0]), (0, width - fine.shape[1])), mode="edge")

@@ -52,6 +52,7 @@ def refine_slanted(
     low: float,
     high: float,
     is_wanted: np.ndarray | None = None,
+    n_scans: int = N_SCANS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Inverse depth of every pixel of one camera by slanted patches.
 
@@ -64,6 +65,7 @@ def refine_slanted(
         low, high: Bounds of inverse depth.
         is_wanted: Pixels to be searched; the others keep what the first seed says and pass it on to their neighbours.
             None for all. [H, W] bool
+        n_scans: Passes over the picture.
     Returns:
         inverse depth [H, W] float64, cost of its match [H, W] float64: about 0 to 1, UNKNOWN_COST where nothing can
         be said.
@@ -87,6 +89,7 @@ def refine_slanted(
         np.stack([pair[1] for pair in pairs]),
         candidates,
         is_wanted,
+        n_scans,
         np.ascontiguousarray(prior, dtype=np.float64),
         low,
         high,
@@ -235,13 +238,13 @@ def _shaken(plane, size, is_depth, is_slope, state, trial):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _search(grey, sources, are_usable, matrices, shifts, seeds, is_wanted, prior, low, high, planes, costs):
+def _search(grey, sources, are_usable, matrices, shifts, seeds, is_wanted, n_scans, prior, low, high, planes, costs):
     """Writes the plane [inverse depth, slope along x, slope along y] and the cost of every wanted pixel."""
     height, width = grey.shape
     side = 2 * (RADIUS_PX // STRIDE_PX) + 1
     own, weights, places = np.empty(side * side), np.empty(side * side), np.empty((side * side, 2))
     ranked, trial = np.empty(len(sources)), np.empty(3)
-    for scan in range(N_SCANS + 1):
+    for scan in range(n_scans + 1):
         step = 1 if scan % 2 == 0 else -1
         size = 0.5 ** max(scan - 1, 0)
         for row in range(height):

@@ -33,6 +33,8 @@ UNKNOWN_COST = 1.0
 BEST_ANGLES_DEG = (6.0, 18.0)
 """Preferred triangulation angle of a narrow (forward-facing) and of a wide (surrounding) rig."""
 NEIGHBOR_SHARE = 0.75
+WINDOW_PX = 8
+"""Edge of the blocks in which wanted pixels are looked for; each costs a margin of the patch radius."""
 WIDEST_ANGLE_DEG = 35.0
 """Preferred triangulation angle at most, where cameras stand far apart."""
 
@@ -129,6 +131,7 @@ def matching_costs(
     camera: int,
     sources: list[int],
     inverse_depths: np.ndarray,
+    is_wanted: np.ndarray | None = None,
 ) -> np.ndarray:
     """Cost of every plane at every pixel: mean over the better half of the sources of 1 - ZNCC (+ grey difference).
 
@@ -136,6 +139,7 @@ def matching_costs(
         greys: White-balanced grey pictures of all cameras, 0..255. [C, H, W] float32
         is_usable: False where a background cannot be trusted. [C, H, W] bool
         rig: At the size of greys.
+        is_wanted: Pixels whose costs are needed; of the others, only some get any. None for all. [H, W] bool
     Returns:
         float32 [H, W, D], about 0 (match) to 1 (no relation); UNKNOWN_COST where nothing can be said.
     """
@@ -146,17 +150,53 @@ def matching_costs(
     pairs = [relative_homography(rig, camera, other) for other in sources]
     matrices = np.stack([pair[0] for pair in pairs]).astype(np.float32)
     shifts = np.stack([pair[1] for pair in pairs]).astype(np.float32)
+    sides = [np.ascontiguousarray(greys[other]) for other in sources], [is_usable[other] for other in sources]
+    for top, bottom, left, right in [(0, height, 0, width)] if is_wanted is None else _windows(is_wanted):
+        # a window is a small picture of its own, with a margin for the patches at its border
+        y0, x0 = max(0, top - PATCH_RADIUS_PX), max(0, left - PATCH_RADIUS_PX)
+        y1, x1 = min(height, bottom + PATCH_RADIUS_PX), min(width, right + PATCH_RADIUS_PX)
+        move = np.array([[1, 0, x0], [0, 1, y0], [0, 0, 1]], dtype=np.float32)
+        reference = np.ascontiguousarray(greys[camera, y0:y1, x0:x1])
+        found = _window_costs(reference, *sides, matrices @ move, shifts, inverse_depths)
+        costs[top:bottom, left:right] = found[top - y0 : bottom - y0, left - x0 : right - x0]
+    costs[~is_usable[camera]] = UNKNOWN_COST
+    return costs
+
+
+def _windows(is_wanted: np.ndarray) -> list[tuple[int, int, int, int]]:
+    """Blocks that cover the wanted pixels, those side by side joined: (top, bottom, left, right), without overlap."""
+    height, width = is_wanted.shape
+    found = []
+    for top in range(0, height, WINDOW_PX):
+        bottom = min(top + WINDOW_PX, height)
+        padded = np.zeros(-(-width // WINDOW_PX) * WINDOW_PX, dtype=np.int8)
+        padded[:width] = is_wanted[top:bottom].any(axis=0)
+        steps = np.diff(padded.reshape(-1, WINDOW_PX).any(axis=1).astype(np.int8), prepend=0, append=0)
+        for first, last in zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1), strict=True):
+            found.append((top, bottom, int(first) * WINDOW_PX, min(int(last) * WINDOW_PX, width)))
+    return found
+
+
+def _window_costs(
+    reference: np.ndarray,
+    sources: list[np.ndarray],
+    are_usable: list[np.ndarray],
+    matrices: np.ndarray,
+    shifts: np.ndarray,
+    inverse_depths: np.ndarray,
+) -> np.ndarray:
+    """Costs of a picture, or of a piece of one, against whole sources. float32 [h, w, D]"""
+    height, width = reference.shape
+    costs = np.full((height, width, len(inverse_depths)), UNKNOWN_COST, dtype=np.float32)
     moments, sums = np.empty((2, 6, height, width), np.float32)
     source_costs = np.empty((len(sources), height, width), np.float32)
     ranked = np.empty(len(sources), np.float32)
     for d, inverse_depth in enumerate(inverse_depths):
-        for s, other in enumerate(sources):
-            warp = matrices[s], shifts[s] * inverse_depth
-            _warped_moments(greys[camera], greys[other], is_usable[other], *warp, moments)
+        for s, (source, usable) in enumerate(zip(sources, are_usable, strict=True)):
+            _warped_moments(reference, source, usable, matrices[s], shifts[s] * inverse_depth, moments)
             _patch_sums(moments, sums)
             _zncc_cost(sums, source_costs[s])
         _mean_of_best_half(source_costs, ranked, costs, d)
-    costs[~is_usable[camera]] = UNKNOWN_COST
     return costs
 
 

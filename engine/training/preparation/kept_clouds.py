@@ -23,6 +23,8 @@ logger = logging.getLogger(__name__)
 
 CLOUD_FILES = "cloud-*.safetensors"
 """Of all such files of a folder."""
+_VERSION = 1
+"""Grows when the same pictures give another cloud."""
 _ARRAYS = {"points": np.float32, "colors": np.float32, "gains": np.float32, "n_of_frames": np.int64}
 
 
@@ -37,7 +39,7 @@ def kept_cloud(prep_dir: Path, start: int, key: dict[str, Any], build: Callable[
     Raises:
         DiskError: It could not be kept.
     """
-    words = json.dumps(key, sort_keys=True)
+    words = json.dumps(key | {"version": _VERSION}, sort_keys=True)
     name = CLOUD_FILES.replace("*", f"{start:06d}-{hashlib.sha256(words.encode()).hexdigest()[:8]}")
     cloud = _read(prep_dir / name, words)
     if cloud is not None:

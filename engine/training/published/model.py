@@ -53,8 +53,8 @@ MODEL = (
     Point(
         "what learning starts from",
         "released code",
-        released="features of zero, all scales the distance to three neighbours, entries of the grid within 1e-4, "
-        "heads as PyTorch starts any layer; nothing of the colours of the point cloud",
+        released="features of zero, all scales the root mean square distance to three neighbours, entries of the "
+        "grid within 1e-4, heads as PyTorch starts any layer; nothing of the colours of the point cloud",
         settings={"initial": "published"},
     ),
     Point(
@@ -63,7 +63,12 @@ MODEL = (
         paper="all of them, at every time",
         settings={"gate": "off"},
     ),
-    Point("colours of the cameras", "both", paper="those of the scene, for all of them", settings={"color": "off"}),
+    Point(
+        "colours of the cameras",
+        "released code",
+        released="those of the scene, for all of them",
+        settings={"color": "off"},
+    ),
     Point("stored values", "released code", released="float32, as trained", settings={"storage": "exact"}),
     Point(
         "knots in time",

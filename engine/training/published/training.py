@@ -51,7 +51,7 @@ TRAINING = (
         "paper",
         paper="the sum over the Gaussians, of no stated weight",
         released="0.01 times their mean",
-        here="0.01 times the sum",
+        here="0.01 times the sum, in cubes of scene units",
         reason="the paper comes first, with the only weight there is",
         settings={"volume": "sum", "volume_weight": 0.01},
     ),
@@ -88,7 +88,8 @@ TRAINING = (
         "where rates end",
         "paper",
         paper="a schedule as in 3D Gaussian splatting, begun anew with every clip",
-        released="after 30,000 or 200,000 steps, so that a clip is done at three quarters of most rates",
+        released="after 30,000 steps, or 200,000 for its own captures, where a clip of 10,880 ends at three quarters "
+        "of most rates",
         here="with the clip",
         reason="the paper comes first: there a schedule spans a training",
     ),

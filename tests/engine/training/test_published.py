@@ -15,6 +15,8 @@ from engine.backends.table import backend_called
 from engine.camera.depth_range import NEAR_SHARE
 from engine.clip_files.clip_header import FieldShape
 from engine.cloud.motion.dedup import residual_rows
+from engine.cloud.stereo.depth_scene import WORKING_PIXELS
+from engine.cloud.stereo.frames_cloud import FRAME_SPACING_PX
 from engine.conventions import ALPHA_MAX, ALPHA_MIN
 from engine.errors import NonFiniteLoss
 from engine.model.anchors import AnchorSet
@@ -82,10 +84,10 @@ def cells_double_from_sixteen() -> None:
     assert field_shape().cells == (16, 32, 64)
 
 
-def the_field_is_float32_and_starts_like_the_heads() -> None:
-    field = SpatioTemporalField(field_shape(), torch.Generator().manual_seed(1))
+def the_field_is_float32_and_starts_as_released() -> None:
+    field = SpatioTemporalField(field_shape(), torch.Generator().manual_seed(1), is_published=True)
     for layer in (field.hidden, field.out):
-        bound = 1.0 / math.sqrt(layer.in_features)
+        bound = math.sqrt(6.0 / (layer.in_features + layer.out_features))
         assert layer.weight.dtype == torch.float32
         assert 0.95 * bound < float(layer.weight.detach().abs().max()) <= bound
 
@@ -106,6 +108,14 @@ def anchors_have_six_scales() -> None:
 def heads_are_equally_wide() -> None:
     decoder = Decoder(static_dim=64, dynamic_dim=64, gaussians_per_anchor=10, hidden=PAPER.head_hidden)
     assert {decoder.first[head].shape[1] for head in decoder.first} == {256}
+
+
+def depth_maps_are_as_small_as_said() -> None:
+    assert WORKING_PIXELS == 160 * 90
+
+
+def voxels_are_four_pixels() -> None:
+    assert FRAME_SPACING_PX == 4.0
 
 
 def coverage_is_the_union() -> None:
@@ -160,9 +170,11 @@ CHECKS: dict[str, Callable[[], None]] = {
     "scales of an anchor": anchors_have_six_scales,
     "knots in time": knots_lie_on_frames,
     "cells of a level": cells_double_from_sixteen,
-    "numbers in the field": the_field_is_float32_and_starts_like_the_heads,
+    "numbers in the field": the_field_is_float32_and_starts_as_released,
     "outside of the box": places_outside_are_the_nearest_inside,
     "head of offsets": heads_are_equally_wide,
+    "stereo": depth_maps_are_as_small_as_said,
+    "density of the point clouds": voxels_are_four_pixels,
     "deduplication": coverage_is_the_union,
     "end of a pass": passes_follow_each_other,
     "where rates end": rates_end_with_the_clip,

@@ -97,7 +97,7 @@ def _window(text: str, capture: Capture, own: ProjectFacts) -> Window:
     found = _CROP.fullmatch(text)
     if found is None:
         raise ProjectError(
-            f"--crop is '{text}', which is no window.", hint="Write CAMERA:FRAME:X,Y,WIDTH,HEIGHT, in pixels."
+            f"--crop is '{text}', which is not a window.", hint="Write CAMERA:FRAME:X,Y,WIDTH,HEIGHT, in pixels."
         )
     camera = _camera(found["camera"], capture, "--crop")
     frame, x, y, width, height = (int(found[name]) for name in ("frame", "x", "y", "width", "height"))

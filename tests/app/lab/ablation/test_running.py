@@ -9,8 +9,12 @@ from dataclasses import replace
 
 import pytest
 
+from app.evaluation.headless import TrainedProject
+from app.evaluation.speed.frame_rates import FrameRates
+from app.evaluation.speed.laps import Rate
 from app.lab.ablation.measuring import MEASURED_FILE
 from app.lab.ablation.running import RESULT_FILE, TABLE_FILE, project_folder
+from app.lab.ablation.table import as_text
 from app.lab.ablation.variants import FULL, with_source_steps
 from app.project.project import open_project, read_settings
 from engine.errors import ProjectError, TrainingError
@@ -172,3 +176,25 @@ def test_settings_that_a_variant_cannot_have_are_said_before_anything_is_trained
         runner.run(names, settings=replace(runner.settings, overrides=BASE | overrides))
     assert not runner.launched
     assert not runner.folder.exists()
+
+
+def test_frame_rates_are_columns_and_change_no_kept_figure(runner):
+    def rates_of(opened: TrainedProject) -> FrameRates:
+        fps = 10.0 + len(opened.project.folder.name)
+        return FrameRates("0", 32, 24, Rate(fps, 30.0, 500, 3, "CPU rasterizer, 2 threads"), None, "no driver")
+
+    without = runner.run([FULL])
+    kept = project_folder(runner.folder, FULL, 0) / MEASURED_FILE
+    before = kept.read_bytes()
+    document = runner.run([FULL], rates_of=rates_of)
+    assert kept.read_bytes() == before
+    (line,) = document["lines"]
+    assert (line["fps_cpu"], line["fps_gl"], line["n_gaussians"]) == (10.0 + len("full-seed0"), None, 500.0)
+    assert without["lines"] == [line | {"fps_cpu": None, "n_gaussians": None}]
+    assert without["rendering"] is None
+    rendering = document["rendering"]
+    assert (rendering["width"], rendering["height"]) == (32, 24)
+    for part in ("32 x 24 px", "CPU rasterizer, 2 threads", "No OpenGL: no driver."):
+        assert part in rendering["words"]
+    assert "FPS CPU" in as_text(document["lines"])
+    assert "FPS GL" not in as_text(document["lines"])

@@ -123,3 +123,14 @@ def plain_cost(rig: CameraRig, grey: np.ndarray, source: np.ndarray, x: int, y: 
     )
     likeness = np.average((mine - mean) * (theirs - other), weights=weights) / (spread + STD_FLOOR)
     return min(1 - likeness, 1.0) + GREY_WEIGHT * min(abs(mean - other), GREY_TRUNCATION) / GREY_TRUNCATION
+
+
+def test_pixels_that_are_not_wanted_keep_the_first_seed(rig: CameraRig, floor: tuple[np.ndarray, np.ndarray]) -> None:
+    greys, truth = floor
+    known = np.maximum(truth[1], LOW)
+    is_wanted = np.zeros(SIZE[::-1], dtype=bool)
+    is_wanted[20:28, 14:34] = True
+    prior = np.where(is_wanted, 1 / 4.5, known)
+    inverse, _ = refine(rig, greys, prior, is_wanted=is_wanted)
+    assert np.array_equal(inverse[~is_wanted], prior[~is_wanted])
+    assert np.median(np.abs(inverse / known - 1)[is_wanted]) < 0.01

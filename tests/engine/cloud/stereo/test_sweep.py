@@ -10,6 +10,7 @@ from engine.cloud.stereo.sweep import (
     BEST_ANGLES_DEG,
     WIDEST_ANGLE_DEG,
     choose_sources,
+    matching_costs,
     plane_inverse_depths,
     preferred_angle_deg,
     relative_homography,
@@ -96,3 +97,23 @@ def test_planes_rise_evenly_and_move_what_sources_see_by_about_a_pixel_at_most()
         assert np.median(steps) < 1.0
         assert steps.max() < 1.5
     assert len(plane_inverse_depths(rig, 0, [], near[0], far[0])) == 25
+
+
+# ---------------------------------------------------------------- costs
+
+
+def test_costs_of_wanted_pixels_are_those_of_the_whole_picture():
+    rig = make_rig(12, (84, 62))  # no multiple of a window
+    greys = np.random.default_rng(0).uniform(0, 255, (12, 62, 84)).astype(np.float32)
+    is_usable = np.ones(greys.shape, dtype=bool)
+    is_usable[:, 10:14, 20:30] = False
+    is_wanted = np.zeros((62, 84), dtype=bool)
+    is_wanted[:3, :2] = is_wanted[30:37, 40:52] = is_wanted[61, 83] = is_wanted[11, 22:24] = True
+    planes = np.linspace(0.2, 0.5, 9, dtype=np.float32)
+    whole, some = (
+        matching_costs(greys, is_usable, rig, camera=0, sources=[1, 2, 11], inverse_depths=planes, is_wanted=wanted)
+        for wanted in (None, is_wanted)
+    )
+    assert np.abs(some - whole)[is_wanted].max() < 1e-3
+    assert (some == 1.0).all(axis=-1).mean() > 0.7  # most of the picture was left out
+    assert not (whole == 1.0).all(axis=-1)[is_wanted].all()

@@ -109,6 +109,7 @@ def test_cc_psnr_of_a_picture_is_that_of_the_corrected_one():
     found = measure_picture(image, pixels, np.zeros((48, 64), bool), metrics="quick").figures
     shown, truth = np.clip(image, 0, 1).astype(np.float32), pixels / np.float32(255)
     assert found["cc_psnr"] == pytest.approx(psnr(corrected_as_gsplat_does(shown, truth), truth), abs=1e-3)
-    assert found["psnr"] < found["cc_psnr"] < found["psnr_fit"]
+    raw, corrected, fitted = (found[name] or 0.0 for name in ("psnr", "cc_psnr", "psnr_fit"))
+    assert 0.0 < raw < corrected < fitted
     dark = measure_picture(np.zeros_like(image), np.zeros_like(pixels), np.zeros((48, 64), bool), metrics="quick")
     assert dark.figures["cc_psnr"] == MAX_PSNR_DB

@@ -86,13 +86,13 @@ def test_only_held_out_cameras_of_the_others_are_measured(project, other):
         (["--camera", "none"], "--camera is 'none'; name one camera."),
         (["--boundary", "2"], "--boundary is 2, where no two trained clips meet. Clips meet at frame 3."),
         (["--boundary", "x"], "invalid int value"),
-        (["--crop", "0:0"], "--crop is '0:0', which is no window. Write CAMERA:FRAME:X,Y,WIDTH,HEIGHT"),
-        (["--crop", "0:0:-1,0,4,4"], "which is no window"),
+        (["--crop", "0:0"], "--crop is '0:0', which is not a window. Write CAMERA:FRAME:X,Y,WIDTH,HEIGHT"),
+        (["--crop", "0:0:-1,0,4,4"], "which is not a window"),
         (["--crop", "8:0:0,0,4,4"], "There is no camera '8'"),
         (["--crop", "0:6:0,0,4,4"], "frame 6 is in no trained clip. Trained are frames 0 to 2, 3 to 5."),
         (["--crop", "0:0:29,0,4,4"], "reaches outside of the picture. Pictures of camera 0 are 32 x 24 pixels."),
         (["--crop", "0:0:0,0,0,4"], "empty or reaches outside"),
-        (["--crop", f"0:{'9' * 5000}:0,0,4,4"], "which is no window"),
+        (["--crop", f"0:{'9' * 5000}:0,0,4,4"], "which is not a window"),
     ],
 )
 def test_places_that_do_not_exist_end_with_2_before_anything_is_measured(project, capsys, arguments, expected):

@@ -1,4 +1,4 @@
-"""Which places the figures choose when nobody says any."""
+"""Which places the figures choose by themselves."""
 
 from __future__ import annotations
 

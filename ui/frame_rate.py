@@ -1,6 +1,6 @@
 """Renders frames of a project as the window does and says how long that takes; a program of its own, without a window.
 
-`python -m ui.gl.frame_rate PROJECT` prints one line, see app.evaluation.speed.window_drawing. Frames are decoded like
+`python -m ui.frame_rate PROJECT` prints one line, see app.evaluation.speed.window_drawing. Frames are decoded like
 those of the playback, all Gaussians of the clip; sorting, which a window leaves to a thread, is waited for.
 """
 
