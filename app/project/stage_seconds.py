@@ -22,5 +22,4 @@ def stages_of(row: Mapping[str, Any]) -> dict[str, float]:
 def memory_of(row: Mapping[str, Any]) -> float:
     """The memory_mb of a metrics row; 0 where there is none or it is not a number."""
     held = row.get("memory_mb")
-    is_known = isinstance(held, int | float) and math.isfinite(held) and held >= 0
-    return float(held) if is_known else 0.0
+    return float(held) if isinstance(held, int | float) and math.isfinite(held) and held >= 0 else 0.0

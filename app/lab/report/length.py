@@ -27,7 +27,7 @@ _COMPARED = (
 """What is said of early and late clips: column, name, unit and digits."""
 
 
-def length_section(evaluation: Mapping[str, Any], clips: Sequence[ClipFacts]) -> Section:
+def length_section(evaluation: dict[str, Any], clips: Sequence[ClipFacts]) -> Section:
     """Figures of every trained clip over the sequence, as charts and one table.
 
     Args:

@@ -141,7 +141,8 @@ def test_a_value_without_neighbours_is_seen():
     png = draw_over_time([CurvePanel("dB", [Curve("a", [20.0, None, 21.0])])], [0, 5, 10], (), "clip")
     with Image.open(io.BytesIO(png)) as image:
         colors = np.asarray(image.convert("RGB")).astype(int)
-    is_line = (np.abs(colors - tuple(bytes.fromhex(PALETTE[0][1:]))) < 30).all(2)
+    far = np.abs(colors - np.array(list(bytes.fromhex(PALETTE[0][1:]))))
+    is_line = np.asarray(np.less(far, 30).all(axis=2))
     assert is_line[:, : colors.shape[1] * 3 // 4].sum() > 10, "beside the legend, which stands on the right"
 
 
