@@ -14,12 +14,14 @@ from PIL import Image
 
 from engine.capture.came_along import came_along
 from engine.capture.capture import open_capture
+from engine.capture.clip import Clip
 from engine.capture.format_result import Layout
 from engine.synthetic.writing import write_video
 from engine.training.config import TrainConfig
 from engine.training.preparation.cloud_preparation import key_of_corrected
 
 MakeCapture = Callable[..., Path]
+CLIP = Clip(0, 0, 3, 3)
 
 
 @pytest.fixture
@@ -65,11 +67,18 @@ def test_kept_backgrounds_belong_to_masks_and_points(folder: Path, tmp_path: Pat
     points = tmp_path / "points.ply"
     points.write_bytes(b"p" * 1_000_000)
     with_points = replace(capture, layout=replace(capture.layout, points=points))
-    keys = [key_of_corrected(one, [0, 1], TrainConfig()) for one in (capture, with_points)]
+    keys = [key_of_corrected(one, CLIP, [0, 1], TrainConfig()) for one in (capture, with_points)]
     points.write_bytes(b"p" * 500_000 + b"q" + b"p" * 499_999)
-    keys.append(key_of_corrected(with_points, [0, 1], TrainConfig()))
+    keys.append(key_of_corrected(with_points, CLIP, [0, 1], TrainConfig()))
     moved = replace(with_points, layout=replace(with_points.layout, points_to_world=np.diag([2.0, 2.0, 2.0, 1.0])))
-    keys.append(key_of_corrected(moved, [0, 1], TrainConfig()))
+    keys.append(key_of_corrected(moved, CLIP, [0, 1], TrainConfig()))
     points.unlink()
-    keys.append(key_of_corrected(with_points, [0, 1], TrainConfig()))
+    keys.append(key_of_corrected(with_points, CLIP, [0, 1], TrainConfig()))
     assert all(first != second for row, first in enumerate(keys) for second in keys[:row])
+
+
+def test_kept_backgrounds_of_a_clip_belong_to_it(folder: Path) -> None:
+    capture, other = open_capture(folder), Clip(1, 3, 3, 3)
+    of_clip, of_capture = TrainConfig(backgrounds="clip"), TrainConfig()
+    assert key_of_corrected(capture, CLIP, [0, 1], of_clip) != key_of_corrected(capture, other, [0, 1], of_clip)
+    assert key_of_corrected(capture, CLIP, [0, 1], of_capture) == key_of_corrected(capture, other, [0, 1], of_capture)

@@ -1,4 +1,4 @@
-"""The section on length: one line per clip, whatever is unknown of it, and what is said of early and late clips."""
+"""The section on length: one line per clip, whatever is unknown of it, and what is said about early and late clips."""
 
 from __future__ import annotations
 
