@@ -34,13 +34,15 @@ def measure_light(
     """Give a model that inherits static anchors as they are the light on them at the start and the end of its clip.
 
     Args:
-        model: Of a clip; one whose static anchors learn, or change over time, stays as it is.
+        model: Of a clip; one whose static anchors learn, or change over time, or that has none, stays as it is.
         pictures: Of the clip, in the exposure of the backgrounds.
         rig: Training cameras.
         backgrounds: What they see in the reference clip when nothing moves.
         exposures: That of each background; None where no camera's exposure is looked at.
         report: Gets one line.
     """
+    if STATIC not in model.roles():
+        return
     anchors = model.anchor_set(STATIC)
     if anchors.is_trainable or anchors.is_dynamic:
         return

@@ -112,6 +112,14 @@ def test_without_deduplication_points_of_still_things_become_anchors_too(tiny, p
     assert len(training.model.anchor_set("residual")) == coverage.n_points > 0
 
 
+def test_a_clip_that_inherits_no_anchors_has_those_of_its_own_frames_alone(tiny, paper_prep, reference):
+    training = tiny.prepared(1, reference=reference, prep_dir=paper_prep, **PAPER | {"inherit": "off"})
+    assert training.model.roles() == ["residual"]
+    coverage = training.state().header.coverage
+    assert coverage.n_inherited == 0 < coverage.n_residual == len(training.model.anchor_set("residual"))
+    finish(training)
+
+
 def test_a_training_of_the_paper_preset_goes_on_exactly(tiny, paper_prep, reference, tmp_path):
     whole = finish(tiny.prepared(1, reference=reference, prep_dir=paper_prep, **PAPER))
     stopped = take_steps(tiny.prepared(1, reference=reference, prep_dir=paper_prep, **PAPER), 3)
