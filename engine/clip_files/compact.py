@@ -27,7 +27,8 @@ _LIGHT_BITS = 8
 _POSITION_BITS = 16
 """Of positions on no lattice, per axis of their bounding box: 0.2 mm in a hall of 20 m."""
 _MAX_POSITION_ERROR = 0.01
-"""Largest error of such a position, spacings of the static anchors; where the box is too large they stay exact."""
+"""Largest error of such a position, spacings of the static anchors, and cells of the field where it is read there;
+where the box is too large they stay exact."""
 
 Codec = tuple[str, dict[str, Any]]
 
@@ -100,7 +101,8 @@ def _codecs(name: str, array: np.ndarray, state: ClipState) -> list[Codec]:
     if table_index(name) is not None:
         return [("steps", {"bits": _TABLE_BITS}), exact]
     if kind == "positions":
-        return [*_position_codecs(array, state), exact]
+        is_in_field = name.replace("positions", "presence") in state.arrays
+        return [*_position_codecs(array, state, is_in_field=is_in_field), exact]
     if kind in _BITS and not state.is_reference:
         return [("steps", {"bits": _BITS[kind]}), exact]
     if name.endswith(".light"):
@@ -112,13 +114,17 @@ def _codecs(name: str, array: np.ndarray, state: ClipState) -> list[Codec]:
     return [exact]
 
 
-def _position_codecs(array: np.ndarray, state: ClipState) -> list[Codec]:
-    """Hulls lie on a grid of voxels; other positions get steps where those are small against the anchors' spacing."""
+def _position_codecs(array: np.ndarray, state: ClipState, *, is_in_field: bool) -> list[Codec]:
+    """Hulls lie on a grid of voxels; other positions get steps where those are small against the anchors' spacing, and
+    against the finest cells of the field, which would be read elsewhere than it has learned."""
     codecs: list[Codec] = []
     if state.header.moving_spacing:
         codecs.append(("lattice", {"spacing": state.header.moving_spacing}))
     side = float(np.ptp(array, axis=0).max()) if len(array) else 0.0
-    if side / 2 ** (_POSITION_BITS + 1) < _MAX_POSITION_ERROR * state.header.spacing:
+    smallest, field = state.header.spacing, state.header.field
+    if is_in_field and field is not None:
+        smallest = min(smallest, field.side * min(field.aspect) / max(field.cells))
+    if side / 2 ** (_POSITION_BITS + 1) < _MAX_POSITION_ERROR * smallest:
         codecs.append(("steps", {"bits": _POSITION_BITS}))
     return codecs
 

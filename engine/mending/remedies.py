@@ -24,7 +24,7 @@ MakeTraining = Callable[[int, TrainConfig], ClipTraining]
 """Clip index and settings to a training that is not prepared."""
 ReportSteps = Callable[[int, int], None]
 """Told steps done, and all of them."""
-_RATES = ("feature_lr", "scale_lr", "table_lr", "field_mlp_lr")
+_RATES = ("feature_lr", "scale_lr", "position_lr", "table_lr", "field_mlp_lr")
 _FADING, _LEARNING = (8, 0.5), (6, 0.5)
 """Passes over the pictures, and shares of the rates that a training begins with: what is learned is near already."""
 _REST_SHARE = 0.5

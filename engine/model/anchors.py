@@ -111,7 +111,7 @@ class AnchorSet(nn.Module):
 
     def learn_positions(self) -> None:
         """From here on the positions are parameters. Nothing happens where they are already, or nothing here learns."""
-        if self.is_trainable and not self.positions.requires_grad:
+        if self.is_trainable and not isinstance(self.positions, nn.Parameter):
             positions = self.positions
             del self.positions
             self.positions = nn.Parameter(positions)

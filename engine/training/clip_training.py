@@ -188,9 +188,7 @@ class ClipTraining:
         name, n_steps = self.phases[index]
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
-        if self.config.position_lr:
-            for role in self.model.roles():
-                self.model.anchor_set(role).learn_positions()
+        self._learn_positions()
         parameters = named_parameters(self.model, self.gains, self.config, self._cameras.pixels, extent=self.rig.extent)
         ratios = self.method.final_ratios(parameters, self.config)
         self._optimizer = PhaseOptimizer(
@@ -209,6 +207,12 @@ class ClipTraining:
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
+
+    def _learn_positions(self) -> None:
+        """Positions of what learns are parameters from here on, if they learn at all."""
+        if self.config.position_lr:
+            for role in self.model.roles():
+                self.model.anchor_set(role).learn_positions()
 
     def _items_of(self, phase: str) -> list[int]:
         """Numbers of what a phase draws: cameras, or pictures camera by camera; without what is excluded altogether."""
@@ -441,6 +445,7 @@ class ClipTraining:
                 coverage=header.coverage,
             )
         )
+        self._learn_positions()
         for name, parameter in self.model.named_parameters():
             if not name.startswith((DECODER, *learning)):  # heads that learn are stored, and are so ever after
                 parameter.requires_grad = False

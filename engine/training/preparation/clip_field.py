@@ -80,5 +80,5 @@ def _alive_positions(model: ClipModel) -> Tensor:
     for role in model.roles():
         anchors = model.anchor_set(role)
         if anchors.presence is not None and len(anchors):
-            parts.append(anchors.positions[anchors.presence.any(1)].float().cpu())
+            parts.append(anchors.positions.detach()[anchors.presence.any(1)].float().cpu())
     return torch.cat(parts)

@@ -185,7 +185,7 @@ class ClipPreparation:
         """
         drift, exposures = self._without_drift(pictures)
         backgrounds = self._estimated(self._clip, exposures) if self._needs_backgrounds else blank(pictures)
-        cloud = self._frames_cloud(pictures)
+        cloud = self._frames_cloud(pictures, drift)
         sizes = np.full(len(cloud.points), cloud.spacing, np.float32)
         static = StaticCloud(cloud.points, cloud.colors, sizes, cloud.gains, cloud.spacing)
         model = static_model(static, self._clip, self._config, self._backend, self._generator)
@@ -216,7 +216,8 @@ class ClipPreparation:
         parts = self._inherited_parts(reference, pictures)
         model, moving_spacing = parts.model, None
         if self._config.cloud == "frames":
-            found = self._frames_cloud(pictures, spacing=parts.spacing, gains=host_array(parts.gains))
+            gains = host_array(parts.gains)
+            found = self._frames_cloud(pictures, parts.drift, spacing=parts.spacing, gains=gains)
             everywhere = np.ones((len(found.points), self._clip.n_frames), bool)
             cloud = MovingCloud(found.points, found.colors, everywhere, found.spacing)
         else:
@@ -338,8 +339,19 @@ class ClipPreparation:
         return estimate_backgrounds(self._capture, clip, cameras, exposures, self._config, self._report, keep)
 
     def _frames_cloud(
-        self, pictures: TrainingPictures, *, spacing: float | None = None, gains: np.ndarray | None = None
+        self,
+        pictures: TrainingPictures,
+        drift: np.ndarray,
+        *,
+        spacing: float | None = None,
+        gains: np.ndarray | None = None,
     ) -> FramesCloud:
+        """The cloud of all frames of the clip, kept or new.
+
+        Args:
+            drift: What was taken out of the pictures.
+            spacing, gains: Of the reference clip; None for a reference clip.
+        """
         rig, config, keep = self._cameras.rig, self._config, self._stages.keep
 
         def build() -> FramesCloud:
@@ -351,6 +363,7 @@ class ClipPreparation:
             "poses": fingerprint_of({"poses": rig.world_to_camera, "Ks": rig.Ks}),
             "at_most": [config.max_static_points, config.max_moving_points],
             "color": config.color,
+            **({"drift": fingerprint_of({"drift": drift})} if (drift != 1.0).any() else {}),
             "spacing": spacing,
             "gains": None if gains is None else gains.tolist(),
         }

@@ -127,6 +127,19 @@ def test_values_beyond_half_precision_and_positions_in_a_wide_world_stay_exact(r
         assert np.array_equal(clip.state.arrays[name], reference.arrays[name])
 
 
+def test_positions_stay_exact_where_the_field_would_be_read_elsewhere(reference):
+    source = make_source(reference)
+    name = "sets.residual.positions"
+    arrays = source.arrays | {name: source.arrays[name] + np.float32(1e-3) * np.arange(900).reshape(300, 3)}
+    arrays[name] = arrays[name].astype(np.float32)  # learned: on no lattice
+    field = source.header.field
+    coarse = replace(source.header, field=replace(field, cells=(4,) * len(field.cells)))
+    fine = replace(source.header, field=replace(field, cells=(4,) * (len(field.cells) - 1) + (1 << 19,)))
+    rounded, kept = (compact_clip(ClipState(arrays, header)).state.arrays[name] for header in (coarse, fine))
+    assert not np.array_equal(rounded, arrays[name])
+    assert np.array_equal(kept, arrays[name])
+
+
 def test_files_of_the_first_schema_are_read(reference, tmp_path):
     write_clip_state(tmp_path / "old.safetensors", with_header(reference, schema=1))
     found = read_clip_state(tmp_path / "old.safetensors")

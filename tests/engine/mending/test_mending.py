@@ -157,8 +157,11 @@ def test_a_fade_goes_evenly_from_one_look_to_the_other(tiny: Tiny, trained: Clip
     assert np.allclose(pictures.picture(0, span.stop - clip.start), np.clip(end, 0, 1))
 
 
-def test_taking_up_a_clip_changes_nothing_before_the_first_step(tiny: Tiny, trained: ClipState) -> None:
-    training = tiny.training(1)
+@pytest.mark.parametrize("position_lr", [0.0, 1e-3])
+def test_taking_up_a_clip_changes_nothing_before_the_first_step(
+    tiny: Tiny, trained: ClipState, position_lr: float
+) -> None:
+    training = tiny.training(1, position_lr=position_lr)
     case = Case(tiny, {0: tiny.reference, 1: trained})
     looks = Looks(tiny.capture, case.shown(), training.camera_indices)
     clip = tiny.clips[1]

@@ -13,6 +13,7 @@ from engine.errors import ProjectError
 from engine.model.host_array import host_array
 from engine.training.clip_training import seed_of
 from engine.training.config import TrainConfig
+from engine.training.preparation.kept_clouds import CLOUD_FILES
 from engine.training.presets import preset
 from tests.engine.training.tiny_training import finish, same_arrays, take_steps
 
@@ -145,6 +146,17 @@ def test_what_is_trained_is_what_is_shown_where_positions_learn(tiny, paper_prep
     before = training.model.decode(0.0).means.detach()
     training.finish()
     assert torch.equal(training.model.decode(0.0).means.detach(), before)
+
+
+def test_a_kept_cloud_is_of_pictures_in_the_same_exposure(tiny, paper_prep, reference):
+    training = tiny.prepared(1, reference=reference, prep_dir=paper_prep, **PAPER)
+    before = set(paper_prep.glob(CLOUD_FILES))
+    drift = training.drift.copy()
+    for gain in (1.0, 1.02):
+        drift[0, 0] = gain
+        training._preparation._frames_cloud(training.pictures, drift, spacing=reference.header.spacing)
+    # unlike those of the clip itself, these are measured without gains
+    assert len(set(paper_prep.glob(CLOUD_FILES)) - before) == 2
 
 
 def test_frames_need_no_gate():

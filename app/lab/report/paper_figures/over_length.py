@@ -58,7 +58,8 @@ def clip_length_section(compared: Sequence[Compared]) -> Section | None:
     def series(name: str) -> list[Series]:
         found = []
         for family in families.values():
-            points = sorted((one.facts.settings.clip_length, by_name[one.facts.name][name]) for one in family)
+            in_order = sorted(family, key=lambda one: one.facts.settings.clip_length)
+            points = [(one.facts.settings.clip_length, by_name[one.facts.name][name]) for one in in_order]
             found.append(Series(family[0].facts.name, points))
         return found
 
