@@ -77,7 +77,7 @@ class FieldShape(Struct, frozen=True):
     is_rectified: bool = False
 
     def __post_init__(self) -> None:
-        if self.n_knots * self.n_entries * self.channels * len(self.cells) > _MAX_TABLE_VALUES:
+        if max(self.n_tables * self.n_entries * self.channels, self.n_knots) * len(self.cells) > _MAX_TABLE_VALUES:
             raise ValueError(f"more than {_MAX_TABLE_VALUES} values in its tables")
         if not all(map(math.isfinite, self.bounds_min)):
             raise ValueError(f"bounds_min {shown(self.bounds_min)}")

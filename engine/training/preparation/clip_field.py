@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from torch import Tensor
 
 from engine.clip_files.clip_header import FieldShape
+from engine.errors import PreparationError
 from engine.model.clip_model import ClipModel
 from engine.model.field import SpatioTemporalField
 from engine.model.field_sizes import derive_cells, derive_log2_entries
@@ -23,6 +26,8 @@ def fit_field(
     Args:
         spacing: Distance between moving anchors, scene units.
         is_shared: Whether all frames share one table; else every frame has its own.
+    Raises:
+        PreparationError: Its tables would be too large.
     """
     positions, most_alive = _alive_positions(model), n_alive(model)
     if len(positions) == 0:
@@ -47,7 +52,7 @@ def fit_field(
     )
     x, y, z = (lower - margin).tolist()
     sides = (upper - lower).clamp(min=1e-6 * side) / side
-    shape = FieldShape(
+    shape = _shape_of(
         n_knots=model.n_frames,
         cells=cells,
         n_entries=2**log2_entries,
@@ -66,6 +71,16 @@ def fit_field(
         f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
         f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({most_alive} anchors alive)"
     )
+
+
+def _shape_of(**sizes: Any) -> FieldShape:
+    try:
+        return FieldShape(**sizes)
+    except ValueError as error:
+        raise PreparationError(
+            f"The field of {sizes['n_knots']} frames would have {error}.",
+            hint="Take shorter clips, fewer levels or entries, or one table for all frames (field_tables=shared).",
+        ) from error
 
 
 def n_alive(model: ClipModel) -> int:

@@ -133,6 +133,7 @@ def test_positions_stay_exact_where_the_field_would_be_read_elsewhere(reference)
     arrays = source.arrays | {name: source.arrays[name] + np.float32(1e-3) * np.arange(900).reshape(300, 3)}
     arrays[name] = arrays[name].astype(np.float32)  # learned: on no lattice
     field = source.header.field
+    assert field is not None
     coarse = replace(source.header, field=replace(field, cells=(4,) * len(field.cells)))
     fine = replace(source.header, field=replace(field, cells=(4,) * (len(field.cells) - 1) + (1 << 19,)))
     rounded, kept = (compact_clip(ClipState(arrays, header)).state.arrays[name] for header in (coarse, fine))
