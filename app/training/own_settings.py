@@ -34,7 +34,8 @@ def offered(project: Project, clip_index: int) -> tuple[str, ...]:
     """The main ones of a clip: those that a dialog shows."""
     config = project.settings.config()
     if not is_source(project.settings, config, clip_index):
-        return (*_OF_REFERENCE, *_OF_BOTH)
+        has_static_phase = config.cloud != "frames"
+        return (*(name for name in _OF_REFERENCE if has_static_phase or name != "static_steps"), *_OF_BOTH)
     shared = ("residual",) if config.independent else ()
     return tuple(name for name in (*_OF_SOURCE, *_OF_BOTH) if name not in shared)
 

@@ -435,6 +435,11 @@ class TrainConfig(msgspec.Struct, frozen=True):
         """Whether a source clip shows the reference clip's static anchors exactly as they are there."""
         return self.inherit in ("frozen", "moving") and self.decoder == "frozen"
 
+    @property
+    def needs_backgrounds(self) -> bool:
+        """Whether backgrounds are estimated: with cloud=frames nothing but exposures is measured against them."""
+        return self.cloud != "frames" or self.color != "off"
+
     def n_static_steps(self, n_cameras: int) -> int:
         """Steps of the static phase for this many training cameras."""
         return self.static_steps or STATIC_RULE.steps(n_cameras)

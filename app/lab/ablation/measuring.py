@@ -118,6 +118,9 @@ def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measur
 
 def _key(project: Project, scope: Scope) -> dict[str, Any]:
     """Everything that the figures depend on."""
+    from engine.metrics.pictures import lpips
+
+    has_lpips = scope.metrics == "all" and lpips.why_missing() is None
     headers = [read_clip_header(project.clip_path(i)) for i in scope.clips]
     return {
         "clips": [None if header is None else header.fingerprint for header in headers],
@@ -125,6 +128,7 @@ def _key(project: Project, scope: Scope) -> dict[str, Any]:
         "metrics": scope.metrics,
         "precision": scope.precision,
         "schema": MEASURED_SCHEMA,
+        **({"lpips": True} if has_lpips else {}),
     }
 
 

@@ -245,7 +245,9 @@ def make_plan(
     n_static, n_moving = expected_anchors(footage, config, reference)
     sizes = StepSizes(footage.width, footage.height, round(SEEN_SHARE * n_static), n_moving, config)
     n_pictures = footage.n_cameras * clip.n_frames
-    n_read = n_pictures if is_source else footage.n_cameras * min(footage.n_frames, config.background_frames)
+    n_read = n_pictures
+    if not is_source and config.needs_backgrounds and config.backgrounds == "capture":
+        n_read = footage.n_cameras * min(footage.n_frames, config.background_frames)
     preparation = expected_from(same, "preparation_s") or Expected(
         rough_preparation_s(
             n_cameras=footage.n_cameras,
@@ -303,7 +305,7 @@ def _picture_lines(footage: Footage, clip: Clip, config: TrainConfig, *, is_sour
     n_pictures = footage.n_cameras * clip.n_frames
     counted = f"{footage.n_cameras} cameras ({left_out}) x {_plural(clip.n_frames, 'frame')}"
     lines = [PlanLine("pictures", n_pictures, "", f"{counted}, {footage.width}x{footage.height}")]
-    if not is_source and (config.cloud == "parts" or config.color != "off"):
+    if not is_source and config.needs_backgrounds:
         whose, n_all = "the clip", clip.n_frames
         if config.backgrounds == "capture":
             whose, n_all = "the capture", footage.n_frames

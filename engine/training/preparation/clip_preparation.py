@@ -184,7 +184,7 @@ class ClipPreparation:
             PreparationError: No point was found.
         """
         drift, exposures = self._without_drift(pictures)
-        backgrounds = self._estimated(self._clip, exposures) if self._needs_backgrounds else blank(pictures)
+        backgrounds = self._estimated(self._clip, exposures) if self._config.needs_backgrounds else blank(pictures)
         cloud = self._frames_cloud(pictures, drift)
         sizes = np.full(len(cloud.points), cloud.spacing, np.float32)
         static = StaticCloud(cloud.points, cloud.colors, sizes, cloud.gains, cloud.spacing)
@@ -249,7 +249,7 @@ class ClipPreparation:
         model = inheriting_model(reference, self._clip, self._backend, learns=self._method.learns_inherited)
         self._say("Taking over the reference", self._method.words(self._config))
         backgrounds = blank(pictures)
-        if self._needs_backgrounds:
+        if self._config.needs_backgrounds:
             kept = read_backgrounds(self._prep_dir, self._key_of_corrected())
             backgrounds = kept or self._backgrounds_of(reference, model, gains)
         exposures = exposures_in(backgrounds.images) if self._has_drift else None
@@ -273,7 +273,7 @@ class ClipPreparation:
         Raises:
             DiskError: The disk refused.
         """
-        if not self._needs_backgrounds:
+        if not self._config.needs_backgrounds:
             return
         is_valid = self._capture.valid_of(self._camera_indices)
         backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains), is_valid)
@@ -320,11 +320,6 @@ class ClipPreparation:
     @property
     def _has_drift(self) -> bool:
         return self._config.color != "off"
-
-    @property
-    def _needs_backgrounds(self) -> bool:
-        """With cloud=frames nothing but exposures is measured against them."""
-        return self._config.cloud != "frames" or self._has_drift
 
     def _without_drift(self, pictures: TrainingPictures) -> tuple[np.ndarray, list[Exposure] | None]:
         """Drift within a reference clip, which its pictures lose, and its exposures; None where they do not count."""

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -212,6 +215,9 @@ def test_settings_of_one_clip_are_those_that_leave_the_others_alone(six: OpenedP
         assert set(offered(six.project, index)) <= set(ALLOWED)
     assert "joint_steps" in offered(six.project, 0)
     assert "source_steps" in offered(six.project, 1)
+    frames = replace(six.project.settings, overrides={"gate": "off", "cloud": "frames"})
+    with_frames: Any = SimpleNamespace(settings=frames)
+    assert set(offered(six.project, 0)) - set(offered(with_frames, 0)) == {"static_steps"}, "there is no such phase"
     shared = {"static_feature_dim", "gaussians_per_anchor", "color", "gate", "decoder", "inherit", "field", "backend"}
     assert not shared & set(ALLOWED)
     assert with_own(six.project, {"source_steps": 7, "residual": "none"}) == {"source_steps": 7, "residual": "none"}

@@ -107,6 +107,18 @@ def test_a_source_clip_says_how_far_it_lies_from_its_reference():
     assert not {"distance", "exposure"} & texts(plan()).keys()
 
 
+def test_a_cloud_of_all_frames_needs_no_phase_and_no_backgrounds():
+    found = plan(config=TrainConfig(gate="off", cloud="frames", color="off"))
+    assert not {"static steps", "background frames", "static anchors"} & texts(found).keys()
+    assert texts(found)["anchors"][0] == "<= 54,000"
+    with_backgrounds = plan(config=TrainConfig(gate="off", cloud="frames"))
+    assert "background frames" in texts(with_backgrounds)
+    least, most = found.memory_mb.value, with_backgrounds.memory_mb.value
+    assert least is not None
+    assert most is not None
+    assert least < most
+
+
 def test_one_frame():
     lines = texts(plan(clip=dataclasses.replace(CLIP, n_frames=1)))
     assert lines["pictures"][0] == 27
