@@ -93,7 +93,8 @@ def anchor_sets(header, arrays, reference):
 
 def dynamic_features(positions, field, arrays, knot):
     """The spatio-temporal field at anchors and a frame of the clip: a hash grid, then two layers."""
-    unit = (positions.astype(np.float64) - field["bounds_min"]) / field["side"]
+    sides = field["side"] * np.asarray(field.get("aspect", (1.0, 1.0, 1.0)))
+    unit = (positions.astype(np.float64) - field["bounds_min"]) / sides
     table = arrays["field.tables.0" if field.get("is_shared") else f"field.tables.{knot}"]  # [levels, entries, values]
     levels, mask = [], field["n_entries"] - 1
     for level, n_cells in enumerate(field["cells"]):
@@ -116,7 +117,8 @@ def dynamic_features(positions, field, arrays, knot):
             total = total + weight[:, None] * table[level][(index & np.uint64(mask)).astype(np.int64) ^ key]
         levels.append(total)
     hidden = np.maximum(np.concatenate(levels, 1) @ arrays["field.hidden.weight"].T, 0)
-    return hidden @ arrays["field.out.weight"].T
+    features = hidden @ arrays["field.out.weight"].T
+    return np.maximum(features, 0) if field.get("is_rectified") else features
 
 
 def decode(header, arrays, reference, frame_in_clip):

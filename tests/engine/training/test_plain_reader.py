@@ -52,7 +52,14 @@ def test_the_reference_clip(reference: Path):
 
 @pytest.mark.parametrize(
     "settings",
-    [{}, {"field_tables": "shared"}, {"decoder": "finetune"}, {"inherit": "trainable"}, {"residual": "none"}],
+    [
+        {},
+        {"field_tables": "shared"},
+        {"field_form": "published"},
+        {"decoder": "finetune"},
+        {"inherit": "trainable"},
+        {"residual": "none"},
+    ],
     ids=str,
 )
 def test_source_clips(tiny: Tiny, reference: Path, tmp_path: Path, settings: dict[str, Any]):
