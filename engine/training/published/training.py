@@ -28,14 +28,15 @@ TRAINING = (
     Point(
         "length and order",
         "released code",
-        released="34 passes over the pictures of a clip, every picture once a pass, one at a step",
+        released="34 passes over the pictures of a clip for its Long 360 capture, every picture once a pass, one at a "
+        "step",
         settings={"passes": 34},
     ),
     Point("what a step compares", "released code", released="whole pictures", settings={"tiles": "all"}),
     Point(
         "end of a pass",
         "neither",
-        released="one picture more, drawn again",
+        released="a step more, with the last picture again",
         here="the next pass begins",
         reason="it seems not to be meant",
     ),
