@@ -41,11 +41,11 @@ class Published:
 
 
 CAVEATS = (
-    "Published figures are of all 150 frames. That their colours are raw follows from the authors' training code and is "
-    "not said by them: it learns a gain and an offset of each training camera at the first frame, and none of a test "
-    "camera. No code of their evaluation was ever published; re-runs by others differ from the printed figures by up to "
-    "1.7 dB per sequence. Copied from texts that copy the papers' tables. Compare raw PSNR, of all 150 frames; never "
-    "PSNR after the colour fit."
+    "Published figures are of all 150 frames. That their colours are raw follows from the authors' training code and "
+    "is not said by them: it learns a gain and an offset of each training camera at the first frame, and none of a "
+    "test camera. No code of their evaluation was ever published; re-runs by others differ from the printed figures by "
+    "up to 1.7 dB per sequence. Copied from texts that copy the papers' tables. Compare raw PSNR, of all 150 frames; "
+    "never PSNR after the colour fit."
 )
 _LUITEN = "Luiten et al., Dynamic 3D Gaussians (3DV 2024), table 1"
 _S4D = "S4D, table 4"

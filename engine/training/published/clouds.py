@@ -25,10 +25,11 @@ CLOUDS = (
         "stereo",
         "neither",
         paper="COLMAP",
-        released="COLMAP's PatchMatch for every frame, and its fusion",
+        released="COLMAP's PatchMatch for every frame, and its fusion; such clouds come with its captures",
         here="our own, at about 160 x 90 pixels: a plane sweep and slanted patches, in a later frame only where its "
-        "picture differs from that of the clip's first one; only what other cameras agree with is kept",
-        reason="COLMAP's PatchMatch needs CUDA",
+        "picture differs from that of the clip's first one; only what other cameras agree with is kept; clouds that "
+        "come along are not used",
+        reason="COLMAP's PatchMatch needs CUDA, and clouds of all clips would have to come along",
         settings={"cloud": "frames"},
     ),
     Point(
