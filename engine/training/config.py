@@ -145,8 +145,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "The point clouds that anchors come from.",
             {
                 "parts": "what stands still by stereo of the backgrounds, what moves by visual hulls",
-                "frames": "everything by stereo of every frame of the clip, as published; needs gate=off, and has at "
-                "most as many anchors as both limits below allow together",
+                "frames": "everything by stereo of every frame of the clip, as published; needs gate=off; the voxel grows "
+                "until a reference clip has no more anchors than both limits below together",
             },
         ),
     ] = "parts"
@@ -154,10 +154,10 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             CLOUDS,
-            "Where the frames lie that a camera's background is estimated from.",
+            "Frames that a camera's background is estimated from.",
             {
                 "capture": "spread over the whole capture",
-                "clip": "in the clip itself, so that it can be trained before the capture is complete",
+                "clip": "those of the clip itself, so that it can be trained before the capture is complete",
             },
         ),
     ] = "capture"
