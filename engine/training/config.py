@@ -145,8 +145,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "The point clouds that anchors come from.",
             {
                 "parts": "what stands still by stereo of the backgrounds, what moves by visual hulls",
-                "frames": "everything by stereo of every frame of the clip, as published; needs gate=off; the voxel grows "
-                "until a reference clip has no more anchors than both limits below together",
+                "frames": "everything by stereo of every frame of the clip, as published; needs gate=off; the voxel "
+                "grows until a reference clip has no more anchors than both limits below together",
             },
         ),
     ] = "parts"
