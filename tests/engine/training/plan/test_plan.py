@@ -107,6 +107,12 @@ def test_a_source_clip_says_how_far_it_lies_from_its_reference():
     assert not {"distance", "exposure"} & texts(plan()).keys()
 
 
+def test_a_source_clip_of_frames_has_as_many_anchors_as_it_needs():
+    config = TrainConfig(cloud="frames", gate="off")
+    line = texts(plan(clip=NEXT, is_source=True, config=config))["residual anchors"]
+    assert line == (None, "all points that inherited anchors do not cover")
+
+
 def test_one_frame():
     lines = texts(plan(clip=dataclasses.replace(CLIP, n_frames=1)))
     assert lines["pictures"][0] == 27
