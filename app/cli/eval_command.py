@@ -26,7 +26,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
     add_figure_choices(command, default="all", said="all")
     command.add_argument(
-        "--fps", action="store_true", help="measure how many pictures are rendered per second too, some seconds"
+        "--fps",
+        action="store_true",
+        help="also measure how many pictures are rendered per second, which takes some seconds",
     )
     command.add_argument("--quiet", action="store_true", help="no progress")
 

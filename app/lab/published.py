@@ -1,8 +1,8 @@
 """Figures that others have published of data that can be trained here too, with their sources and what to beware of.
 
 All are of the Panoptic Sports sequences as Dynamic 3D Gaussians cut them: 150 frames, 640 x 360 px, 27 cameras trained
-on and cameras 0, 10, 15 and 30 tested, colours as rendered. None was read in the papers themselves, whose tables were
-not at hand: they are copied from texts that copy them, which is said beside each.
+on and cameras 0, 10, 15 and 30 tested, colours taken to be as rendered. None was read in the papers themselves, whose
+tables were not at hand: they are copied from texts that copy them.
 """
 
 from __future__ import annotations
@@ -41,10 +41,11 @@ class Published:
 
 
 CAVEATS = (
-    "Published figures are of all 150 frames. Their colours are raw: the authors learn a gain and an offset of each "
-    "training camera at the first frame, and none of a test camera. No code of their evaluation was ever published; "
-    "re-runs by others differ from the printed figures by up to 1.5 dB per sequence. Copied from texts that copy the "
-    "papers' tables. Compare raw PSNR, of all 150 frames; never PSNR after the colour fit."
+    "Published figures are of all 150 frames. That their colours are raw follows from the authors' training code and "
+    "is not said by them: it learns a gain and an offset of each training camera at the first frame, and none of a "
+    "test camera. No code of their evaluation was ever published; re-runs by others differ from the printed figures by "
+    "up to 1.7 dB per sequence. Copied from texts that copy the papers' tables. Compare raw PSNR, of all 150 frames; "
+    "never PSNR after the colour fit."
 )
 _LUITEN = "Luiten et al., Dynamic 3D Gaussians (3DV 2024), table 1"
 _S4D = "S4D, table 4"

@@ -75,6 +75,7 @@ class AnchorArrays:
         inherited_reasons, own_reasons: Why the gate decided so, codes of engine.gate.reasons. [A0], [A] uint8
         source: The frame they are of; unknown for all anchors of the clip.
         spacing: Distance between neighbours, scene units; 0 where unknown.
+        has_changing_static: Whether the static anchors have a dynamic feature, as with gate=off.
     """
 
     inherited_positions: np.ndarray
@@ -86,6 +87,7 @@ class AnchorArrays:
     own_reasons: np.ndarray | None = None
     source: PictureSource = UNKNOWN
     spacing: float = 0.0
+    has_changing_static: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

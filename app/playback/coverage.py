@@ -1,7 +1,8 @@
 """Coverage: the space that inherited anchors answer for, and how far a clip's own anchors lie from it. On one thread.
 
-A moving point of a source clip becomes a residual anchor where it lies outside all spheres around the anchors that move
-in the reference clip (engine.cloud.motion.dedup). The points that did not become anchors are not kept.
+A point of a source clip becomes a residual anchor where it lies outside all spheres around the anchors of the reference
+clip that can change: those that move there, or with gate=off all of them (engine.cloud.motion.dedup). The points that
+did not become anchors are not kept.
 """
 
 from __future__ import annotations
@@ -78,12 +79,14 @@ class CoverageFinder:
 
 
 def coverage_of(request: CoverageRequest) -> Coverage:
-    """Measure. There are no spheres where a clip inherits no anchor that moves, as in the reference clip."""
+    """Measure. There are no spheres where a clip inherits no anchor that can change, as in the reference clip."""
     from engine.cloud.motion.dedup import mean_neighbor_distance, union_distance
 
     anchors = request.anchors
     is_inherited = len(anchors.inherited_positions) > 0
-    centers = _of_role(anchors.inherited_positions, anchors.inherited_roles, "moving")
+    centers = anchors.inherited_positions
+    if not anchors.has_changing_static:
+        centers = _of_role(centers, anchors.inherited_roles, "moving")
     adapted = _of_role(anchors.own_positions, anchors.own_roles, "adapted")  # took the place of inherited ones
     centers = np.concatenate([centers, adapted]) if is_inherited else centers[:0]
     points = _of_role(anchors.own_positions, anchors.own_roles, "residual")

@@ -335,4 +335,5 @@ def _anchor_arrays(view: AnchorView, key: Hashable, spacing: float, source: Pict
         own_reasons=view.own_reasons,
         source=source,
         spacing=spacing,
+        has_changing_static=view.has_changing_static,
     )

@@ -44,6 +44,7 @@ class AnchorView:
         inherited_roles: Likewise. [A0] uint8
         own_reasons: Why the gate decided so, a code of engine.gate.reasons. [A] uint8
         inherited_reasons: Likewise. [A0] uint8
+        has_changing_static: Whether the static anchors have a dynamic feature, as with gate=off.
     """
 
     inherited_positions: np.ndarray
@@ -52,6 +53,7 @@ class AnchorView:
     inherited_roles: np.ndarray
     own_reasons: np.ndarray
     inherited_reasons: np.ndarray
+    has_changing_static: bool = False
 
     def chosen(self, inherited: np.ndarray, own: np.ndarray) -> AnchorView:
         """Some of them. inherited: [A0] bool, own: [A] bool"""
@@ -62,6 +64,7 @@ class AnchorView:
             inherited_roles=self.inherited_roles[inherited],
             own_reasons=self.own_reasons[own],
             inherited_reasons=self.inherited_reasons[inherited],
+            has_changing_static=self.has_changing_static,
         )
 
 
@@ -291,6 +294,7 @@ class ClipModel(nn.Module):
             inherited_roles=inherited_roles,
             own_reasons=own_reasons,
             inherited_reasons=inherited_reasons,
+            has_changing_static=STATIC in self.roles() and self.anchor_set(STATIC).is_dynamic,
         )
 
     def entries_in_use(self) -> list[np.ndarray]:

@@ -145,7 +145,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "The point clouds that anchors come from.",
             {
                 "parts": "what stands still by stereo of the backgrounds, what moves by visual hulls",
-                "frames": "everything by stereo of every frame of the clip, as published; needs gate=off",
+                "frames": "everything by stereo of every frame of the clip, as published; needs gate=off; the voxel "
+                "grows until a reference clip has no more anchors than both limits below together",
             },
         ),
     ] = "parts"
@@ -153,10 +154,10 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             CLOUDS,
-            "Where the frames lie that a camera's background is estimated from.",
+            "Frames that a camera's background is estimated from.",
             {
                 "capture": "spread over the whole capture",
-                "clip": "in the clip itself, so that it can be trained before the capture is complete",
+                "clip": "those of the clip itself, so that it can be trained before the capture is complete",
             },
         ),
     ] = "capture"
@@ -241,7 +242,13 @@ class TrainConfig(msgspec.Struct, frozen=True):
     offset_head_lr: Annotated[float, _rate("the head of offsets")] = 4e-3
     position_lr: Annotated[
         float,
-        _rate("the anchors' positions, as a share of how far the cameras reach; with 0 they stay as they are,"),
+        setting(
+            RATES,
+            "Learning rate of the anchors' positions at the start of a phase, as a share of how far the cameras reach; "
+            "with 0 they stay where they are.",
+            low=0.0,
+            high=1.0,
+        ),
     ] = 0.0
     gain_lr: Annotated[float, _rate("the cameras' colour gains in the reference clip")] = 3e-4
     camera_lr: Annotated[float, _rate("corrections of cameras, in pixels at the working size,")] = 0.015
@@ -351,7 +358,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
             {
                 "dedup": "where the inherited ones leave space uncovered",
                 "none": "none",
-                "full": "all moving points of the clip, beside the inherited ones that cover them",
+                "full": "all points of the clip's cloud that may move, beside the inherited ones that cover them",
             },
         ),
     ] = "dedup"

@@ -92,7 +92,7 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None], 
     source_s = {clip.clip_index: clip.wall_s for clip in clips if clip.role == "source"}
     figures |= later_figures(document["means"]["clips"], group, source_s)
     figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
-    measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
+    measured = _measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
     with named_failure(place / MEASURED_FILE):
         content = {"key": key, "figures": measured.figures, "n_frames": measured.n_frames}
         write_checked_json(place / MEASURED_FILE, content)
@@ -140,4 +140,10 @@ def _read(path: Path, key: dict[str, Any]) -> Measured | None:
     if content.get("key") != key:
         return None
     figures, n_frames = content.get("figures"), content.get("n_frames")
-    return Measured(figures, n_frames) if isinstance(figures, dict) and isinstance(n_frames, int) else None
+    return _measured(figures, n_frames) if isinstance(figures, dict) and isinstance(n_frames, int) else None
+
+
+def _measured(figures: dict[str, float | None], n_frames: int) -> Measured:
+    """With what follows from the figures."""
+    size = figures.get("megabytes")
+    return Measured(figures | {"mb_per_frame": None if size is None else size / n_frames}, n_frames)

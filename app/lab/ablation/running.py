@@ -242,7 +242,11 @@ def _take_clouds(project: Project) -> None:
     """Copy clouds of frames that other variants and seeds have made; their names say what they are of."""
     project.prep_dir.mkdir(parents=True, exist_ok=True)
     for path in sorted(project.folder.parent.glob(f"*/{project.prep_dir.name}/{CLOUD_FILES}")):
-        if not (project.prep_dir / path.name).exists():
+        if (project.prep_dir / path.name).exists():
+            continue
+        try:
+            (project.prep_dir / path.name).hardlink_to(path)  # such files are never changed in place
+        except OSError:  # of a disk without links
             with atomic_path(project.prep_dir / path.name) as partial:
                 shutil.copyfile(path, partial)
 

@@ -36,6 +36,7 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "later_s": ("s per later clip", 0),
     "minutes": ("minutes", 1),
     "megabytes": ("MB", 2),
+    "mb_per_frame": ("MB per frame", 3),
     "fps_cpu": ("FPS CPU", 1),
     "fps_gl": ("FPS GL", 1),
     "n_gaussians": ("Gaussians", 0),

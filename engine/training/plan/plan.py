@@ -357,6 +357,8 @@ def _anchor_lines(config: TrainConfig, reference: ClipHeader | None, *, is_sourc
     inherited = PlanLine("static anchors", n_static, "", "inherited; the reference clip is not trained yet")
     if known is not None:
         inherited = PlanLine("static anchors", known, "", "inherited, counted in the reference clip")
+    if config.cloud == "frames":  # the limit is not below what a frame has: all of them
+        return [inherited, PlanLine("residual anchors", None, "", "all points that inherited anchors do not cover")]
     return [inherited, PlanLine("residual anchors", n_moving, "", "together with the inherited moving ones in use")]
 
 

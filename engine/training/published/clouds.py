@@ -25,18 +25,20 @@ CLOUDS = (
         "stereo",
         "neither",
         paper="COLMAP",
-        released="COLMAP's PatchMatch for every frame, and its fusion",
+        released="COLMAP's PatchMatch for every frame, and its fusion; such clouds come with its captures",
         here="our own, at about 160 x 90 pixels: a plane sweep and slanted patches, in a later frame only where its "
-        "picture has changed; only what other cameras agree with is kept",
-        reason="COLMAP's PatchMatch needs CUDA",
+        "picture differs from that of the clip's first one; only what other cameras agree with is kept; clouds that "
+        "come along are not used",
+        reason="COLMAP's PatchMatch needs CUDA, and clouds of all clips would have to come along",
         settings={"cloud": "frames"},
     ),
     Point(
         "density of the point clouds",
         "neither",
-        released="one point per voxel of 0.012 scene units; a later frame adds points to empty voxels only",
-        here="likewise, with voxels of 4 pixels; statistical outliers are removed; as many anchors as a setting "
-        "allows at most",
+        released="one point per voxel of 0.012 scene units; a later frame adds points to empty voxels only; points "
+        "more than some 3 units from their neighbours are left out",
+        here="likewise, with voxels of 4 pixels at the median depth, larger where more than two million anchors would "
+        "come of them; statistical outliers are left out",
         reason="0.012 means something else in every scene",
         settings={"max_static_points": 1_000_000, "max_moving_points": 1_000_000},
     ),

@@ -9,13 +9,18 @@ TRAINING = (
         "positions of the anchors",
         "paper",
         paper="learned with the reference clip, frozen in source clips",
-        released="fixed, but for one capture: 1.6e-4 to 1.6e-6 times the extent of the cameras",
-        here="learned at the rates of that capture, those of residual anchors too",
+        released="fixed, but for one capture: 1.6e-4 to 1.6e-6, in a reference clip times the extent of the cameras; "
+        "the field gives them no gradient",
+        here="learned at the rates of that capture times the extent, those of residual anchors too; likewise without a "
+        "gradient through the field",
         reason="the paper comes first",
         settings={"position_lr": 1.6e-4, "position_final_ratio": 0.01, "inherit": "frozen"},
     ),
     Point(
-        "number of anchors", "released code", released="as the point clouds give them; none are added or removed later"
+        "number of anchors",
+        "released code",
+        released="as the point clouds give them; none are removed later, and adding some is switched off for its own "
+        "captures",
     ),
     Point("heads in source clips", "both", paper="frozen", settings={"decoder": "frozen"}),
     Point("field of a source clip", "both", paper="its own, from nothing", settings={"field": "per_clip"}),
@@ -28,14 +33,15 @@ TRAINING = (
     Point(
         "length and order",
         "released code",
-        released="34 passes over the pictures of a clip, every picture once a pass, one at a step",
+        released="34 passes over the pictures of a clip for its Long 360 capture, every picture once a pass, one at a "
+        "step",
         settings={"passes": 34},
     ),
     Point("what a step compares", "released code", released="whole pictures", settings={"tiles": "all"}),
     Point(
         "end of a pass",
         "neither",
-        released="one picture more, drawn again",
+        released="a step more, with the last picture again",
         here="the next pass begins",
         reason="it seems not to be meant",
     ),

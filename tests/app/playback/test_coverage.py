@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,3 +55,14 @@ def test_a_reference_clip_covers_nothing_of_another_one() -> None:
 def test_points_without_any_sphere_are_infinitely_far() -> None:
     found = coverage_of(CoverageRequest("key", anchors(np.zeros((0, 3)), np.ones((2, 3)))))
     assert np.isposinf(found.distances).all()
+
+
+def test_static_anchors_that_change_have_spheres_too() -> None:
+    plain = anchors(np.random.default_rng(2).random((5, 3)), np.ones((2, 3)))
+    found, all_of_them = (
+        coverage_of(CoverageRequest("key", replace(plain, has_changing_static=does_change)))
+        for does_change in (False, True)
+    )
+    assert len(found.centers) == 5
+    np.testing.assert_array_equal(all_of_them.centers, plain.inherited_positions)
+    assert (all_of_them.distances <= found.distances).any()

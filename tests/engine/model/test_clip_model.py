@@ -194,12 +194,16 @@ def test_incomplete_states_are_named_and_not_a_fault_of_the_program(name, damage
 
 def test_anchor_view_separates_inherited_from_own():
     reference = state_of(make_reference(), role="reference")
-    view = make_source(reference).anchors()
+    source = make_source(reference)
+    view = source.anchors()
     assert view.inherited_positions.shape == (30, 3)
     assert view.own_positions.shape == (5, 3)
     assert np.bincount(view.inherited_roles).tolist() == [20, 10]
     assert (view.own_roles == ROLES.index("residual")).all()
     assert (view.own_reasons == NO_REASON).all()
+    assert not view.has_changing_static
+    source.anchor_set("static").presence = torch.ones(20, N_FRAMES, dtype=torch.bool)  # as with gate=off
+    assert source.anchors().has_changing_static
 
 
 def test_anchors_say_what_the_gate_said_of_them():

@@ -46,6 +46,7 @@ def test_every_variant_is_a_project_and_a_line_of_the_table(runner):
         assert line["flicker_borders"] == pytest.approx(255 * 0.04)
     assert line["minutes"] > 0
     assert line["megabytes"] > 0
+    assert line["mb_per_frame"] == pytest.approx(line["megabytes"] / line["n_frames"])
 
 
 def test_the_reference_clip_of_full_is_not_trained_again(runner):

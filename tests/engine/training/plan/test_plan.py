@@ -119,6 +119,12 @@ def test_a_cloud_of_all_frames_needs_no_phase_and_no_backgrounds():
     assert least < most
 
 
+def test_a_source_clip_of_frames_has_as_many_anchors_as_it_needs():
+    config = TrainConfig(cloud="frames", gate="off")
+    line = texts(plan(clip=NEXT, is_source=True, config=config))["residual anchors"]
+    assert line == (None, "all points that inherited anchors do not cover")
+
+
 def test_one_frame():
     lines = texts(plan(clip=dataclasses.replace(CLIP, n_frames=1)))
     assert lines["pictures"][0] == 27
