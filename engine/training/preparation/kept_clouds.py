@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from engine.cloud.stereo.frames_cloud import FramesCloud
+from engine.errors import DiskError
 from engine.storage.array_files import ArraysError, read_arrays, write_arrays
 
 logger = logging.getLogger(__name__)
@@ -36,8 +37,6 @@ def kept_cloud(prep_dir: Path, start: int, key: dict[str, Any], build: Callable[
         start: First frame of the clip.
         key: JSON-able: everything that the cloud depends on.
         build: Makes it.
-    Raises:
-        DiskError: It could not be kept.
     """
     words = json.dumps(key | {"version": _VERSION}, sort_keys=True)
     name = CLOUD_FILES.replace("*", f"{start:06d}-{hashlib.sha256(words.encode()).hexdigest()[:8]}")
@@ -46,7 +45,10 @@ def kept_cloud(prep_dir: Path, start: int, key: dict[str, Any], build: Callable[
         return cloud
     cloud = build()
     arrays = {kind: np.asarray(getattr(cloud, kind)) for kind in _ARRAYS} | {"spacing": np.array([cloud.spacing])}
-    write_arrays(prep_dir / name, arrays, {"key": words}, what="The cloud")
+    try:
+        write_arrays(prep_dir / name, arrays, {"key": words}, what="The cloud")
+    except DiskError as error:  # it would only be found again
+        logger.warning("a cloud was not kept: %s", error)
     return cloud
 
 
