@@ -32,7 +32,7 @@ def fail(code: int, message: str) -> int:
 
 def suggestion(word: str, known: Iterable[str]) -> str:
     """ " Did you mean X?" for what was probably meant; empty where nothing is near."""
-    near = difflib.get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.65)
     names = [name for name in known if near and name.lower() == near[0]]
     return f" Did you mean {names[0]}?" if names else ""
 
