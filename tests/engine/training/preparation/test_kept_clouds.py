@@ -11,18 +11,21 @@ from engine.training.preparation import kept_clouds
 from engine.training.preparation.kept_clouds import CLOUD_FILES, kept_cloud
 
 
+class Made:
+    """Builds one cloud, and counts how often."""
+
+    def __init__(self) -> None:
+        self.n_calls = 0
+        self._points, self._colors = np.random.default_rng(0).random((2, 7, 3), np.float32)
+
+    def __call__(self) -> FramesCloud:
+        self.n_calls += 1
+        return FramesCloud(self._points, self._colors, np.ones((2, 3), np.float32), 0.25, np.array([4, 3]))
+
+
 @pytest.fixture
-def made():
-    """Counts what is built."""
-    rng, calls = np.random.default_rng(0), []
-    points, colors = rng.random((2, 7, 3), np.float32)
-
-    def build() -> FramesCloud:
-        calls.append(1)
-        return FramesCloud(points, colors, np.ones((2, 3), np.float32), 0.25, np.array([4, 3]))
-
-    build.calls = calls
-    return build
+def made() -> Made:
+    return Made()
 
 
 def same(one: FramesCloud, other: FramesCloud) -> bool:
@@ -33,10 +36,10 @@ def same(one: FramesCloud, other: FramesCloud) -> bool:
 def test_a_cloud_is_built_once_for_a_key(tmp_path, made):
     first = kept_cloud(tmp_path, 10, {"size": [4, 3]}, made)
     assert same(kept_cloud(tmp_path, 10, {"size": [4, 3]}, made), first)
-    assert len(made.calls) == 1
+    assert made.n_calls == 1
     kept_cloud(tmp_path, 10, {"size": [8, 6]}, made)
     kept_cloud(tmp_path, 20, {"size": [4, 3]}, made)
-    assert len(made.calls) == 3
+    assert made.n_calls == 3
     assert len(list(tmp_path.glob(CLOUD_FILES))) == 3
 
 
@@ -46,10 +49,10 @@ def test_a_damaged_file_is_made_again(tmp_path, made, share, caplog):
     (path,) = tmp_path.glob(CLOUD_FILES)
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
     assert same(kept_cloud(tmp_path, 0, {}, made), first)
-    assert len(made.calls) == 2
+    assert made.n_calls == 2
     assert "is made again" in caplog.text
     kept_cloud(tmp_path, 0, {}, made)
-    assert len(made.calls) == 2
+    assert made.n_calls == 2
 
 
 def test_a_full_disk_costs_the_file_and_not_the_cloud(tmp_path, made, monkeypatch, caplog):
