@@ -29,6 +29,7 @@ class Published:
         ssim, lpips: None where not printed. LPIPS is the authors' own.
         source: Where it is printed.
         caveat: What makes it hard to compare; may be empty.
+        n_frames: Of the sequence that it is of; None where that is not said.
     """
 
     method: str
@@ -38,10 +39,12 @@ class Published:
     lpips: float | None
     source: str
     caveat: str = ""
+    n_frames: int | None = None
 
 
 CAVEATS = (
-    "Published figures are of all 150 frames. That their colours are raw follows from the authors' training code and "
+    "Published figures are of all 150 frames where a number stands beside them; S4D's text does not say. "
+    "That their colours are raw follows from the authors' training code and "
     "is not said by them: it learns a gain and an offset of each training camera at the first frame, and none of a "
     "test camera. No code of their evaluation was ever published; re-runs by others differ from the printed figures by "
     "up to 1.7 dB per sequence. Copied from texts that copy the papers' tables. Compare raw PSNR, of all 150 frames; "
@@ -54,7 +57,7 @@ _RERUN = "a re-run by others"
 
 def _row(method: str, source: str, caveat: str, *figures: tuple[float, float, float]) -> tuple[Published, ...]:
     return tuple(
-        Published(method, sequence, *values, source, caveat)
+        Published(method, sequence, *values, source, caveat, N_FRAMES)
         for sequence, values in zip(SEQUENCES, figures, strict=True)
     )
 

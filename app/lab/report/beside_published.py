@@ -67,5 +67,5 @@ def _own(one: Compared, sequence: str | None) -> dict[str, Any]:
 
 def _printed(one: Published) -> dict[str, Any]:
     figures = {"psnr": one.psnr, "ssim": one.ssim, "lpips": one.lpips}
-    named = {"method": one.method, "sequence": one.sequence, "n_frames": N_FRAMES}
+    named = {"method": one.method, "sequence": one.sequence, "n_frames": one.n_frames}
     return named | figures | {"source": one.source, "caveat": one.caveat}

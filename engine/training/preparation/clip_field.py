@@ -40,9 +40,8 @@ def fit_field(
     side = max(float((upper - lower).max()), 4 * spacing) + 2 * margin
     n_levels = config.field_levels or config.field_max_levels
     n_shared = model.n_frames if is_shared else 1
-    log2_entries = config.field_log2_entries or derive_log2_entries(
-        most_alive, n_shared_knots=n_shared, at_most=_MOST_LOG2 if config.gate == "off" else 17
-    )
+    most = {"at_most": _MOST_LOG2} if config.gate == "off" else {}
+    log2_entries = config.field_log2_entries or derive_log2_entries(most_alive, n_shared_knots=n_shared, **most)
     cells = derive_cells(
         side=side,
         spacing=0.0 if config.field_levels else spacing,  # a fixed number of levels does not look at the anchors
