@@ -30,6 +30,7 @@ check: setup lint ## linters, types, import contracts and the fast tests
 
 test: SETUP_FLAGS := --tests
 test: setup lint types ## everything CI runs: linters, types, import contracts, all tests
+	@$(BIN)/python -m tests.count_lines
 	@$(PYTEST) --durations=15
 
 coverage: setup ## branches of engine and app that tests take; compiled kernels and child processes are not seen
@@ -62,7 +63,7 @@ faults: setup ## damage files and captures, contend for locks, kill trainings an
 soak: setup ## one hour of use by a program: does the window hold more and more memory or handles? MINUTES=60
 	@$(BIN)/python -m tests.soak.soak --minutes $(or $(MINUTES),60) $(if $(PROJECT),--project "$(PROJECT)")
 
-docs: setup ## fill the generated parts of the documents: keys, commands, settings, tree
+docs: setup ## fill the generated parts of the documents: keys, commands, settings
 	@$(BIN)/python -m tests.documents write
 
 screenshots: setup ## pictures of the window for the documents, of PROJECT=folder or of a quick one made from the sample

@@ -51,11 +51,11 @@ class Overlays:
         show_trails: The ways that Gaussians took over the last frames.
         show_paths: The chosen camera path and its keys.
         compare: "off", "wipe", "side" or "blink": another picture over, beside or in turn with the rendered one.
-        compare_with: The other picture: CAPTURED, the name of a mode (app.playback.view_modes), or that of an earlier
-            version of the clip, see `version_name`.
+        compare_with: The other picture: CAPTURED, the name of a mode (see view_modes), or that of an earlier version of
+            the clip, see `version_name`.
         wipe_position: Share of the width that shows the other picture, 0..1.
         blink_hz: How often a second each of the two pictures is seen.
-        mode, content: What colours mean and which part of a clip is drawn, by name; see app.playback.view_modes.
+        mode, content: What colours mean and which part of a clip is drawn, by name; see app.playback.modes.view_modes.
         heat: Name of the residual heat map over the picture, see app.residuals.heat_map.HEAT_KINDS; empty for none.
             Where no camera is looked through, the residual of each anchor is shown in its place.
         heat_opacity: Of the heat map, 0..1.
@@ -185,7 +185,7 @@ class ClipStatus:
             has ended before the last step and goes on there), trained, failed, stale (its reference was trained
             again, or the clip that it goes on from), or damaged (finished, but its file cannot be read).
         progress: Share of its steps, 0..1.
-        held_out_psnr: Newest figure, dB; None when not measured.
+        held_out_psnr, held_out_whole: dB, and what it is over, see ClipRecord; None when not measured.
         n_inherited, n_own: All anchors of the clip, whatever frames they are alive in: those it inherits from the
             reference clip, and those it holds itself (all of the reference clip, residual ones of another). 0 where
             there are none yet.
@@ -204,6 +204,7 @@ class ClipStatus:
     resume_step: int | None = None
     reason: str = ""
     exposure_change: float | None = None
+    held_out_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,7 +296,7 @@ class VersionStatus:
         number: Names it for RestoreVersion and RemoveVersion.
         trained: When it was trained, local time as text.
         step: Steps it was trained for.
-        held_out_psnr: dB; None where not measured.
+        held_out_psnr, held_out_whole: dB, and what it is over, see ClipRecord; None where not measured.
         n_bytes: Size of its file.
         differences: Settings in which it differs from the finished clip: name, its value, that of the clip.
         why_not: Why it cannot be brought back now; empty where it can.
@@ -308,6 +309,7 @@ class VersionStatus:
     n_bytes: int = 0
     differences: tuple[tuple[str, str, str], ...] = ()
     why_not: str = ""
+    held_out_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -329,7 +331,7 @@ class DependencyStatus:
 
 @dataclass(frozen=True, slots=True)
 class SettingStatus:
-    """A training setting that the user may change before the first clip is trained.
+    """A training setting that the user may change before the first clip is finished.
 
     Attributes:
         name: In TrainConfig.
@@ -355,7 +357,8 @@ class PlanStatus:
         presets: Names to choose from.
         preset: The one that the settings begin with.
         settings: The main ones.
-        can_edit: Whether they may still change: nothing was learned with them.
+        can_edit: Whether they may still change: no clip is finished.
+        discards: What a change throws away, as "the progress of clip 0 (step 331 of 720)"; empty for nothing.
     """
 
     clip_index: int
@@ -365,6 +368,7 @@ class PlanStatus:
     preset: str = ""
     settings: tuple[SettingStatus, ...] = ()
     can_edit: bool = False
+    discards: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -384,17 +388,37 @@ class RegionsStatus:
     effect: str = ""
 
 
+LEAST_TOLD = 0.05
+"""Before this share of a job is done, the time left is not told: it would be a guess."""
+
+
 @dataclass(frozen=True, slots=True)
 class JobStatus:
     """A short job on a thread.
 
     Attributes:
         done: Share that is finished, 0..1; 0 when unknown.
+        message: What it does at the moment.
+        began_s: When it began, by `time.monotonic`; None where nobody noted it.
+        can_cancel: Whether the user may give it up.
     """
 
     name: str
     done: float = 0.0
     message: str = ""
+    began_s: float | None = None
+    can_cancel: bool = False
+
+    def elapsed_s(self, now_s: float) -> float | None:
+        """Seconds since it began. now_s: By `time.monotonic`."""
+        return None if self.began_s is None else max(now_s - self.began_s, 0.0)
+
+    def eta_s(self, now_s: float) -> float | None:
+        """Seconds that are left, if its share goes on rising as it did; None before LEAST_TOLD."""
+        spent_s = self.elapsed_s(now_s)
+        if spent_s is None or not LEAST_TOLD <= self.done < 1.0:
+            return None
+        return spent_s * (1.0 - self.done) / self.done
 
 
 @dataclass(frozen=True, slots=True)
@@ -452,7 +476,7 @@ class SeamStatus:
             cameras: see engine.metrics.clips.seams. None where no camera was measured in both clips.
         ratio: Change of static pixels there / inside the two clips, over all cameras; 1 where nothing shows. None where
             nothing changes inside, or nothing was measured.
-        n_cameras: Cameras behind the score.
+        n_cameras, n_all: Cameras of which the boundary and both clips are measured, and those of which they can be.
         worst_camera: The camera with the highest score; None without one.
     """
 
@@ -461,7 +485,13 @@ class SeamStatus:
     score: float | None = None
     ratio: float | None = None
     n_cameras: int = 0
+    n_all: int = 0
     worst_camera: int | None = None
+
+    @property
+    def is_provisional(self) -> bool:
+        """Whether cameras are missing: with few of them a ratio is often twice what it comes to."""
+        return self.n_cameras < self.n_all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -473,11 +503,12 @@ class ResidualStatus:
         cells: By column of CELL_COLUMNS: figures by frame and camera, NaN where not measured. [F, C] float32, not to be
             changed
         is_held_out: Of each camera.
-        n_done, n_all: Pictures that are measured, and all of trained clips.
+        measured: By column of CELL_COLUMNS: of how many pictures it is measured, and of how many it can be.
+        n_done, n_all: Pictures of which every column is measured, and all of trained clips.
         is_measuring: Whether more are being measured now.
         is_held_back: Whether that goes on slowly only, because a clip trains or the user looks around.
         rate: Pictures per second; 0 when unknown.
-        eta_s: Seconds until all are measured; None when unknown.
+        eta_s: Seconds until all are measured; None while it is not known well.
         message: What went wrong, in sentences; empty when nothing did.
         revision: Grows with every change of the figures.
     """
@@ -485,6 +516,7 @@ class ResidualStatus:
     seams: tuple[SeamStatus, ...] = ()
     cells: Mapping[str, np.ndarray] = field(default_factory=dict)
     is_held_out: tuple[bool, ...] = ()
+    measured: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     n_done: int = 0
     n_all: int = 0
     is_measuring: bool = False

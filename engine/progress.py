@@ -23,17 +23,17 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class StepStats:
-    """One optimiser step.
+    """Some optimiser steps.
 
     Attributes:
-        step: Steps done, this one included.
+        step: Steps done, these included.
         n_steps: Steps of the whole clip.
-        loss: Training loss of the picture; with active tiles without the part that nothing can change.
-        train_psnr: PSNR of the picture that was trained on, dB.
-        n_gaussians: Gaussians rendered.
+        loss: Mean training loss of the pictures; with active tiles without the part that nothing can change.
+        train_psnr: PSNR of the picture that was trained on last, dB.
+        n_gaussians: Gaussians rendered last.
         stage: "static", "joint" or "source".
-        gradient_norm: Euclidean norm over all gradients, before `max_gradient_norm` clips it.
-        is_clipped: Whether it did.
+        gradient_norms: Of every step, over all gradients, before `max_gradient_norm` clips them.
+        n_clipped: How many steps it clipped.
     """
 
     step: int
@@ -42,8 +42,8 @@ class StepStats:
     train_psnr: float
     n_gaussians: int
     stage: str
-    gradient_norm: float
-    is_clipped: bool = False
+    gradient_norms: tuple[float, ...]
+    n_clipped: int = 0
 
 
 ReportProgress = Callable[[Progress], None]

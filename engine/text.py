@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 MAX_SHOWN = 60
 """Characters of a value from a file that one message repeats."""
 
@@ -28,6 +30,11 @@ def shown(value: object) -> str:
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
 
 
+def camera_text(name: str) -> str:
+    """A camera by its name, in which it need not say that it is one."""
+    return name if name.lower().startswith("cam") else f"camera {name}"
+
+
 def duration_text(seconds: float | None) -> str:
     """Minutes and seconds below an hour, hours and minutes above; a dash when unknown."""
     if seconds is None or not 0 <= seconds < 1e9:
@@ -40,8 +47,18 @@ def _escaped(sign: str) -> str:
     return sign.encode("unicode_escape").decode("ascii")
 
 
+def figure_text(value: float) -> str:
+    """A measured figure in three digits, never with an exponent: 0.0123, 23.1, 1,370."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:g}"
+    n_decimals = max(0, 2 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{min(n_decimals, 6)}f}"
+
+
 def size_text(megabytes: float) -> str:
     """An amount of memory or disk, in two or three digits."""
     if megabytes >= 999.5:
         return f"{megabytes / 1e3:.1f} GB"
+    if megabytes < 0.05:
+        return f"{1e3 * megabytes:.0f} kB"
     return f"{megabytes:.0f} MB" if megabytes >= 9.95 else f"{megabytes:.1f} MB"

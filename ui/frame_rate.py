@@ -19,7 +19,7 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed.laps import Lap, camera_of, enough, frames_of
 from app.evaluation.speed.window_drawing import Drawn, said_by
 from app.playback.frame_decoder import ClipFiles, FrameRequest, decode_frame
-from app.project.project import open_project
+from app.project.project_access import open_project
 from engine.errors import EngineError
 from engine.kernels.cache import use_kernel_cache
 from ui.gl.context import ContextError, is_software, make_headless_context, renderer_name
@@ -47,7 +47,7 @@ def drawn_laps(
     try:
         for clip_index, frames in frames_of(opened).items():
             requests = [_request(opened, clip_index, frame) for frame in frames]
-            loaded = files.read(requests[0])
+            loaded = files.read(requests[0], opened.backend)
             for number, request in enumerate(requests):
                 start = clock()
                 gaussians = decode_frame(loaded, request).gaussians

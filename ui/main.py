@@ -12,9 +12,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.background.logs import PrintableFormatter, start_logging
-from app.cli.arguments import PlainParser, add_follow_links, parse, path_argument, suggestion
+from app.cli.arguments import PlainParser, add_backend, add_follow_links, parse, path_argument, suggestion
 from app.cli.commands import COMMANDS
 from engine.assets import asset_path
+from engine.backends.table import AUTO, choose_backend
+from engine.errors import ProjectError
 from engine.kernels.cache import use_kernel_cache
 from ui.style.ui_scale import parse_scale
 
@@ -52,6 +54,7 @@ def build_parser() -> PlainParser:
         metavar="SCALE",
         help="size of the interface: auto, or 75%% to 250%%",
     )
+    add_backend(parser)
     parser.add_argument("--verbose", action="store_true", help="log more")
     return parser
 
@@ -69,6 +72,7 @@ def build_demo_parser() -> argparse.ArgumentParser:
         "--out", type=path_argument, default=Path("demo_output"), help="folder for the results (default: demo_output)"
     )
     parser.add_argument("--quick", action="store_true", help="a few steps only; shows that every part works")
+    add_backend(parser)
     return parser
 
 
@@ -87,21 +91,33 @@ def main(argv: Sequence[str] | None = None) -> int:
         return int(run_command(arguments) or 0)
     if arguments and arguments[0] == "demo":
         use_kernel_cache()
-        return _run_demo(build_demo_parser().parse_args(arguments[1:]))
+        demo_parser = build_demo_parser()
+        demo_options = demo_parser.parse_args(arguments[1:])
+        _choose_backend(demo_parser, demo_options)
+        return _run_demo(demo_options)
     parser = build_parser()
     mistake = _mistyped_command(arguments)
     if mistake:
         parser.error(mistake)
     options = parse(parser, arguments)
+    _choose_backend(parser, options)
     use_kernel_cache()
-    logging.basicConfig(level=logging.DEBUG if options.verbose else logging.INFO)
-    for handler in logging.getLogger().handlers:
-        handler.setFormatter(PrintableFormatter("%(levelname)s %(message)s"))
-    start_logging(level=logging.DEBUG if options.verbose else logging.INFO)
-    if not has_display():
+    level = logging.DEBUG if options.verbose else logging.INFO
+    start_logging(level=level)
+    if not has_display():  # the headless job says in the terminal what it does; records go to the log file alone
         demo_arguments = [] if options.path is None else [str(options.path)]
         return _run_demo(build_demo_parser().parse_args(demo_arguments))
+    logging.basicConfig(level=level)
+    for handler in logging.getLogger().handlers:
+        handler.setFormatter(PrintableFormatter("%(levelname)s %(message)s"))
     return _run_window(options)
+
+
+def _choose_backend(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    try:
+        choose_backend(getattr(options, "backend", AUTO))
+    except ProjectError as error:
+        parser.error(str(error).rstrip("."))
 
 
 def _mistyped_command(arguments: Sequence[str]) -> str:
@@ -150,18 +166,20 @@ def _serve_window(options: argparse.Namespace) -> int:
     pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
     from app.project.project_choices import ProjectChoices
     from app.session.commands import OpenCapture
-    from app.session.preferences import PreferencesFile
+    from app.session.projects.preferences import PreferencesFile
+    from app.session.projects.window_memory import read_window_memory
     from app.session.session import Session
-    from app.session.window_memory import read_window_memory
     from ui.shell.window import StudioWindow
 
     width, height = options.size or (None, None)
-    memory = read_window_memory()
+    memory, preferences = read_window_memory(), PreferencesFile()
+    if "backend" not in options:
+        preferences.values.choose_backend()
     if "ui_scale" in options:
         memory.ui_scale = options.ui_scale
     session = Session()
     try:
-        window = StudioWindow(session, width=width, height=height, memory=memory, preferences=PreferencesFile())
+        window = StudioWindow(session, width=width, height=height, memory=memory, preferences=preferences)
     except BaseException:
         session.close()
         raise

@@ -20,10 +20,11 @@ from app.project.clip_exchange import begin_exchange, exchange, give_up_exchange
 from app.project.clip_versions import forget_oldest, read_finished, set_aside
 from app.project.project import Project
 from engine.capture.clip import Clip
-from engine.clip_files.clip_header import ClipFigures, ClipHeader
+from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.rewriting import rewrite_clip
-from engine.editing.edit import Delete, Edit
+from engine.editing.actions import Delete
+from engine.editing.edit import Edit
 from engine.errors import ProjectError
 
 NAME = "apply deletions permanently"
@@ -182,7 +183,7 @@ def _described(state: ClipState, reference: ClipState | None) -> ClipHeader:
     n_anchors = {role: len(model.anchor_set(role)) for role in model.roles()}
     metrics = state.header.metrics
     if metrics is not None:
-        metrics = with_entries(metrics, held_out_psnr=ClipFigures().held_out_psnr)
+        metrics = with_entries(metrics, held_out_psnr=None, held_out_whole=False)
     return with_entries(state.header, n_anchors=n_anchors, n_alive=n_alive(model), metrics=metrics)
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from app.project.clip_versions import read_finished
 from app.project.project import Project
-from engine.backends.table import backend_called
+from engine.backends.table import process_backend
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
-from engine.editing.edit import Delete, Edit
+from engine.editing.actions import Delete
+from engine.editing.edit import Edit
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ def loaded(state: ClipState, reference: ClipState | None) -> EditedClip:
     from engine.model.clip_model import load_clip_model
 
     header = state.header
-    model = load_clip_model(state, reference, backend=backend_called())
+    model = load_clip_model(state, reference, backend=process_backend())
     index = 0 if reference is None else reference.header.clip_index
     clip = Clip(header.clip_index, header.start, header.n_frames, header.clip_length)
     return EditedClip(model, clip, named_sets(model, header, index))

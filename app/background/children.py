@@ -1,16 +1,74 @@
-"""Child processes: a number from one of their own, and how Ctrl+C does not reach them.
+"""Processes of multiprocessing: started one way, ended with this one.
 
-A terminal sends Ctrl+C to all of them; the parent decides what it means.
+A terminal sends Ctrl+C to all of them; the parent decides what it means. While the program ends nobody starts another
+one, and it waits for those that are just being started: a child whose parent ends meanwhile finds half of what it is
+told, and says so on the terminal.
 """
 
 from __future__ import annotations
 
-import multiprocessing
+import atexit
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from multiprocessing.connection import Connection
-from typing import Any
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
+
+STARTED_WITHIN_S = 10.0
+"""So long the program waits at its end for a process that is being started."""
+
+
+class Unwanted(OSError):
+    """No process is started or waited for any more: the program, or whoever has asked, ends."""
+
+
+class _Starts:
+    """Counts those that are being started. For any thread."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._n_starting = 0
+        self._is_over = False
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the program ends."""
+        return self._is_over
+
+    @contextmanager
+    def one(self) -> Iterator[None]:
+        """Start one in this block."""
+        with self._changed:
+            if self._is_over:
+                raise Unwanted
+            self._n_starting += 1
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._n_starting -= 1
+                self._changed.notify_all()
+
+    def end(self) -> None:
+        """Let nobody start another one, and wait for those that are being started."""
+        with self._changed:
+            self._is_over = True
+            self._changed.wait_for(lambda: self._n_starting == 0, STARTED_WITHIN_S)
+
+
+_starts = _Starts()
+atexit.register(_starts.end)  # before multiprocessing, which was imported earlier, ends the processes that it knows
+
+
+def start_child(process: BaseProcess) -> None:
+    """Start a process of multiprocessing.
+
+    Raises:
+        Unwanted: The program ends.
+        OSError: The system refused.
+    """
+    with _starts.one(), undisturbed():
+        process.start()
 
 
 @contextmanager
@@ -28,34 +86,3 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def in_fresh_process(call: Callable[..., float], *arguments: Any, timeout_s: float) -> float | None:
-    """What a call returns in a process of its own; None if it fails or takes too long.
-
-    Args:
-        call: Importable function that returns a number.
-        arguments: Its arguments.
-        timeout_s: The process is ended after that.
-    """
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_send_result, args=(theirs, call, arguments), daemon=True)
-    with undisturbed():
-        process.start()
-    theirs.close()
-    try:
-        with suppress(EOFError, OSError):
-            if ours.poll(timeout_s):
-                return float(ours.recv_bytes())
-        return None
-    finally:
-        process.kill()
-        process.join()
-        ours.close()
-
-
-def _send_result(pipe: Connection, call: Callable[..., float], arguments: tuple[Any, ...]) -> None:
-    number = call(*arguments)
-    with suppress(OSError):  # whoever asked has gone
-        pipe.send_bytes(str(number).encode())

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from app.status import JobStatus
@@ -19,8 +21,8 @@ class JobCancelled(Exception):
 class JobContext:
     """What a job sees of the outside."""
 
-    def __init__(self, name: str) -> None:
-        self.status = JobStatus(name)
+    def __init__(self, name: str, *, can_cancel: bool = False) -> None:
+        self.status = JobStatus(name, began_s=time.monotonic(), can_cancel=can_cancel)
         self._is_cancelled = threading.Event()
 
     def report(self, done: float, message: str = "") -> None:
@@ -31,7 +33,7 @@ class JobContext:
         """
         if self._is_cancelled.is_set():
             raise JobCancelled
-        self.status = JobStatus(self.status.name, min(max(done, 0.0), 1.0), message)
+        self.status = replace(self.status, done=min(max(done, 0.0), 1.0), message=message)
 
     def cancel(self) -> None:
         """Make the next report raise."""
@@ -51,6 +53,7 @@ class Job:
         work: Runs on the thread with a JobContext; its return value goes to `on_done`.
         on_done: Called by `Jobs.poll` on the polling thread.
         on_error: Likewise, with the exception.
+        can_cancel: Whether the user may give it up.
     """
 
     def __init__(
@@ -59,8 +62,10 @@ class Job:
         work: Callable[[JobContext], Any],
         on_done: Callable[[Any], None],
         on_error: Callable[[Exception], None],
+        *,
+        can_cancel: bool = False,
     ) -> None:
-        self.context = JobContext(name)
+        self.context = JobContext(name, can_cancel=can_cancel)
         self._work, self._on_done, self._on_error = work, on_done, on_error
         self._result: Any = None
         self._error: Exception | None = None
@@ -109,9 +114,11 @@ class Jobs:
         work: Callable[[JobContext], Any],
         on_done: Callable[[Any], None],
         on_error: Callable[[Exception], None],
+        *,
+        can_cancel: bool = False,
     ) -> Job:
-        """Run `work` on a thread; `on_done` or `on_error` follow in `poll`."""
-        job = Job(name, work, on_done, on_error)
+        """Run `work` on a thread; `on_done` or `on_error` follow in `poll`, neither if the user gives it up."""
+        job = Job(name, work, on_done, on_error, can_cancel=can_cancel)
         self._jobs.append(job)
         return job
 
@@ -132,6 +139,12 @@ class Jobs:
                 if self._on_fault is not None:
                     self._on_fault(job.context.status.name, error)
         return bool(finished)
+
+    def give_up(self, name: str) -> None:
+        """The user does not want the jobs of this name, as far as they can be cancelled."""
+        for job in self._jobs:
+            if job.context.status.name == name and job.context.status.can_cancel:
+                job.context.cancel()
 
     def cancel(self) -> None:
         """Nothing that runs is wanted any more."""

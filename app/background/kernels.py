@@ -10,8 +10,9 @@ import logging
 
 from app.background.collector import uncollected
 from app.background.libraries import load_libraries
+from engine.backends.table import process_backend
 from engine.kernels.cache import is_cache_warm
-from engine.kernels.compile_ahead import compile_all, warm_up_all
+from engine.kernels.compile_ahead import compile_all
 from engine.kernels.threads import configure_threads
 from engine.progress import Progress, ReportProgress
 
@@ -23,13 +24,14 @@ COMPILING = "Compiling kernels, first start only"
 def warm_cache() -> None:
     """Compile what is not in the cache yet. Blocks until it is done; a failure is logged and otherwise ignored."""
     try:
-        compile_all()
+        compile_all(backend=process_backend().name)
     except OSError as error:
         logger.warning("kernels could not be compiled ahead: %s", error)
 
 
 def warm_up_reporting(report: ReportProgress) -> None:
-    """Compile what is not in the cache yet, saying how far that is, and load what a training step needs.
+    """Compile what is not in the cache yet, saying how far that is, and load what a training step of this process's
+    back end needs.
 
     What `report` raises ends the compiling processes and passes on.
     """
@@ -41,12 +43,18 @@ def warm_up_reporting(report: ReportProgress) -> None:
         said = max(said, done)
         report(Progress(COMPILING, done / max(n, 1), message))
 
-    warm_up_all(report_groups)
+    backend = process_backend()
+    compile_all(report_groups, backend=backend.name)
+    backend.warm_up(is_training=True)
 
 
-def use_threads(n_threads: int | None) -> int:
-    """Set how many threads the calling thread computes with; None for every core. Returns how many it will be."""
-    return configure_threads(n_threads)
+def use_threads(n_threads: int | None, *, with_torch: bool = True) -> int:
+    """Set how many threads the calling thread computes with; None for every core. Returns how many it will be.
+
+    Args:
+        with_torch: See `configure_threads`.
+    """
+    return configure_threads(n_threads, with_torch=with_torch)
 
 
 def prepare_drawing() -> None:
@@ -56,9 +64,7 @@ def prepare_drawing() -> None:
     with uncollected():
         use_threads(1)
         if is_cache_warm():
-            from engine.backends.cpu.raster.warm import warm_up
-
-            warm_up()
+            process_backend().warm_up(is_training=False)
 
 
 def prepare_decoding() -> None:

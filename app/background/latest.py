@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Hashable, Sequence
 from typing import Generic, TypeVar
 
-from app.background.priority import lower_thread
+from engine.children.priority import lower_thread
 
 Request = TypeVar("Request", bound=Hashable)
 Result = TypeVar("Result")
@@ -137,6 +137,11 @@ class LatestWorker(Generic[Request, Result]):
         with self._condition:
             return request in self._failed.values()
 
+    def has_failed_ahead(self, request: Request) -> bool:
+        """Whether this request failed when nobody had asked for it yet; it is tried again once somebody does."""
+        with self._condition:
+            return request in self._failed_ahead
+
     def take_error(self) -> tuple[Request, Exception] | None:
         """The last failure of something asked for, once."""
         with self._condition:
@@ -159,6 +164,11 @@ class LatestWorker(Generic[Request, Result]):
         """Block until nothing waits, runs or is planned; for tests and headless use. False when the time is up."""
         with self._condition:
             return self._condition.wait_for(lambda: not (self._pending or self._running or self._planned), timeout_s)
+
+    @property
+    def is_closed(self) -> bool:
+        """For `compute`: whether nothing that it comes to is taken up any more."""
+        return self._is_closed
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Stop after the running request; later requests are ignored."""

@@ -10,6 +10,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from engine.storage.files import open_regular
 from engine.text import printable
 from engine.user_folders import data_dir
 
@@ -99,9 +100,9 @@ def start_logging(path: Path | None = None, *, level: int = logging.INFO) -> Pat
 
 
 def tail(path: Path, n_lines: int = 12, *, max_bytes: int = 16_384) -> str:
-    """Last lines of a text file; empty when there is none."""
+    """Last lines of a text file; empty when there is none, or something else under its name."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             size = file.seek(0, 2)
             file.seek(max(size - max_bytes, 0))
             text = file.read().decode("utf-8", errors="replace")

@@ -38,12 +38,16 @@ class CalibrationRequest:
         out: Folder that becomes the capture; None for the folder of the videos. Only capture.json is written.
         options: Lens, scale, up.
         is_replacing: Whether a capture.json that is there may be replaced.
+        keeps_doubtful: Write it also where the calibration has failed, and leave doubtful cameras in use.
+        follow_links: Whether links in the folder of the videos may lead out of it.
     """
 
     videos: Path
     out: Path | None = None
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     is_replacing: bool = False
+    keeps_doubtful: bool = False
+    follow_links: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,18 +59,20 @@ class CalibrationOutcome:
         needs_links: Whether it has to be opened with follow_links, since its videos lie elsewhere.
         calibration: The figures.
         lines: The report in sentences, fit to be shown one below another.
+        is_written: Whether there is a capture: not where matches contradict many cameras.
     """
 
     capture: Path
     needs_links: bool
     calibration: Calibration
     lines: tuple[str, ...]
+    is_written: bool = True
 
 
 def run_calibration(
     request: CalibrationRequest, *, report: ReportProgress, alive: Callable[[], None] = lambda: None
 ) -> CalibrationOutcome:
-    """Calibrate and write capture.json; on this thread.
+    """Calibrate and write capture.json, unless the calibration has failed; on this thread.
 
     Args:
         request: What is asked for.
@@ -77,19 +83,33 @@ def run_calibration(
     """
     out = request.out or request.videos
     check_target(out, is_replacing=request.is_replacing)
-    calibration = calibrate(request.videos, request.options, report=report, alive=alive)
-    needs_links = write_calibrated(calibration, request.videos, out)
-    return CalibrationOutcome(out, needs_links, calibration, tuple(report_lines(calibration)))
+    calibration = calibrate(
+        request.videos, request.options, follow_links=request.follow_links, report=report, alive=alive
+    )
+    return written(calibration, request)
+
+
+def written(calibration: Calibration, request: CalibrationRequest) -> CalibrationOutcome:
+    """What comes of a calibration: a capture, unless it has failed and is not to be kept all the same.
+
+    Raises:
+        DiskError: It could not be written.
+    """
+    out, keeps = request.out or request.videos, request.keeps_doubtful
+    is_written = keeps or not calibration.failure
+    needs_links = is_written and write_calibrated(
+        calibration, request.videos, out, keeps_doubtful=keeps, follow_links=request.follow_links
+    )
+    lines = tuple(report_lines(calibration, keeps_doubtful=keeps))
+    return CalibrationOutcome(out, needs_links, calibration, lines, is_written)
 
 
 def calibration_work(request: CalibrationRequest) -> Callable[[JobContext], CalibrationOutcome]:
     """`run_calibration` as the work of a Job."""
 
     def work(context: JobContext) -> CalibrationOutcome:
-        left = TimeLeft()
-
         def report(progress: Progress) -> None:
-            context.report(progress.done, " - ".join(filter(None, [progress.stage, left.text(progress.done)])))
+            context.report(progress.done, progress.stage)
 
         def alive() -> None:
             if context.is_cancelled:
@@ -101,7 +121,7 @@ def calibration_work(request: CalibrationRequest) -> Callable[[JobContext], Cali
 
 
 class TimeLeft:
-    """Time left from the share that is done; stages are weighed so that the share rises evenly.
+    """Time taken, and time left from the share that is done; stages are weighed so that the share rises evenly.
 
     Args:
         clock: Seconds; tests bring their own.
@@ -112,8 +132,8 @@ class TimeLeft:
         self._started_s = clock()
 
     def text(self, done: float) -> str:
-        """As "about 2 min left"; empty at the beginning and at the end."""
+        """As "0:40, about 2:00 left"; at the beginning and at the end only the time that was taken."""
+        spent_s = self._clock() - self._started_s
         if not MIN_SHARE <= done < 1.0:
-            return ""
-        left_s = (self._clock() - self._started_s) * (1 - done) / done
-        return f"about {duration_text(left_s)} left"
+            return duration_text(spent_s)
+        return f"{duration_text(spent_s)}, about {duration_text(spent_s * (1 - done) / done)} left"

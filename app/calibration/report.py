@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.calibration.calibrated import CalibratedRig, Calibration
+from engine.calibration.pair_lines import WHAT_TO_DO, pair_lines
 from engine.text import printable
 
 GOOD_ERROR_PX = 1.0
@@ -16,8 +17,13 @@ WHAT_HELPS = (
 )
 
 
-def report_lines(calibration: Calibration) -> list[str]:
-    """Everything that a user has to know, one sentence or camera per line."""
+def report_lines(calibration: Calibration, *, keeps_doubtful: bool = False) -> list[str]:
+    """Everything that a user has to know, one sentence or camera per line.
+
+    Args:
+        calibration: What was found.
+        keeps_doubtful: Whether doubtful cameras were left in use.
+    """
     found = calibration.found
     rig = found.rig
     n_all = len(rig) + len(calibration.missing)
@@ -31,7 +37,18 @@ def report_lines(calibration: Calibration) -> list[str]:
     if calibration.missing:
         lines.append(WHAT_HELPS)
     lines += [_scale_line(found), _up_line(found)]
-    return [*lines, *(f"Note: {warning}" for warning in calibration.warnings)]
+    lines += [f"Note: {warning}" for warning in calibration.warnings]
+    if calibration.failure:
+        lines += [calibration.failure, *map(printable, pair_lines(calibration.pairs)), WHAT_TO_DO]
+    elif any(found.doubts):
+        lines.append(_doubtful_line(found, keeps_doubtful=keeps_doubtful))
+    return lines
+
+
+def _doubtful_line(found: CalibratedRig, *, keeps_doubtful: bool) -> str:
+    named = ", ".join(printable(name) for name, doubt in zip(found.rig.names, found.doubts, strict=True) if doubt)
+    what = "in use all the same; look at them before you train" if keeps_doubtful else "written as excluded"
+    return f"The places of these cameras cannot be trusted, they are {what}: {named}."
 
 
 def _camera_line(found: CalibratedRig, row: int) -> str:
@@ -46,7 +63,7 @@ def _camera_line(found: CalibratedRig, row: int) -> str:
     bend = f"{lens.model} {' '.join(f'{value:+.3f}' for value in lens.params)}"
     text = (
         f"{width}x{height}, focal length {K[0, 0]:.1f} px ({view:.0f} degrees), {bend}, {n} points, {error:.2f} px, "
-        f"{found.explained_shares[row]:.0%} of its matches explained"
+        f"{100 * found.explained_shares[row]:.0f} % of its matches explained"
     )
     return f"  {printable(found.rig.names[row])}: {text}" + (f" - {' and '.join(doubts)}" if doubts else "")
 

@@ -27,13 +27,22 @@ def check_target(out: Path, *, is_replacing: bool) -> None:
         )
 
 
-def write_calibrated(calibration: Calibration, videos: Path, out: Path) -> bool:
+def write_calibrated(
+    calibration: Calibration, videos: Path, out: Path, *, keeps_doubtful: bool = False, follow_links: bool = False
+) -> bool:
     """Write capture.json into `out`. Whether the capture has to be opened with follow_links.
 
+    Args:
+        calibration: Cameras whose places cannot be trusted are written as excluded.
+        videos: What was calibrated.
+        out: Folder that becomes the capture.
+        keeps_doubtful: Leave those in use.
+        follow_links: Whether links in the folder of the videos may lead out of it.
     Raises:
         DiskError: The folder cannot be written.
     """
-    found, sources = calibration.found, {video.name: video for video in find_videos(videos)}
+    found = calibration.found
+    sources = {video.name: video for video in find_videos(videos, follow_links=follow_links)}
     rig = found.rig
     used = [sources[name] for name in rig.names]
     entries = [
@@ -44,6 +53,9 @@ def write_calibrated(calibration: Calibration, videos: Path, out: Path) -> bool:
     out.mkdir(parents=True, exist_ok=True)
     document = capture_document(layout, out)
     document["up"] = [0.0, 0.0, 1.0]
+    for camera, doubt in zip(document["cameras"], found.doubts, strict=True):
+        if doubt and not keeps_doubtful:
+            camera["is_excluded"] = True
     write_capture_json(out, document)
     root = os.path.abspath(out)
-    return os.path.commonpath((os.path.abspath(videos), root)) != root
+    return follow_links or os.path.commonpath((os.path.abspath(videos), root)) != root

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from engine.backends.table import AUTO, backend_names
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
 from engine.text import printable, shown
@@ -101,6 +102,16 @@ def path_argument(text: str) -> Path:
         reason = getattr(error, "strerror", None) or error
         raise argparse.ArgumentTypeError(f"{shown(text)} cannot be used as a path ({reason})") from error
     return Path(text)
+
+
+def add_backend(command: argparse.ArgumentParser) -> None:
+    """The argument of everything that trains, decodes or draws clips."""
+    command.add_argument(
+        "--backend",
+        default=argparse.SUPPRESS,  # then it is chosen otherwise
+        metavar="NAME",
+        help=f"what to compute with: {backend_names()} (default: {AUTO}, the first that works on this machine)",
+    )
 
 
 def add_follow_links(command: argparse.ArgumentParser) -> None:

@@ -3,42 +3,51 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from app.cli.arguments import parse_cameras, parse_range
 from app.cli.training_settings import overrides_of
-from app.document.document_store import DocumentStore
 from app.document.history import DocumentHistory
 from app.document.project_document import ProjectDocument
-from app.project.project import (
-    PROJECT_FILE,
-    Project,
-    ProjectSettings,
-    check_settings,
-    create_project,
-    default_settings,
-    open_project,
-    read_settings,
-)
+from app.document.project_settings import ProjectSettings
+from app.document.storing.document_file import PROJECT_FILE
+from app.document.storing.document_store import DocumentStore
+from app.project.allowed_changes import SettingsFixed, check_change, discard_unfitting, is_shared_change
+from app.project.disk.discarding import discard, progress_of, training_of
+from app.project.project import Project
+from app.project.project_access import check_settings, create_project, default_settings, open_project, read_settings
 from engine.capture.capture import Capture, open_capture
 from engine.errors import ProjectError
+from engine.training.presets import closest_preset
 
 
-def open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
-    """The project of the arguments, made or opened; what was given has to agree with what is there."""
+def open_for_training(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[Project, Capture]:
+    """The project of the arguments, made or opened; what was given has to agree with what is finished there.
+
+    Args:
+        say: Told what was discarded.
+    """
     settings, stored, capture = _chosen_settings(options)
     if stored is None:
         return create_project(options.project, settings), capture
     project = open_project(options.project)
     try:
-        _check_changes(options, project, settings)
+        if options.is_starting_over:
+            found = training_of(project)
+            discard(project, found)
+            say(f"Starting over. Discarded: {found.words or 'nothing, since nothing was trained'}")
+        _check_changes(project, capture, settings)
+        if settings != stored:
+            project.update(settings)
+            found = discard_unfitting(project, stored, settings)
+            if found.progress:
+                say(f"The settings are others than before. Discarded: {found.words}")
     except ProjectError:
         project.close()
         raise
-    if settings != stored:
-        project.update(settings)
     return project, capture
 
 
@@ -47,9 +56,17 @@ def project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
     settings, stored, capture = _chosen_settings(options)
     document = None if stored is None else DocumentStore(options.project).read().present
     project = _unlocked(options.project, settings, document)
-    if stored is not None:
-        _check_changes(options, _unlocked(options.project, stored), settings)
+    if stored is not None and not options.is_starting_over:
+        _check_changes(_unlocked(options.project, stored), capture, settings)
     return project, capture
+
+
+def what_goes(project: Project, options: argparse.Namespace) -> str:
+    """What training with these arguments would discard, in words; empty for nothing."""
+    if options.is_starting_over:
+        return training_of(project).words
+    stored = read_settings(project.folder) if (project.folder / PROJECT_FILE).is_file() else project.settings
+    return progress_of(project).words if is_shared_change(stored, project.settings) else ""
 
 
 def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
@@ -76,8 +93,7 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
             overrides=overrides,
             reference_clip=options.reference_clip or 0,
         )
-        n_clips = len(settings.clips(capture.n_frames))
-        parse_range(options.clips, n_clips, option="--clips", what="clips")  # said before the folder is made
+        _check_clips(options, settings, capture)  # said before the folder is made
         return settings, None, capture
     given = {
         "scale": options.scale,
@@ -92,11 +108,18 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
             "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
         )
     place = str(Path(capture.path).resolve())  # the capture may have moved
-    changes |= {"overrides": stored.overrides | overrides, "capture": place, "follow_links": follow_links}
+    is_other_preset = bool(options.preset) and closest_preset(stored.overrides) != options.preset
+    kept = {} if is_other_preset else stored.overrides
+    changes |= {"overrides": kept | overrides, "capture": place, "follow_links": follow_links}
     changes["frames"] = capture.frames
     settings = replace(stored, **changes)
     check_settings(settings, capture)
+    _check_clips(options, settings, capture)  # before anything is discarded
     return settings, stored, capture
+
+
+def _check_clips(options: argparse.Namespace, settings: ProjectSettings, capture: Capture) -> None:
+    parse_range(options.clips, len(settings.clips(capture.n_frames)), option="--clips", what="clips")
 
 
 def _unlocked(folder: Path, settings: ProjectSettings, document: ProjectDocument | None = None) -> Project:
@@ -104,15 +127,18 @@ def _unlocked(folder: Path, settings: ProjectSettings, document: ProjectDocument
     return Project(folder, DocumentHistory(known), None)
 
 
-def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:
-    """See that nothing was learned with other settings."""
+def _check_changes(project: Project, capture: Capture, settings: ProjectSettings) -> None:
+    """See that no clip is finished with other settings."""
     stored = project.settings
     names = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
     changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]
-    if changed and project.has_progress:
+    before, after = project.document, replace(project.document, settings=settings)
+    try:
+        check_change(project, capture, before, after)
+    except SettingsFixed as error:
         listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)
         raise ProjectError(
-            f"The project was trained with {listed}; that cannot change any more.",
-            hint="Leave the option out, or choose another --project folder.",
-            path=options.project,
-        )
+            f"The project was trained with {listed}; that cannot change any more: {training_of(project).words}.",
+            hint="Leave the option out, choose another --project folder, or discard all of that with --start-over.",
+            path=project.folder,
+        ) from error

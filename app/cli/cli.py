@@ -13,11 +13,13 @@ import sys
 from collections.abc import Collection, Iterator, Sequence
 
 from app.background.logs import start_logging
-from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, PlainParser, fail, parse
+from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, PlainParser, add_backend, fail, parse
 from app.cli.commands import COMMANDS
+from app.cli.terminal.notes import notes_on_terminal
 from app.cli.terminal.printable_stream import PrintableStream
 from app.training.process import ProcessWorker
 from app.training.service import Launch
+from engine.backends.table import choose_backend
 from engine.errors import CaptureError, DiskError, EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
 
@@ -35,6 +37,8 @@ def build_parser(used: Collection[str]) -> PlainParser:
         subparser = commands.add_parser(name, help=command.summary, description=about)
         if name in used:
             command.load().add_arguments(subparser)
+            if command.has_backend:
+                add_backend(subparser)
     return parser
 
 
@@ -57,7 +61,13 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
         return EXIT_FAILED
     log_file = start_logging()
     try:
-        with _terminating_like_ctrl_c(), contextlib.redirect_stdout(PrintableStream(sys.stdout)):
+        if "backend" in options:
+            choose_backend(options.backend)
+        with (
+            _terminating_like_ctrl_c(),
+            contextlib.redirect_stdout(PrintableStream(sys.stdout)),
+            notes_on_terminal(),
+        ):
             return COMMANDS[options.command].load().run(options, launch)
     except DiskError as error:
         return fail(EXIT_FAILED, str(error))

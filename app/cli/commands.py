@@ -35,11 +35,13 @@ class Command(NamedTuple):
         summary: What it does, in one line for the list of commands and for its own help.
         module: Where its arguments and its work are.
         interrupted: What has become of the work after an interruption, beside what the interruption itself says.
+        has_backend: Whether clips are trained, decoded or drawn, with the back end of `--backend`.
     """
 
     summary: str
     module: str
     interrupted: str = ""
+    has_backend: bool = False
 
     def load(self) -> CommandModule:
         """Import the command's module."""
@@ -47,73 +49,89 @@ class Command(NamedTuple):
 
 
 COMMANDS = {
-    "train": Command("train clips of a capture, or go on where it stopped", "app.cli.train_command", _GOES_ON),
+    "train": Command(
+        "train clips of a capture, or go on where it stopped", "app.cli.train_command", _GOES_ON, has_backend=True
+    ),
     "eval": Command(
         "measure trained clips against every camera, and the seams between them",
         "app.cli.eval_command",
         "The result was not written.",
+        has_backend=True,
     ),
     "apply": Command(
         "take what edits delete out of the clips for good",
-        "app.cli.apply_command",
+        "app.cli.projects.apply_command",
         "Edits and clips fit together, before or after.",
+        has_backend=True,
     ),
     "mend": Command(
         "make a seam between two clips smaller, or a stretch that flickers, and measure it",
-        "app.cli.mend_command",
+        "app.cli.projects.mend_command",
         "All clips are as they were.",
+        has_backend=True,
     ),
     "render": Command(
         "render the scene as a video or a sequence of pictures",
         "app.cli.render_command",
         "Nothing was written.",
+        has_backend=True,
     ),
     "export": Command(
         "write Gaussians, a player, figures or cameras for other programs",
         "app.cli.export_command",
         "Nothing was written.",
+        has_backend=True,
     ),
     "inspect": Command(
         "examine and correct a capture, or say what the trained clips of a project weigh",
-        "app.cli.inspect_command",
+        "app.cli.captures.inspect_command",
     ),
     "calibrate": Command(
         "find the cameras of a folder of plain videos, and make a capture of it",
-        "app.cli.calibrate_command",
+        "app.cli.captures.calibrate_command",
         "Nothing was written.",
     ),
     "synchronise": Command(
         "find how far each camera of a capture is ahead of the others, and correct it on request",
-        "app.cli.synchronise_command",
+        "app.cli.captures.synchronise_command",
         "Nothing was changed.",
     ),
     "convert": Command(
         "write a capture in another layout: COLMAP, transforms.json or capture.json",
-        "app.cli.convert_command",
+        "app.cli.captures.convert_command",
         "Nothing was written.",
     ),
     "clips": Command(
-        "list the clips of a project, split and merge them, choose the reference", "app.cli.clips_command"
+        "list the clips of a project, split and merge them, choose the reference", "app.cli.projects.clips_command"
     ),
     "versions": Command(
         "list what clips were before they were trained again, bring it back, make room on the disk",
-        "app.cli.versions_command",
+        "app.cli.projects.versions_command",
     ),
-    "exclude": Command("leave cameras and pictures out of training", "app.cli.exclude_command"),
+    "exclude": Command("leave cameras and pictures out of training", "app.cli.projects.exclude_command"),
     "edit": Command(
-        "list and change the edits of a project, and take steps back", "app.cli.edit_command", "Nothing was changed."
+        "list and change the edits of a project, and take steps back",
+        "app.cli.projects.edit_command",
+        "Nothing was changed.",
+        has_backend=True,
     ),
-    "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
-    "repair": Command("say what is left of a damaged project, and go on with it", "app.cli.repair_command"),
+    "gate": Command("say what is static in a project and why, and overrule it", "app.cli.projects.gate_command"),
+    "repair": Command("say what is left of a damaged project, and go on with it", "app.cli.projects.repair_command"),
     "doctor": Command(
-        "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"
+        "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.captures.doctor_command"
     ),
     "bench": Command("measure the kernels on this machine, speed beside error", "app.lab.bench.command"),
     "report": Command(
-        "write a page about a project, alone or beside others", "app.lab.report.command", "The page was not written."
+        "write a page about a project, alone or beside others",
+        "app.lab.report.command",
+        "The page was not written.",
+        has_backend=True,
     ),
     "ablate": Command(
-        "train variants of the method and baselines, and compare them", "app.lab.ablation.command", _GOES_ON
+        "train variants of the method and baselines, and compare them",
+        "app.lab.ablation.command",
+        _GOES_ON,
+        has_backend=True,
     ),
 }
 """Subcommands that run without a window."""

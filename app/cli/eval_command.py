@@ -14,7 +14,7 @@ from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.speed.frame_rates import DEFINITION, frame_rates
 from app.export.staging import check_target
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.training.service import Launch
 from engine.storage.json_files import json_text
 
@@ -68,14 +68,13 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
-    from engine.metrics.clips.flicker import flicker_figures
-
     for clip, summary in document["means"]["clips"].items():
         for group, words in (("held_out", "held out"), ("trained_on", "trained on")):
             found = summary[group]
             if found:
+                of = _pictures_text(document["rows"], int(clip), is_held_out=group == "held_out")
                 line.say(
-                    f"Clip {clip}, {words}: PSNR {_figure(found['psnr'], 2)} dB, cc_psnr "
+                    f"Clip {clip}, {words} ({of}): PSNR {_figure(found['psnr'], 2)} dB, cc_psnr "
                     f"{_figure(found['cc_psnr'], 2)} dB, after colour fit {_figure(found['psnr_fit'], 2)} dB, "
                     f"SSIM {_figure(found['ssim'], 4)}"
                 )
@@ -85,15 +84,13 @@ def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
             f"{_figure(seam['ratio_static'], 2)} times that inside the clips on static pixels, "
             f"{_figure(seam['ratio_moving'], 2)} times on moving ones (truth: {_figure(seam['truth_ratio_moving'], 2)})"
         )
-    flow = flicker_figures(document["seams"]["rows"])
-    if flow["tof"] is not None:
-        line.say(
-            f"tOF: {_figure(flow['tof'], 3)} px per frame, {_figure(flow['tof_inside'], 3)} inside clips, "
-            f"{_figure(flow['tof_borders'], 3)} at borders"
-        )
-    missing = document["columns"]["lpips"]["why_missing"]
-    if document["metrics"] == "all" and missing:
-        line.say(f"LPIPS is left empty: {'; '.join(missing)}")
+
+
+def _pictures_text(rows: list[dict[str, Any]], clip_index: int, *, is_held_out: bool) -> str:
+    """Which pictures a mean is over."""
+    found = [row for row in rows if (row["clip_index"], row["is_held_out"]) == (clip_index, is_held_out)]
+    frames, cameras = ({row[name] for row in found} for name in ("frame_index", "camera"))
+    return f"{len(frames)} frames, {len(cameras)} {'camera' if len(cameras) == 1 else 'cameras'}"
 
 
 def _figure(value: float | None, n_digits: int) -> str:

@@ -14,15 +14,16 @@ from app.cli.arguments import (
     parse_range,
     path_argument,
 )
-from app.cli.chosen_project import open_for_training, project_to_plan
+from app.cli.chosen_project import open_for_training, project_to_plan, what_goes
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.cli.training_settings import add_training_settings
+from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.speed import step_time
 from app.project.clip_catalog import ClipCatalog
-from app.project.project import PROJECT_FILE
+from app.residuals.kept_reading import note_kept
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.storage.json_files import json_text
@@ -55,6 +56,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="a training setting that the chosen clips alone are to have; may be given several times",
     )
+    command.add_argument(
+        "--start-over",
+        dest="is_starting_over",
+        action="store_true",
+        help="first discard everything that is trained in the project, which frees its settings; --plan says what",
+    )
     command.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     command.add_argument(
@@ -71,15 +78,16 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     if options.plan:
         return _plan(options)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
-    project, capture = open_for_training(options)
-    is_refused, outcomes = False, []
     line = ProgressLine(is_quiet=options.quiet)
+    project, capture = open_for_training(options, line.say)
+    is_refused, outcomes = False, []
     service: TrainingService | None = None
     try:
         clips = project.clips(capture.n_frames)
         chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
         holdout = capture.camera_indices(project.settings.holdout)
         service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False)
+        note_kept(service.catalog, project, capture)
         names = ", ".join(project.settings.holdout) or "none"
         line.say(
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
@@ -138,19 +146,27 @@ def _plan(options: argparse.Namespace) -> int:
     project, capture = project_to_plan(options)
     clips = project.clips(capture.n_frames)
     chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
+    discarded = what_goes(project, options)
     catalog = ClipCatalog(project, len(clips))
     order = [i for i in catalog.order if i in chosen]
-    trained = [i for i in order if catalog[i].state == "trained"]
-    damaged = [i for i in order if catalog[i].state == "damaged" or catalog[i].blocked_by is not None]
+    is_afresh = options.is_starting_over
+    kept = [] if is_afresh else order
+    trained = [i for i in kept if catalog[i].state == "trained"]
+    damaged = [i for i in kept if catalog[i].state == "damaged" or catalog[i].blocked_by is not None]
     history = clip_history(project, len(clips))
     plans = [
-        plan_clip(project, capture, clips[i], step_time=step_time, history=history, catalog=catalog)
+        plan_clip(
+            project, capture, clips[i], step_time=step_time, history=history, catalog=catalog, is_afresh=is_afresh
+        )
         for i in order
         if i not in trained and i not in damaged
     ]
     if options.json:
-        print(json_text(plan_document(project, capture, plans, trained, damaged), indent=2))
+        document = plan_document(project, capture, plans, trained, damaged) | {"discards": discarded}
+        print(json_text(document, indent=2))
         return EXIT_OK
+    if discarded:
+        print(f"Discards {discarded}")
     for plan in plans:
         print("\n".join(plan_text(plan)))
     if trained:

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Any
 
+from engine.setting import value_text
 from engine.training.config import SETTINGS, parse_overrides
 from engine.training.presets import PRESETS, preset
-from engine.training.setting import value_text
 
 WIDTH = 100
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from msgspec import Struct
+
 from app.command_text.command_text import CommandText
-from app.command_text.quoting import number, option
+from app.command_text.quoting import option
 from app.document.project_settings import ProjectSettings
-from app.export.export_jobs import Job
-from app.export.named_jobs import JOB_FORMATS, format_name_of
-from app.export.picked_frames import PickedFrames
+from app.export.jobs.job import Job
+from app.export.picked_frames import PickedFrames, frames_text
 from engine.clip_files.clip_header import SettingValue
-from engine.training.setting import value_text
+from engine.setting import Setting, settings_of, value_text
 
 
 def training_command(
@@ -78,104 +78,33 @@ def mend_command(
     return CommandText(("mend", str(folder), *what, *how), f"project.mend({', '.join(said)})", folder)
 
 
-def export_command(folder: Path, kind: str, job: Job) -> CommandText:
-    """The command that carries out an export.
-
-    Args:
-        folder: Of the project.
-        kind: One of app.export.export_jobs.KINDS.
-        job: Of this kind.
-    """
+def export_command(folder: Path, job: Job) -> CommandText:
+    """The command that carries out an export. folder: Of the project."""
     folder, out = folder.absolute(), str(Path(job.out).absolute())
-    format_name = format_name_of(kind, job)
-    values = _differing(format_name, job)
-    if kind == "video":
-        arguments = ["render", str(folder), *_view_arguments(values), "--out", out, "--format", format_name]
-        arguments += _video_arguments(values)
-    else:
-        arguments = ["export", str(folder)]
-        arguments += ["--player", out] if kind == "player" else ["--format", format_name, "--out", out]
-        arguments += _export_arguments(values)
-    said = [repr(out), f"format={format_name!r}"]
-    if kind == "video" and "frames" in values:
-        values = values | {"frames": range(*values["frames"])}
-    said += [f"{name}={value!r}" for name, value in values.items()]
-    names = tuple(type(value).__name__ for value in values.values() if hasattr(value, "__dataclass_fields__"))
-    call = "render" if kind == "video" else "export"
-    return CommandText(tuple(arguments), f"project.{call}({', '.join(said)})", folder, names, reads_only=True)
-
-
-def _differing(format_name: str, job: Job) -> dict[str, Any]:
-    """Entries of a job that are not the usual ones, beside its format and place."""
-    said = ("out", *JOB_FORMATS[format_name].fixed)
-    return {
-        field.name: getattr(job, field.name)
-        for field in fields(job)  # type: ignore[arg-type]
-        if field.name not in said and getattr(job, field.name) != field.default
+    declared = settings_of(type(job))
+    values = {
+        name: value
+        for name, setting in declared.items()
+        if name != "format" and (value := getattr(job, name)) != setting.default
     }
-
-
-def _export_arguments(values: Mapping[str, Any]) -> list[str]:
-    arguments: list[str] = []
+    where = ["--format", job.format_name, "--out", out] if "format" in declared else [f"--{job.kind}", out]
+    arguments = [job.command, str(folder), *where]
     for name, value in values.items():
-        match name:
-            case "frames":
-                arguments += _frames_arguments(value)
-            case "up":
-                arguments += ["--up" if value.startswith("+") else "--down", value[1:]]
-            case "scale":
-                arguments += ["--scale", number(float(value))]
-            case "has_edits":
-                arguments += [] if value else ["--without-edits"]
-            case "has_folder":
-                arguments.append("--data-folder" if value else "--one-file")
-            case "scene_up":
-                arguments += ["--scene-up", *(number(float(part)) for part in value)]
-            case _:
-                arguments += [f"--{name.replace('_', '-')}", str(value)]
-    return arguments
+        arguments += _frames_arguments(value) if name == "frames" else _arguments(declared[name], value)
+    said = [repr(out), f"format={job.format_name!r}", *(f"{name}={value!r}" for name, value in values.items())]
+    names = tuple(type(value).__name__ for value in values.values() if isinstance(value, PickedFrames | Struct))
+    return CommandText(tuple(arguments), f"project.{job.command}({', '.join(said)})", folder, names, reads_only=True)
+
+
+def _arguments(setting: Setting, value: Any) -> list[str]:
+    flag = setting.flag_of(value)
+    if flag.constant is not None:
+        parts = ((one, getattr(value, name)) for name, one in setting.inner.items())
+        return [flag.name, *(word for one, part in parts if part != one.default for word in _arguments(one, part))]
+    text = setting.text(value).removeprefix(flag.prefix)
+    return [flag.name, *text.split()] if isinstance(value, tuple) else list(option(flag.name, text))
 
 
 def _frames_arguments(frames: range | PickedFrames) -> list[str]:
-    runs: Sequence[range] = frames.runs if isinstance(frames, PickedFrames) else (frames,)
-    step = frames.step
-    text = ",".join(f"{run.start}:{run.stop}" for run in runs)
-    return ["--frames", text, *(["--step", str(step)] if step != 1 else [])]
-
-
-def _view_arguments(values: Mapping[str, Any]) -> list[str]:
-    if values.get("camera") is not None:
-        return list(option("--camera", values["camera"]))
-    if values.get("path") is not None:
-        return list(option("--path", values["path"]))
-    return ["--turntable"]
-
-
-def _video_arguments(values: Mapping[str, Any]) -> list[str]:
-    arguments: list[str] = []
-    for name, value in values.items():
-        match name:
-            case "camera" | "path":
-                pass
-            case "turntable":
-                arguments += ["--turns", number(value.n_turns), "--elevation", number(value.elevation_deg)]
-                arguments += [] if value.radius is None else ["--radius", number(value.radius)]
-            case "frames":
-                arguments += ["--frames", f"{value[0]}:{value[1]}"]
-            case "shows":
-                arguments += ["--show", value]
-            case "size":
-                arguments += ["--size", f"{value[0]}x{value[1]}"]
-            case "fps" | "speed" | "hold":
-                arguments += [f"--{name}", number(float(value))]
-            case "background":
-                arguments += ["--background", "#{:02x}{:02x}{:02x}".format(*value)]
-            case "is_transparent":
-                arguments.append("--transparent")
-            case "has_edits":
-                arguments += [] if value else ["--without-edits"]
-            case "sound":
-                arguments += option("--sound", value)
-            case _:
-                arguments += [f"--{name}", str(value)]
-    return arguments
+    step = ["--step", str(frames.step)] if frames.step != 1 else []
+    return ["--frames", frames_text(frames), *step]

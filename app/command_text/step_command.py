@@ -10,28 +10,11 @@ from msgspec import structs, to_builtins
 
 from app.command_text.command_text import CommandText
 from app.command_text.quoting import can_be_argument, number, option
-from app.document import edit_changes
+from app.document.changes import edit_changes
 from app.document.project_document import ProjectDocument
-from app.document.stored_document import plain_document
-from engine.editing.edit import (
-    EVERYWHERE,
-    Action,
-    Box,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Target,
-    Transform,
-)
+from app.document.storing.stored_document import plain_document
+from engine.editing.actions import Action
+from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
 from engine.storage.json_files import json_text
 
 
@@ -170,31 +153,15 @@ def _target_arguments(target: Target, *, in_full: bool) -> tuple[tuple[str, ...]
 
 
 def _action_arguments(action: Action) -> list[str]:
-    match action:
-        case Hide():
-            return ["--hide"]
-        case Delete():
-            return ["--delete"]
-        case Transform():
-            return [
-                *("--move", *_numbers(action.translation)),
-                *("--quat", *_numbers(action.quat)),
-                *("--scale", number(action.scale)),
-                *("--pivot", *_numbers(action.pivot)),
-            ]
-        case Recolor():
-            return [
-                *("--recolour", *_numbers((*action.tint, action.tint_share))),
-                *("--saturation", number(action.saturation)),
-                *("--gains", *_numbers(action.gains)),
-                *("--opacity", number(action.opacity)),
-            ]
-        case Expose(stops=stops):
-            return ["--exposure", number(stops)]
-        case Hold(frame_index=frame_index):
-            return ["--hold", str(frame_index)]
-        case Smooth(sigma_frames=sigma_frames):
-            return ["--smooth", number(sigma_frames)]
+    found: list[str] = []
+    for flag, settings in action.flags().values():
+        if flag.read is None:  # else another one says the same
+            found.append(flag.name)
+            for one in settings:
+                value = getattr(action, one.name)
+                is_text = one.kind in (int, str)
+                found += [str(value)] if is_text else _numbers(value if one.kind is tuple else (value,))
+    return found
 
 
 def _scope_arguments(scope: Scope, *, in_full: bool) -> list[str]:

@@ -11,7 +11,8 @@ from msgspec import Meta, Struct
 from app.document.project_settings import ProjectSettings
 from engine.camera.camera_path import CameraPath
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
-from engine.editing.edit import Edit, Vector
+from engine.editing.actions import Vector
+from engine.editing.edit import Edit
 from engine.gate.regions import GateRegion
 
 MAX_TEXT_CHARACTERS = 200

@@ -15,6 +15,7 @@ from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS, KeptFigures
 from engine.capture.exclusions import exclusion_key
+from engine.metrics.columns import FIGURES_VERSION
 from engine.parallel import n_cores
 
 if TYPE_CHECKING:
@@ -26,7 +27,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-EVAL_SCHEMA = 1
+EVAL_SCHEMA = 2
+KEPT_SCHEMA = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,12 +161,9 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
     Raises:
         ProjectError: The clip, or the one before it, is not trained or damaged.
     """
-    from engine.metrics.pictures import lpips
-    from engine.metrics.pictures.picture import FIGURES_VERSION
-
     clip, config = opened.clips[clip_index], opened.project.settings.config()
     content = {
-        "schema": EVAL_SCHEMA,
+        "schema": KEPT_SCHEMA,
         "version": FIGURES_VERSION,
         "capture": opened.project.settings.fingerprint,
         "scale": opened.capture.scale,
@@ -174,8 +173,6 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
         "field": _fingerprint(opened, opened.last_trained) if config.field == "continue" else None,
         "metrics": scope.metrics,
         "precision": scope.precision,
-        "holdout": sorted(opened.project.settings.holdout),  # whose optical flow is measured
-        "lpips": scope.metrics == "all" and lpips.why_missing() is None,
     }
     first = clip.start if scope.before(clip_index) is None else clip.start - 1
     excluded = exclusion_key(opened.project.document.exclusions, (first, clip.stop))

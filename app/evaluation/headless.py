@@ -17,7 +17,7 @@ from app.status import TrainingStatus
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
 from app.training.service import TrainingService
 from app.training.train_queue import OwnSettings
-from engine.backends.table import backend_called
+from engine.backends.table import process_backend
 from engine.camera.corrections import corrected
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
@@ -27,6 +27,7 @@ from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
+    from engine.backends.backend import Backend
     from engine.metrics.clips.trained_clip import TrainedClip
 
 TRAIN_SCHEMA = 1
@@ -45,7 +46,7 @@ class ClipOutcome:
         state: trained, skipped (it was trained before), stopped, failed, or damaged (its file cannot be read, or that
             of a clip which it needs; it is left as it is).
         step: Steps done.
-        held_out_psnr: dB; None when not measured.
+        held_out_psnr, held_out_whole: dB, and what it is over, see ClipRecord; None when not measured.
         seconds: Wall time of this run, preparation included.
         message, hint, kind: Of a failure or a damage.
     """
@@ -58,6 +59,7 @@ class ClipOutcome:
     message: str = ""
     hint: str = ""
     kind: str = ""
+    held_out_whole: bool = False
 
 
 def train_clips(
@@ -90,7 +92,9 @@ def train_clips(
     for clip_index in clip_indices:
         known = service.catalog[clip_index]
         if known.state == "trained" and not is_again:
-            outcome = ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr)
+            outcome = ClipOutcome(
+                clip_index, "skipped", known.step, known.held_out_psnr, held_out_whole=known.held_out_whole
+            )
         elif (known.state == "damaged" and not is_again) or known.blocked_by is not None:
             outcome = _left_alone(service, clip_index)
         else:
@@ -179,6 +183,11 @@ class TrainedProject:
     reference: ClipState | None
 
     @property
+    def backend(self) -> Backend:
+        """What clips are decoded and drawn with: the back end of this process."""
+        return process_backend()
+
+    @property
     def measured(self) -> TrainedProject:
         """The same with the capture as it is measured: without what the document excludes."""
         return replace(self, capture=self.capture.without(self.project.document.exclusions))
@@ -237,7 +246,7 @@ class TrainedProject:
             )
         state = read_finished(self.project, clip_index)
         base = state if state.is_reference or self.reference is None else self.reference
-        model = load_clip_model(state, self.reference, backend=backend_called())
+        model = load_clip_model(state, self.reference, backend=self.backend)
         if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
             last = read_finished(self.project, self.last_trained)
             if last.header.field and model.field is not None:
@@ -269,7 +278,7 @@ def open_trained(project: Project, capture: Capture | None = None) -> TrainedPro
 
 def train_document(project: Project, capture: Capture, outcomes: Sequence[ClipOutcome]) -> dict[str, Any]:
     """What `train --json` prints: schema, project, capture, holdout, and per clip its index, state, steps, held-out
-    PSNR (dB or null) and seconds."""
+    PSNR (dB or null), whether that is over every frame of the held-out cameras, and seconds."""
     return {
         "schema": TRAIN_SCHEMA,
         "project": str(project.folder),
@@ -281,6 +290,7 @@ def train_document(project: Project, capture: Capture, outcomes: Sequence[ClipOu
                 "state": outcome.state,
                 "steps": outcome.step,
                 "held_out_psnr": outcome.held_out_psnr,
+                "held_out_whole": outcome.held_out_whole,
                 "seconds": round(outcome.seconds, 2),
             }
             for outcome in outcomes

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 from engine.metrics.clips.seams import PairRow
 from engine.metrics.clips.summary import EvalRow
 from engine.metrics.columns import COLUMNS
-from engine.storage.files import atomic_path
+from engine.storage.files import atomic_path, check_folder, open_to_append
 from engine.storage.json_files import checked_line, read_checked_lines
 from engine.storage.typed_json import to_type
 
@@ -27,6 +27,8 @@ EVALUATIONS = "evaluations"
 """Folder of a project for figures that were measured."""
 MAX_BYTES = 512 << 20
 """About 300,000 pictures of one clip."""
+_FORMER_KEYS = {"holdout", "lpips"}
+"""What files of earlier versions name as well: they kept optical flow and LPIPS, which are passed over."""
 Key = tuple[str, int]
 """Name of the camera, and frame; of a pair, the later one."""
 
@@ -78,11 +80,12 @@ class KeptFigures:
         """Write what is added inside the block. Where that fails, the reason is reported and the work goes on."""
         with contextlib.ExitStack() as stack:
             try:
+                check_folder(self.path.parent)
                 if not self._is_of_this_clip:
                     with atomic_path(self.path) as partial:
                         partial.write_text(checked_line(self._content), encoding="utf-8")
                     self._is_of_this_clip = True
-                self._file = stack.enter_context(self.path.open("ab+", buffering=0))
+                self._file = stack.enter_context(open(open_to_append(self.path), "ab+", buffering=0))
                 self._end_last_line(self._file)
             except OSError as error:
                 self._file = None
@@ -115,7 +118,7 @@ class KeptFigures:
         except OSError as error:
             self._say(f"Kept figures cannot be read and are measured again ({error.strerror or error}) - {self.path}")
             return
-        if not lines or lines[0] != self._content:
+        if not lines or {k: v for k, v in lines[0].items() if k not in _FORMER_KEYS} != self._content:
             if n_damaged:
                 self._say(f"Kept figures are damaged and are measured again - {self.path}")
             return
@@ -131,9 +134,9 @@ class KeptFigures:
     def _take(self, line: dict[str, Any]) -> None:
         if "row" in line:
             row = to_type(line["row"], EvalRow)
-            if row.figures.keys() != COLUMNS.keys():
-                raise ValueError("other columns")
-            self.rows[row.camera, row.frame_index] = replace(row, figures={name: row.figures[name] for name in COLUMNS})
+            figures = {name: row.figures[name] for name in COLUMNS}
+            missing = {name: reason for name, reason in row.missing.items() if name in COLUMNS}
+            self.rows[row.camera, row.frame_index] = replace(row, figures=figures, missing=missing)
             return
         pair = to_type(line["pair"], PairRow)
         if not pair.is_boundary or line["before"] == self._before:

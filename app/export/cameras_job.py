@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
+from app.export.jobs.cameras import CamerasJob
 from app.export.staging import check_target
 from engine.camera.corrections import corrected_camera
 from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import ImageFrames
-from engine.capture.writers.conversion import Target, convert
+from engine.capture.writers.conversion import convert
 
-CamerasFormat = Literal["colmap", "transforms"]
-CAMERAS_FORMATS: tuple[CamerasFormat, ...] = ("colmap", "transforms")
-_TARGETS: dict[CamerasFormat, Target] = {"colmap": "colmap", "transforms": "transforms"}
 ROW_BYTES = {"colmap": 240, "transforms": 720}
 WORLD = "Cameras stand in the world of the Gaussians, in its units; frames stay where they are."
-
-
-@dataclass(frozen=True, slots=True)
-class CamerasJob:
-    """What is asked for. out: A new or empty folder."""
-
-    out: Path
-    format: CamerasFormat = "colmap"
 
 
 def estimate(opened: TrainedProject, job: CamerasJob) -> ExportEstimate:
@@ -52,7 +40,7 @@ def run(opened: TrainedProject, job: CamerasJob, report: Report) -> ExportResult
     check_target(job.out, opened=opened, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
     report(ExportProgress(0, n_cameras, "cameras"))
     layout, lines = _as_trained(opened)
-    done = convert(layout, job.out, _TARGETS[job.format])
+    done = convert(layout, job.out, job.format)
     report(ExportProgress(n_cameras, n_cameras, "cameras"))
     return written(job.out, lines=(WORLD, *lines, *done.lines))
 

@@ -11,6 +11,8 @@ from app.export.picked_frames import PickedFrames, picked_frames
 
 FramesChoice = Literal["all", "range", "clip", "frame"]
 FRAMES_CHOICES: tuple[FramesChoice, ...] = ("all", "range", "clip", "frame")
+STEP, MAX_STEP = "step", 100_000
+"""The answer that says which frames are left out, and the most of it."""
 Word = Annotated[str, Meta(max_length=400)]
 
 
@@ -21,15 +23,23 @@ class ExportChoices(msgspec.Struct, frozen=True):
         kind: One of the kinds of app.export.export_jobs.
         answers: Chosen values by "kind.option", of every kind that was looked at.
         frames: All that are trained, those from in to out of the timeline, this clip, or this frame.
-        step: Every so many frames.
         out: The file or folder that is written; empty to have one suggested.
     """
 
     kind: Word = "gaussians"
     answers: tuple[tuple[Word, Word], ...] = ()
     frames: FramesChoice = "all"
-    step: Annotated[int, Meta(ge=1, le=100_000)] = 1
     out: str = ""
+
+    @property
+    def step(self) -> int:
+        """Every so many frames; of the present kind alone, as other kinds would carry it along unseen."""
+        said = self.answer(STEP)
+        return min(max(int(said), 1), MAX_STEP) if said.isdecimal() else 1
+
+    def with_step(self, step: int) -> ExportChoices:
+        """The same with one of every so many frames."""
+        return self.with_answer(STEP, str(min(max(step, 1), MAX_STEP)))
 
     def answer(self, option: str, usual: str = "") -> str:
         """What was chosen for an option of the present kind."""

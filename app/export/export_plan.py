@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.export.edits_line import edits_line
 from app.export.export_choices import ExportChoices, ExportContext
-from app.export.export_jobs import KINDS
-from app.export.forms.form import Answers
-from app.export.forms.table import answers_to
+from app.export.jobs.answers import Answers
 from app.export.staging import check_target
 from engine.errors import EngineError, ProjectError
 
@@ -54,22 +53,24 @@ def plan_export(
     Args:
         taken: What other exports will write, although it may not be there yet.
     """
-    answers = answers_to(context, choices)
-    form = answers.form
+    answers = Answers(context, choices)
+    has_frames = answers.job_type.takes("frames")
     problems: list[str] = []
     lines: tuple[str, ...] = ()
     n_files = n_bytes = 0
-    if form.has_frames and not answers.frames:
+    if has_frames and not answers.frames:
         problems.append("No frames are chosen.")
-    elif form.has_frames and form.needs_trained and choices.frames != "all":
+    elif has_frames and answers.job_type.needs_trained and choices.frames != "all":
         problems += _untrained(context.untrained(answers.frames))
     if not choices.out.strip():
         problems.append("Say where it is to be written.")
     if not problems:
         try:
-            job = form.make_job(answers)
-            found = KINDS[choices.kind].load().estimate(opened, job)
+            job = answers.make_job()
+            found = job.load().estimate(opened, job)
             n_files, n_bytes, lines = found.n_files, found.n_bytes, found.lines
+            if said := edits_line(opened.project.document.edits, has_edits=job.applies_edits):
+                lines = (said, *lines)
             _check_place(answers, opened, n_bytes)
             _check_name(answers)
             if any(overlap(answers.out.resolve(), other.resolve()) for other in taken):
@@ -129,7 +130,7 @@ def suggested_out(folder: str, context: ExportContext, choices: ExportChoices, t
     Args:
         taken: What other exports will write, although it may not be there yet.
     """
-    answers = answers_to(context, choices)
+    answers = Answers(context, choices)
     suffix = answers.suffix
     words = [context.name or "scene", *([] if suffix in _OWN_SUFFIXES else [choices.kind])]
     if not suffix:

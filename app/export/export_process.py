@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import queue
-import shutil
 import threading
 import time
 from contextlib import suppress
@@ -18,7 +17,7 @@ from typing import Protocol
 
 import msgspec
 
-from app.background.children import undisturbed
+from app.background.children import start_child
 from app.export.export_jobs import ExportTask
 from app.export.export_messages import (
     CANCEL,
@@ -30,7 +29,7 @@ from app.export.export_messages import (
     decode_event,
 )
 from app.export.export_worker import main
-from engine.storage.files import PARTIAL_PREFIX
+from engine.storage.files import PARTIAL_PREFIX, discard
 
 logger = logging.getLogger(__name__)
 
@@ -99,8 +98,7 @@ class ExportProcess:
 
     def _watch(self) -> None:
         try:
-            with undisturbed():
-                self.process.start()
+            start_child(self.process)
         except OSError as error:
             self._news.put(ExportFailed(f"No process could be started ({error.strerror or error}).", HINT))
             return
@@ -149,11 +147,7 @@ class ExportProcess:
     def _sweep(self) -> None:
         """Remove what the process had begun to write and did not finish, as it does itself unless it is killed."""
         for path in _left_over(self._folder, self.process.pid):
-            with suppress(OSError):
-                if path.is_dir() and not path.is_symlink():
-                    shutil.rmtree(path, ignore_errors=True)
-                else:
-                    path.unlink()
+            discard(path)
 
     def _death(self) -> ExportFailed:
         code = self.process.exitcode or 0

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from app.export.export_jobs import KINDS, ExportTask
+from app.export.export_jobs import ExportTask
 from app.export.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn
 from app.export.export_plan import TAKEN, overlap
 from app.export.export_process import Exporter, ExportProcess
@@ -71,7 +71,8 @@ class ExportQueue:
         self._check_free(task.job.out)
         self._n_added += 1
         self._tasks[self._n_added] = task
-        self._statuses.append(ExportStatus(self._n_added, title or KINDS[task.kind].title, task.job.out))
+        words = title or task.job.title
+        self._statuses.append(ExportStatus(self._n_added, words, task.job.out, project=Path(task.project)))
         self.revision += 1
         return self._n_added
 
@@ -93,11 +94,6 @@ class ExportQueue:
             self._tasks.pop(export_id, None)
             self.revision += 1
 
-    def clear(self) -> None:
-        """Take all that have ended out of the list."""
-        for status in [status for status in self._statuses if status.is_over]:
-            self.remove(status.export_id)
-
     def move(self, export_id: int, place: int) -> None:
         """Bring one that waits to a place among those that wait, 0 being the next."""
         status = self._find(export_id)
@@ -114,7 +110,7 @@ class ExportQueue:
         if status is not None and status.state in ("failed", "cancelled"):
             self._check_free(status.path)
             self._statuses.remove(status)
-            self._statuses.append(ExportStatus(export_id, status.title, status.path))
+            self._statuses.append(ExportStatus(export_id, status.title, status.path, project=status.project))
             self.revision += 1
 
     def poll(self, *, n_threads: int | None = None) -> list[ExportStatus]:

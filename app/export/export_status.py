@@ -26,6 +26,7 @@ class ExportStatus:
         seconds: How long it took; 0 before it ended.
         result: What was written; None unless it is done.
         message, hint: Why it failed, and what helps.
+        project: Folder of the project that it is of.
     """
 
     export_id: int
@@ -39,6 +40,7 @@ class ExportStatus:
     result: ExportResult | None = None
     message: str = ""
     hint: str = ""
+    project: Path = Path()
 
     @property
     def is_over(self) -> bool:

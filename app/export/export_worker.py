@@ -14,10 +14,11 @@ from multiprocessing.connection import Connection
 
 from app.background.kernels import use_threads
 from app.background.logs import start_logging
-from app.background.priority import IDLE_NICENESS, lower_process
 from app.export.export_jobs import ExportTask, run_task
 from app.export.export_messages import ExportDone, ExportFailed, ExportGoesOn, ExportStopped, encode
 from app.export.export_progress import ExportCancelled, ExportProgress
+from engine.backends.table import choose_backend
+from engine.children.priority import IDLE_NICENESS, lower_process
 from engine.errors import EngineError
 from engine.kernels.cache import use_kernel_cache
 
@@ -36,6 +37,7 @@ def main(task: ExportTask, commands: Connection, events: Connection) -> None:
     start_logging()
     use_kernel_cache()  # before kernels are imported
     use_threads(task.n_threads)
+    choose_backend(task.backend)
     with suppress(OSError):  # nobody listens any more
         events.send_bytes(encode(_ending(task, Wanted(commands, events))))
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
+from app.export.jobs.gaussians import WrittenPart
 from app.export.scene_frames import Part
 
-WrittenPart = Literal["all", "static", "moving", "split"]
-WRITTEN_PARTS: tuple[WrittenPart, ...] = ("all", "static", "moving", "split")
-"""What is written; "split": what stands still once and what moves per frame."""
 SIDECAR = "_export.json"
 """End of the name of the file that says what the others are."""
 _N_DIGITS = 4

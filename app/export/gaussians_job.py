@@ -5,9 +5,6 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -15,47 +12,15 @@ from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
-from app.export.gaussian_files import SIDECAR, WrittenPart
+from app.export.gaussian_files import SIDECAR
 from app.export.gaussian_sequence import GaussianSequence
-from app.export.picked_frames import PickedFrames
+from app.export.jobs.gaussians import GaussiansJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
 from engine.errors import ProjectError
-from engine.export.formats.table import FORMATS, Format
-from engine.export.world import AXES, World, world
+from engine.export.formats.table import FORMATS, FULL_PLY, Format
+from engine.export.world import World, world
 from engine.storage.json_files import json_text
-
-FileAxes = Literal["ply", "rub"]
-_SCALES = (1e-6, 1e6)
-
-
-@dataclass(frozen=True, slots=True)
-class GaussiansJob:
-    """What is asked for.
-
-    Attributes:
-        out: A new or empty folder.
-        format: One of `engine.export.formats.table.FORMATS`.
-        frames: Of the capture; None for all that are trained.
-        part: What is written; "static" once as long as it stays the same, "moving" per frame, "split" both.
-        up: Axis of the files that the scene's up is turned to, one of `engine.export.world.AXES`; None leaves it.
-        scale: Units of the files per scene unit; None for metres where the user has said how long a scene unit is, else
-            1.
-        axes: "ply" as they are; "rub" turned by 180 degrees about x, for programs of Niantic.
-        has_edits: Whether the edits of the project are applied.
-        scene_up: Which way is up in the capture; None for what the user has said of the project, else for what its
-            cameras agree on. [3]
-    """
-
-    out: Path
-    format: str = "ply"
-    frames: range | PickedFrames | None = None
-    part: WrittenPart = "all"
-    up: str | None = None
-    scale: float | None = None
-    axes: FileAxes = "ply"
-    scene_up: tuple[float, float, float] | None = None
-    has_edits: bool = True
 
 
 def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
@@ -96,7 +61,8 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     with staged_folder(job.out, what="The export") as folder:
         sequence.write(folder, report)
         document = sequence.document() | {
-            "settings": {"format": job.format, "part": job.part, "axes": job.axes, "up": job.up, "scale": job.scale},
+            "settings": {"format": job.format, "part": job.part, "axes": job.axes, "up": job.up, "scale": job.scale}
+            | ({"fields": job.fields} if job.fields != "usual" else {}),
             "seconds": round(time.monotonic() - started_s, 2),
         }
         (folder / f"{sequence.name}{SIDECAR}").write_text(json_text(document, indent=1) + "\n", encoding="utf-8")
@@ -109,26 +75,19 @@ def _scene(opened: TrainedProject, job: GaussiansJob) -> SceneFrames:
 
 def _frames(scene: SceneFrames, job: GaussiansJob) -> list[int]:
     frames = scene.trained_frames if job.frames is None else list(job.frames)
-    for frame in frames:
-        scene.clip_at(frame)
-    if not frames:
-        raise ProjectError("There are no frames to export.", path=scene.opened.project.folder)
+    scene.check_trained(frames)
     return frames
 
 
 def _kind(job: GaussiansJob) -> Format:
-    if job.format not in FORMATS:
-        raise ProjectError(f"There is no format '{job.format}'.", hint=f"Formats are {', '.join(FORMATS)}.")
-    return FORMATS[job.format]
+    if job.fields == "full" and job.format != "ply":
+        raise ProjectError(f"'{job.format}' has no fields to choose.", hint="Fields are those of ply; leave them out.")
+    return FULL_PLY if job.fields == "full" else FORMATS[job.format]
 
 
 def _world(opened: TrainedProject, job: GaussiansJob) -> World:
-    """Where the scene lies in the files. Raises ProjectError where that cannot be."""
-    if job.up is not None and job.up not in AXES:
-        raise ProjectError(f"There is no axis '{job.up}'.", hint=f"Axes are {', '.join(AXES)}.")
+    """Where the scene lies in the files."""
     said = opened.project.document.world.meters_per_unit
     scale = job.scale if job.scale is not None else 1.0 if said is None else said
-    if not _SCALES[0] <= scale <= _SCALES[1]:
-        raise ProjectError(f"The scale is {scale:g}.", hint=f"Give a number from {_SCALES[0]} to {_SCALES[1]:.0f}.")
     scene_up = opened.up if job.scene_up is None else np.array(job.scene_up)
     return world(scene_up, up=job.up, scale=scale, is_rub=job.axes == "rub")

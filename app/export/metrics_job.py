@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
 
@@ -18,7 +17,7 @@ from app.csv_text import csv_text
 from app.evaluation.evaluation import Scope, kept_figures
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
-from app.export.picked_frames import PickedFrames
+from app.export.jobs.metrics import MetricsJob
 from app.export.staging import check_target, staged_file
 from engine.errors import ProjectError
 from engine.metrics.columns import COLUMNS
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-MetricsFormat = Literal["csv", "json"]
-METRICS_FORMATS: tuple[MetricsFormat, ...] = ("csv", "json")
 SCHEMA = 1
 SETTING = "setting_"
 """Columns of training settings begin with this."""
@@ -48,21 +45,6 @@ _WHICH: tuple[tuple[Choice, Precision], ...] = (
     ("quick", "8bit"),
 )
 """What may be kept of a picture; the first that is there counts."""
-
-
-@dataclass(frozen=True, slots=True)
-class MetricsJob:
-    """What is asked for.
-
-    Attributes:
-        out: The file.
-        format: "csv" has the pictures; "json" the differences of neighbouring frames and everything about clips too.
-        frames: Frames of the project that are listed; None for all. Clips that are not trained are left out.
-    """
-
-    out: Path
-    format: MetricsFormat = "csv"
-    frames: range | PickedFrames | None = None
 
 
 def estimate(opened: TrainedProject, job: MetricsJob) -> ExportEstimate:

@@ -56,3 +56,9 @@ def picked_frames(spans: Iterable[tuple[int, int]], step: int) -> range | Picked
     first = joined[0][0]
     runs = tuple(run for start, stop in joined if (run := range(start + (first - start) % step, stop, step)))
     return runs[0] if len(runs) == 1 else PickedFrames(runs, step)
+
+
+def frames_text(frames: range | PickedFrames) -> str:
+    """Frames as the command line takes them, without their step: "A:B,C:D"."""
+    runs = frames.runs if isinstance(frames, PickedFrames) else (frames,)
+    return ",".join(f"{run.start}:{run.stop}" for run in runs)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report
-from app.export.picked_frames import PickedFrames
+from app.export.jobs.player import PlayerJob
 from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_file, staged_folder
@@ -32,28 +31,6 @@ _DESCRIBED_BYTES = 400
 _SHARED_ROW_BYTES, _LIGHT_ROW_BYTES, _MOVING_ROW_BYTES = 9.5, 0.5, 8.8
 """Of a Gaussian that stands still, once; of the light on it, per clip; and per frame of those that move in the frame
 with most of them. As measured on trained captures, where many are too faint to be written."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlayerJob:
-    """What to write.
-
-    Attributes:
-        out: The page.
-        frames: Of the capture, every n-th where the range has a step; None for all that are trained.
-        has_folder: Whether clips go into a folder beside the page; None for what fits the size.
-        has_edits: Whether the edits of the project are applied.
-    """
-
-    out: Path
-    frames: range | PickedFrames | None = None
-    has_folder: bool | None = None
-    has_edits: bool = True
-
-    @property
-    def folder(self) -> Path:
-        """Where clips go if not into the page."""
-        return self.out.with_name(f"{self.out.stem}_data")
 
 
 def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from app.playback.arrays import BACKGROUND
-from app.playback.orbit_view import OrbitView
-from app.playback.rig_views import camera_pose, home_camera
+from app.playback.modes.arrays import BACKGROUND
+from app.playback.views.orbit_view import OrbitView
+from app.playback.views.rig_views import camera_pose, home_camera
 
 if TYPE_CHECKING:
     from app.export.scene_frames import SceneFrames

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Literal
 
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
-from app.playback.contents import part_of
+from app.playback.modes.contents import part_of
 from engine.capture.clip import Clip
-from engine.capture.frame_runs import runs_of
+from engine.capture.files.frame_runs import runs_of
 from engine.editing.edit import Edit
 from engine.editing.effects import EditStack, Effects
 from engine.errors import ProjectError

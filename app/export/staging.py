@@ -5,18 +5,20 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.project.lock import is_process_alive
 from engine.errors import ProjectError
-from engine.storage.files import atomic_folder, atomic_path, disk_error
+from engine.storage.files import atomic_folder, atomic_path, discard, disk_error, is_left_over
 
 if TYPE_CHECKING:
     from app.evaluation.headless import TrainedProject
 
 SPARE_BYTES = 16 << 20
-"""Of the disk, which stay free whatever is written."""
+"""Of the disk, which stay free whatever is written; less where less is written: a table is not held up by it."""
+LEAST_SPARE_BYTES = 256 << 10
 
 
 def check_target(
@@ -43,13 +45,22 @@ def check_target(
     if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
         reason = "may not be written to" if parent.is_dir() else "is a file"
         raise ProjectError(f"{parent} {reason}.", hint="Choose another place.", path=path)
-    free_bytes = shutil.disk_usage(parent).free
-    if n_bytes + SPARE_BYTES > free_bytes:
+    disk = shutil.disk_usage(parent)
+    if disk.total == 0:
+        raise ProjectError(f"{parent} holds no files of users.", hint="Choose another place.", path=path)
+    spare_bytes = min(SPARE_BYTES, LEAST_SPARE_BYTES + n_bytes)
+    if n_bytes + spare_bytes > disk.free:
+        needed = f"About {_room(n_bytes)} are to be written" if n_bytes else f"{_room(spare_bytes)} have to be free"
         raise ProjectError(
-            f"About {n_bytes / 1e6:.0f} MB are to be written, but only {free_bytes / 1e6:.0f} MB are free.",
+            f"{needed}, but only {_room(disk.free)} are free.",
             hint="Free some space, choose another place, or export fewer frames.",
             path=path,
         )
+
+
+def _room(n_bytes: int) -> str:
+    """Bytes in words that do not round to nothing."""
+    return f"{n_bytes / 1e6:,.0f} MB" if n_bytes >= 9.5e5 else f"{n_bytes / 1e3:.0f} kB"
 
 
 def _check_apart(path: Path, opened: TrainedProject) -> None:
@@ -71,11 +82,14 @@ def _is_empty_folder(path: Path) -> bool:
 def staged_file(path: Path, *, what: str = "The file") -> Iterator[Path]:
     """Write to the yielded path; it becomes `path` when the block ends well, and disappears when it does not.
 
+    What killed programs have left beside it of the same file goes first.
+
     Args:
         what: Names the file in a message.
     Raises:
         DiskError: The disk refused; nothing is left behind.
     """
+    _sweep(path)
     try:
         with atomic_path(path) as partial:
             yield partial
@@ -90,8 +104,16 @@ def staged_folder(path: Path, *, what: str = "The folder") -> Iterator[Path]:
     Raises:
         DiskError: The disk refused, or something else has this name by now; nothing is left behind.
     """
+    _sweep(path)
     try:
         with atomic_folder(path) as partial:
             yield partial
     except OSError as error:
         raise disk_error(error, what=what, path=path) from error
+
+
+def _sweep(path: Path) -> None:
+    with suppress(OSError):
+        for beside in path.absolute().parent.iterdir():
+            if is_left_over(beside, is_process_alive, of=path.name):
+                discard(beside)

@@ -48,7 +48,8 @@ CAVEATS = (
     "is not said by them: it learns a gain and an offset of each training camera at the first frame, and none of a "
     "test camera. No code of their evaluation was ever published; re-runs by others differ from the printed figures by "
     "up to 1.7 dB per sequence. Copied from texts that copy the papers' tables. Compare raw PSNR, of all 150 frames; "
-    "never PSNR after the colour fit."
+    "never PSNR after the colour fit. The highest mean over the six sequences that is known here is 29.83 dB "
+    "(PaMoSplat, arXiv 2605.10307, quoted by a list on the web; not verified, scenes not named)."
 )
 _LUITEN = "Luiten et al., Dynamic 3D Gaussians (3DV 2024), table 1"
 _S4D = "S4D, table 4"

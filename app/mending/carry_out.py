@@ -10,7 +10,8 @@ from app.evaluation.headless import open_trained
 from app.mending.request import MendJob, MendResult
 from app.project.clip_versions import read_finished
 from app.project.mends.record import MendedClip, MendRecord, now_text
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from app.training.build import clip_training
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
@@ -62,6 +63,7 @@ def mend(job: MendJob, report: ReportProgress) -> MendResult:
         reference,
         holdout=holdout,
         make_training=make,
+        backend=opened.backend,
         threads=Threads(n_threads, lambda: use_threads(1)),
         report=report,
     ).run(job.request.method)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import msgspec
 
 from app.project.mends.record import MendRecord
+from engine.backends.table import chosen_name
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
 from engine.mending.figures import CHOICES
@@ -50,6 +51,7 @@ class MendJob(msgspec.Struct, frozen=True):
         folder: Where drafts of clips go, on the disk of the project.
         n_threads: What to compute with; None for all cores.
         is_window_open: Leave the right of way to a window.
+        backend: Name of what is computed with.
     """
 
     project: str
@@ -57,18 +59,16 @@ class MendJob(msgspec.Struct, frozen=True):
     folder: str
     n_threads: int | None = None
     is_window_open: bool = False
+    backend: str = msgspec.field(default_factory=chosen_name)
 
 
 class MendResult(msgspec.Struct, frozen=True):
     """What the process leaves.
 
     Attributes:
-        record: What came of it; None where it failed.
+        record: What came of it.
         drafts: Files of the clips that changed, by index.
-        message, hint: Why it failed.
     """
 
-    record: MendRecord | None = None
+    record: MendRecord
     drafts: dict[int, str] = {}
-    message: str = ""
-    hint: str = ""

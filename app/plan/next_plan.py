@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from app.background.latest import LatestWorker
 from app.plan.planning import plan_clip, plan_status
 from app.plan.speed import step_time
 from app.project.clip_catalog import ClipCatalog
+from app.project.disk.discarding import progress_of
 from app.project.project import Project
 from app.status import PlanStatus
 from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
-from engine.training.plan.plan import TrainingPlan
+from engine.training.plan.plan import StepSizes, TrainingPlan
 
 logger = logging.getLogger(__name__)
 
@@ -41,7 +43,8 @@ class NextPlan:
     """Asks for the plan of the clip that would be trained next. Methods are for one thread and do not wait."""
 
     def __init__(self) -> None:
-        self._plans: LatestWorker[PlanRequest, TrainingPlan | None] = LatestWorker("plans", _compute)
+        self._plans: LatestWorker[PlanRequest, TrainingPlan | None] = LatestWorker("plans", self._compute)
+        self._progress, self._progress_of = "", (Path(), -1)
 
     @property
     def newest(self) -> tuple[PlanRequest, TrainingPlan | None] | None:
@@ -68,22 +71,25 @@ class NextPlan:
             self._plans.request(request)
         if newest is not None and (newest[0].clip, newest[0].basis) == (clip, basis):  # until the machine is timed
             plan = newest[1]
-        can_edit = project.is_writable and not service.catalog.has_progress
-        return plan_status(project, capture, clip, plan, can_edit=can_edit)
+        can_edit = project.is_writable and not service.catalog.has_finished_clips
+        if self._progress_of != (key := (project.folder, service.catalog.revision)):
+            self._progress_of, self._progress = key, progress_of(project).progress_words
+        return plan_status(project, capture, clip, plan, can_edit=can_edit, discards=self._progress)
 
     def forget(self) -> None:
         """Another capture was opened."""
         self._plans.forget()
 
     def close(self) -> None:
-        """End the thread; it may be waiting for a child process that times the machine, so not for long."""
-        self._plans.close(timeout_s=0.2)
+        """End the thread, and the process in which it times the machine."""
+        self._plans.close()
 
+    def _compute(self, request: PlanRequest) -> TrainingPlan | None:
+        def timed(sizes: StepSizes, phase: str) -> float | None:
+            return step_time(sizes, phase, lambda: not self._plans.is_closed) if request.can_measure else None
 
-def _compute(request: PlanRequest) -> TrainingPlan | None:
-    timed = step_time if request.can_measure else lambda sizes, phase: None
-    try:
-        return plan_clip(request.project, request.capture, request.clip, step_time=timed, catalog=request.catalog)
-    except EngineError as error:  # training will say the same
-        logger.info("the next clip cannot be planned: %s", error)
-        return None
+        try:
+            return plan_clip(request.project, request.capture, request.clip, step_time=timed, catalog=request.catalog)
+        except EngineError as error:  # training will say the same
+            logger.info("the next clip cannot be planned: %s", error)
+            return None

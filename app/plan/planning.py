@@ -12,11 +12,11 @@ from app.project.project import Project
 from app.status import PlanStatus, SettingStatus
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.text import duration_text
+from engine.text import duration_text, figure_text
 from engine.training.config import SETTINGS, TrainConfig
 from engine.training.plan.forecast import MeasuredClip, measured_clip
 from engine.training.plan.plan import StepTime, TrainingPlan, footage_of, make_plan, resumed_plan
-from engine.training.presets import PRESETS
+from engine.training.presets import PRESETS, closest_preset
 
 PLAN_SCHEMA = 2
 
@@ -35,6 +35,7 @@ def plan_clip(
     step_time: StepTime,
     history: Sequence[MeasuredClip] | None = None,
     catalog: ClipCatalog | None = None,
+    is_afresh: bool = False,
 ) -> TrainingPlan:
     """The plan of one clip of a project.
 
@@ -45,6 +46,7 @@ def plan_clip(
         step_time: Asked where no other clip of this kind says how long training takes.
         history: Of all its clips, for callers that plan many; read here when None.
         catalog: Says whether the training was stopped and goes on; when None, the whole of it is planned.
+        is_afresh: Plan as if nothing were trained yet.
     Raises:
         CaptureError, PreparationError: The capture does not fit the settings.
     """
@@ -53,9 +55,11 @@ def plan_clip(
     base = project.inherited_index(clip.clip_index)
     if base is None and config.start == "previous" and clip.clip_index != settings.reference_clip:
         base, config = project.previous_index(clip.clip_index), config.going_on()
-    if history is None:
+    if is_afresh:
+        history, catalog = (), None
+    elif history is None:
         history = clip_history(project, len(project.clips(capture.n_frames)))
-    found = None if base is None else project.headers.read(project.clip_path(base))
+    found = None if base is None or is_afresh else project.headers.read(project.clip_path(base))
     plan = make_plan(
         footage_of(capture, capture.camera_indices(settings.holdout)),
         clip,
@@ -104,7 +108,7 @@ def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
 
 
 def plan_status(
-    project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool
+    project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool, discards: str
 ) -> PlanStatus:
     """What the window shows of the next clip.
 
@@ -112,6 +116,7 @@ def plan_status(
         project, capture, clip: What would be trained.
         plan: Its plan; None until it is made.
         can_edit: Whether settings may still change.
+        discards: What a change would throw away, in words.
     """
     settings, config = project.settings, project.settings.config()
     capture = capture.without(project.document.exclusions)
@@ -140,13 +145,8 @@ def plan_status(
             if setting.label
         ),
         can_edit=can_edit,
+        discards=discards,
     )
-
-
-def closest_preset(overrides: dict[str, Any]) -> str:
-    """The preset with the most settings among those that hold all of its own."""
-    fitting = [name for name, values in PRESETS.items() if values.items() <= overrides.items()]
-    return max(fitting, key=lambda name: len(PRESETS[name]))
 
 
 # ---------------------------------------------------------------- as text and JSON
@@ -161,13 +161,20 @@ def short_text(plan: TrainingPlan) -> str:
     """The forecast as one line."""
     stored = "" if plan.disk_mb.value is None else f", {plan.disk_mb.text} stored"
     steps = f"{plan.n_steps:,} steps" if plan.n_steps else "no steps"
-    times = f"about {duration_text(plan.seconds)} ({duration_text(plan.preparation_s.value)} preparation)"
+    times = time_words(plan.seconds)
+    if plan.preparation_s.value is not None:
+        times += f" (preparation {duration_text(plan.preparation_s.value)})"
     if plan.steps_done:
         steps = (
             f"goes on at step {plan.steps_done:,}, {plan.n_steps - plan.steps_done:,} of {plan.n_steps:,} steps left"
         )
-        times = f"about {duration_text(plan.seconds)}"
+        times = time_words(plan.seconds)
     return f"{steps}, {times}, {memory_text(plan.memory_mb.value)}{stored}"
+
+
+def time_words(seconds: float | None) -> str:
+    """A forecast of time as part of a sentence."""
+    return "time not known yet" if seconds is None else f"about {duration_text(seconds)}"
 
 
 def plan_text(plan: TrainingPlan) -> list[str]:
@@ -196,7 +203,7 @@ def compared_text(plan: TrainingPlan, project: Project) -> str:
         ("stored", plan.disk_mb, taken.disk_mb, "MB"),
     )
     parts = [
-        f"{name} {line.value:.3g} against {measured:.3g} {unit}"
+        f"{name} {figure_text(line.value)} against {figure_text(measured)} {unit}"
         for name, line, measured, unit in pairs
         if measured is not None and line.value is not None
     ]

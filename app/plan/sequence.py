@@ -23,7 +23,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import EngineError
-from engine.training.plan.plan import StepTime, TrainingPlan, footage_of, make_plan
+from engine.training.plan.plan import StepSizes, StepTime, TrainingPlan, footage_of, make_plan
 
 logger = logging.getLogger(__name__)
 
@@ -128,7 +128,7 @@ class SequencePlan:
     """Forecasts of the open project. Methods are for one thread and do not wait."""
 
     def __init__(self) -> None:
-        self._worker: LatestWorker[SequenceRequest, Kinds] = LatestWorker("sequence", _kinds)
+        self._worker: LatestWorker[SequenceRequest, Kinds] = LatestWorker("sequence", self._kinds)
         self._parts: list[ClipForecast] = []
         self._kept = Waiting()
         self._waiting_of: tuple[object, ...] = ()
@@ -197,8 +197,14 @@ class SequencePlan:
         self._waiting_of = ()
 
     def close(self) -> None:
-        """End the thread; it may be waiting for a child process that times the machine, so not for long."""
-        self._worker.close(timeout_s=0.2)
+        """End the thread, and the process in which it times the machine."""
+        self._worker.close()
+
+    def _kinds(self, request: SequenceRequest) -> Kinds:
+        def timed(sizes: StepSizes, phase: str) -> float | None:
+            return step_time(sizes, phase, lambda: not self._worker.is_closed)
+
+        return _kinds(request, timed if request.can_measure else known_step_time)
 
 
 def _clip_parts(service: TrainingService, project: Project, kinds: Kinds, own: Sequence[int]) -> list[ClipForecast]:
@@ -227,8 +233,7 @@ def _running_part(service: TrainingService, whole: ClipForecast) -> ClipForecast
 # ---------------------------------------------------------------- on the thread
 
 
-def _kinds(request: SequenceRequest) -> Kinds:
-    timed = step_time if request.can_measure else known_step_time
+def _kinds(request: SequenceRequest, timed: StepTime) -> Kinds:
     free_mb = None
     with suppress(OSError):
         free_mb = shutil.disk_usage(request.project.folder).free / 1e6

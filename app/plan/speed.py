@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import logging
-from functools import cache
+import time
+from collections.abc import Callable
 
-from app.background.children import in_fresh_process
+import msgspec
+
+from engine.backends.table import choose_backend, chosen_name, process_backend
+from engine.children.child import Parent
+from engine.children.kind import ChildFailed, ChildKind, Unwanted
+from engine.children.process import run_child
+from engine.errors import EngineError
 from engine.kernels.cache import is_cache_warm
+from engine.progress import Progress
 from engine.training.plan.plan import StepSizes
 
 logger = logging.getLogger(__name__)
@@ -14,19 +22,52 @@ logger = logging.getLogger(__name__)
 TIMEOUT_S = 60.0
 
 
-def step_time(sizes: StepSizes, phase: str) -> float | None:
+class TimedSteps(msgspec.Struct, frozen=True):
+    """What to time."""
+
+    sizes: StepSizes
+    phase: str
+    backend: str
+
+
+TIMING: ChildKind[TimedSteps, Progress, float] = ChildKind(
+    place="app.plan.speed:TIMING",
+    work="app.plan.speed:time_steps",
+    what="The process that times steps",
+    job=TimedSteps,
+    result=float,
+)
+
+_known: dict[tuple[StepSizes, str], float | None] = {}
+
+
+def step_time(sizes: StepSizes, phase: str, is_wanted: Callable[[], bool] = lambda: True) -> float | None:
     """Seconds of a step of these sizes; takes some seconds, most of them imports, once in the life of the program.
 
     None where kernels are not compiled yet, since that alone takes longer, and where the steps failed.
+
+    Args:
+        is_wanted: Asked several times a second; the process is ended once it is not.
+    Raises:
+        Unwanted: It is not wanted any more; nothing is known.
     """
     if not is_cache_warm():
         return None
-    found_s = _timed_once(sizes, phase)
-    _known[sizes, phase] = found_s
-    return found_s
+    if (sizes, phase) not in _known:
+        until_s = time.monotonic() + TIMEOUT_S
 
+        def alive() -> None:
+            if not is_wanted():
+                raise Unwanted
+            if time.monotonic() > until_s:
+                raise TimeoutError(f"no step in {TIMEOUT_S:.0f} s")
 
-_known: dict[tuple[StepSizes, str], float | None] = {}
+        try:
+            _known[sizes, phase] = run_child(TIMING, TimedSteps(sizes, phase, chosen_name()), alive=alive)
+        except (ChildFailed, EngineError, TimeoutError) as error:
+            logger.warning("steps could not be timed on this machine: %s", error)
+            _known[sizes, phase] = None
+    return _known[sizes, phase]
 
 
 def known_step_time(sizes: StepSizes, phase: str) -> float | None:
@@ -34,18 +75,12 @@ def known_step_time(sizes: StepSizes, phase: str) -> float | None:
     return _known.get((sizes, phase))
 
 
-@cache
-def _timed_once(sizes: StepSizes, phase: str) -> float | None:
-    found_s = in_fresh_process(_time_steps, sizes, phase, timeout_s=TIMEOUT_S)
-    if found_s is None:
-        logger.warning("steps could not be timed on this machine")
-    return found_s
-
-
-def _time_steps(sizes: StepSizes, phase: str) -> float:
+def time_steps(job: TimedSteps, parent: Parent[Progress]) -> float:
+    """Runs in the child."""
     from app.background.kernels import use_threads
 
     use_threads(None)
+    choose_backend(job.backend)
     from engine.training.plan.measured_steps import measured_step_s
 
-    return measured_step_s(sizes, phase)
+    return measured_step_s(job.sizes, job.phase, process_backend())

@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 
-from app.playback.course import Course
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest
+from app.playback.modes.view_modes import PLAIN, ShownAs, decoded_as
+from app.playback.prefetch_order import Course
 from app.playback.render import Look, PictureKey, Renderer, RenderRequest
-from app.playback.view_modes import PLAIN, ShownAs, decoded_as
-from engine.capture.frame_runs import runs_of
+from engine.capture.files.frame_runs import runs_of
 
 PLAYING_S = 1.5
 """This much of what comes is made ready while it plays."""
@@ -102,6 +102,19 @@ class Ahead:
         self._decoder.plan(missing, lambda key: course.distance(key[-1]))
         self._renderer.plan(list(self._drawable(coming)), lambda key: _picture_distance(key, course, look_keys))
 
+    def loaded(self, course: Course, request_of: RequestOf) -> tuple[int, int]:
+        """Of the frames that are played, or as many as memory holds: how many can be shown at once, and how many there
+        are. A frame that is not trained, still trains or cannot be decoded counts as ready: nothing better comes."""
+        parts = dict.fromkeys(decoded_as(asked.look.shown_as) for asked in self._looks.values()) or (PLAIN,)
+        n_that_fit = [self._decoder.n_that_fit // len(parts)]
+        n_that_fit += [self._renderer.n_that_fit(asked.full) // len(self._looks) for asked in self._looks.values()]
+        n_ready = 0
+        frames = [course.frame_index, *course.ahead(max(min(n_that_fit) - SPARE, 0))]
+        for frame in frames:
+            requests = [one for part in parts if (one := request_of(frame, part)) is not None and not one.is_live]
+            n_ready += all(self._is_ready(one.key) or not self._decoder.comes_ahead(one) for one in requests)
+        return n_ready, len(frames)
+
     def _take_looks(self) -> None:
         """What is shown now; a place that has not said so for some turns of the loop is gone."""
         self._unasked = {view_id: 0 if view_id in self._asked else n + 1 for view_id, n in self._unasked.items()}
@@ -160,6 +173,8 @@ class Ahead:
 
 def n_ahead(course: Course) -> int:
     """How many frames are made ready while it plays."""
+    if course.is_loaded_first:
+        return course.n_frames
     return min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image
 
 from app.background.latest import LatestWorker
-from app.playback.arrays import Picture
-from app.playback.hatching import hatched
+from app.playback.modes.arrays import Picture
+from app.playback.modes.hatching import hatched
 from app.playback.picture_source import PictureSource
 from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture

@@ -12,9 +12,9 @@ import numpy as np
 
 from app.background.jobs import Job, JobContext, Jobs
 from app.background.latest import LatestWorker
-from app.playback.arrays import PointArrays
+from app.playback.modes.arrays import PointArrays
 from app.playback.point_spacing import point_spacing
-from app.playback.preview import make_cloud, picture_hint, read_cloud
+from app.playback.preview import CloudJob, make_cloud, picture_hint, read_cloud
 from app.project.opened_project import OpenedProject
 from app.training.service import ShownState
 from engine.capture.capture import Capture
@@ -73,20 +73,15 @@ class Clouds:
             return
         capture = opened.capture
 
+        job = CloudJob(capture.path, opened.holdout, path, capture.frames, capture.follow_links)
+
         def work(context: JobContext) -> Path:
-            return make_cloud(
-                capture.path,
-                holdout=opened.holdout,
-                path=path,
-                context=context,
-                frames=capture.frames,
-                follow_links=capture.follow_links,
-            )
+            return make_cloud(job, context)
 
         def failed(error: Exception) -> None:  # the hint stays; training will say what is wrong
             logger.warning("no first cloud: %s", error)
 
-        self._first = jobs.start("Building a first cloud", work, lambda _: None, failed)
+        self._first = jobs.start("Building a first cloud", work, lambda _: None, failed, can_cancel=True)
 
     def clear(self) -> None:
         """Another project was opened."""

@@ -18,17 +18,18 @@ import numpy as np
 
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker, nothing
-from app.playback.arrays import AnchorArrays, GaussianArrays
-from app.playback.contents import ClipParts
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays
+from app.playback.modes.contents import ClipParts
+from app.playback.modes.view_modes import PLAIN, ShownAs
 from app.playback.picture_source import UNKNOWN, PictureSource
-from app.playback.view_modes import PLAIN, ShownAs
-from engine.backends.table import backend_called
+from engine.backends.table import process_backend
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.editing.effects import NO_EFFECTS, Effects
 
 if TYPE_CHECKING:
+    from engine.backends.backend import Backend
     from engine.metrics.clips.trained_clip import TrainedClip
     from engine.model.camera_colors import CameraColors
     from engine.model.clip_model import AnchorView, ClipModel  # brings torch, which only the thread needs
@@ -56,7 +57,7 @@ class FrameRequest:
         is_live: Whether the file is a snapshot of a running training: it may be gone before it is read, and another
             one follows soon.
         generation: Of the open project.
-        shown_as: What is decoded; see app.playback.view_modes.decoded_as.
+        shown_as: What is decoded; see app.playback.modes.view_modes.decoded_as.
         effects: Of the edits that hold at the frame.
     """
 
@@ -115,8 +116,8 @@ class ClipFiles:
     def __init__(self) -> None:
         self._reference: tuple[tuple[str, int], ClipState] | None = None
 
-    def read(self, request: FrameRequest) -> LoadedClip:
-        """The clip of a request.
+    def read(self, request: FrameRequest, backend: Backend) -> LoadedClip:
+        """The clip of a request, to be decoded and drawn with a back end.
 
         Raises:
             ProjectError: The file is missing or damaged, or does not fit its reference.
@@ -126,7 +127,7 @@ class ClipFiles:
 
         state = read_clip_state(request.path)
         reference = None if state.is_reference else self._read_reference(request.reference_path)
-        model = load_clip_model(state, reference, backend=backend_called())
+        model = load_clip_model(state, reference, backend=backend)
         header = state.header
         spacing = min(header.spacing, header.moving_spacing or header.spacing)
         anchors = _anchor_arrays(model.anchors(), request.model_key, spacing)
@@ -214,8 +215,8 @@ class FrameDecoder:
         return None if loaded is None else loaded.anchors
 
     def model(self, request: FrameRequest) -> ClipModel | None:
-        """The model of a state, not to be decoded on another thread but in parts (app.playback.contents.part_of); None
-        until it was loaded."""
+        """The model of a state, not to be decoded on another thread but in parts (see `part_of`); None until it
+        was loaded."""
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.model
 
@@ -239,6 +240,10 @@ class FrameDecoder:
     def has_failed(self, request: FrameRequest) -> bool:
         """Whether this frame could not be made, so that it is not on its way."""
         return self.worker.has_failed(request)
+
+    def comes_ahead(self, request: FrameRequest) -> bool:
+        """Whether this frame can be made ready before it is asked for, as far as is known."""
+        return not (self.worker.has_failed(request) or self.worker.has_failed_ahead(request))
 
     def clear(self) -> None:
         """Forget everything, as when another capture was opened."""
@@ -275,7 +280,7 @@ class FrameDecoder:
             return models[identity]
         self._loading = identity
         try:
-            loaded = self._files.read(request)
+            loaded = self._files.read(request, process_backend())
         finally:
             self._loading = None
         if not self.worker.is_still_wanted:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from app.playback.view_modes import PLAIN, ShownAs
+from app.playback.modes.view_modes import PLAIN, ShownAs
 
 
 @dataclass(frozen=True, slots=True)

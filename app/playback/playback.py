@@ -11,19 +11,19 @@ from typing import Any
 
 from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
-from app.playback.ahead import Ahead, AskedLook, n_ahead
-from app.playback.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.ahead import Ahead, AskedLook, RequestOf, n_ahead
 from app.playback.capture_pictures import CapturedPictures, Gain, PictureRequest
 from app.playback.clouds import CloudRequest, Clouds
-from app.playback.course import Course
-from app.playback.coverage import Coverage, CoverageFinder
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame
-from app.playback.mode_arrays import ModeArrays
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.modes.coverage import Coverage, CoverageFinder
+from app.playback.modes.mode_arrays import ModeArrays
+from app.playback.modes.trails import TrailMaker, TrailRequest, Trails, trail_frames
+from app.playback.modes.view_modes import PLAIN, ShownAs, decoded_as
+from app.playback.prefetch_order import Course
 from app.playback.render import Look, Renderer
 from app.playback.timeline import Timeline
-from app.playback.trails import TrailMaker, TrailRequest, Trails, trail_frames
-from app.playback.view_modes import PLAIN, ShownAs, decoded_as
+from app.playback.views.orbit_view import OrbitView
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
@@ -73,6 +73,9 @@ class Playback:
         self._compared: dict[tuple[int, int], bool] = {}  # camera and width, asked for since the last turn
         self._planned_compared: object = None
         self._rig: tuple[object, CameraRig] | None = None
+        self._loaded: tuple[int, int] | None = None
+        self.loading: tuple[int, int] | None = None
+        """Before no frame is left out around a seam: how many frames are ready, of how many; None once it may play."""
 
     def start(self) -> None:
         """Start the threads now rather than with the first request, and load what they need."""
@@ -225,8 +228,25 @@ class Playback:
             is_busy: Whether a training needs the cores while nothing plays.
         """
         course = Course.of(timeline)
-        self.ahead.plan(course, lambda frame, shown_as: self._request_at(timeline, frame, shown_as), is_busy=is_busy)
+
+        def request_of(frame: int, shown_as: ShownAs) -> FrameRequest | None:
+            return self._request_at(timeline, frame, shown_as)
+
+        self.ahead.plan(course, request_of, is_busy=is_busy)
         self._plan_compared(timeline, course)
+        self._follow_loading(timeline, course, request_of)
+
+    def _follow_loading(self, timeline: Timeline, course: Course, request_of: RequestOf) -> None:
+        """What is played around a seam is made ready once; another view later on does not hold it up again."""
+        self.loading = None
+        if timeline.around != self._loaded:
+            self._loaded = None
+        if course.is_loaded_first and self._loaded is None:
+            n_ready, n_frames = self.ahead.loaded(course, request_of)
+            if n_ready < n_frames:
+                self.loading = n_ready, n_frames
+            else:
+                self._loaded = timeline.around
 
     def _plan_compared(self, timeline: Timeline, course: Course) -> None:
         """Captured pictures that are set beside the render come ahead of the playhead, too."""

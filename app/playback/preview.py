@@ -7,19 +7,20 @@ small pictures of a single moment, in a short process of its own: compiling and 
 from __future__ import annotations
 
 import logging
-import multiprocessing
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
-from app.background.children import undisturbed
 from app.background.jobs import JobContext
-from app.background.priority import lower_process
-from app.playback.arrays import PointArrays
 from app.playback.capture_pictures import downsized
+from app.playback.modes.arrays import PointArrays
 from app.playback.point_spacing import point_spacing
 from engine.camera.projection import to_world
 from engine.capture.capture import Capture, open_capture
+from engine.children.child import Parent
+from engine.children.kind import ChildFailed, ChildKind
+from engine.children.process import run_child
 from engine.errors import EngineError, PreparationError, ProjectError
 from engine.storage.array_files import ArraysError, read_arrays, write_arrays
 
@@ -31,7 +32,15 @@ DEPTH_SHARE = 0.16
 CLOUD_WIDTH_PX = 200
 """Pictures for the first cloud are at most this wide."""
 MAX_CLOUD_POINTS = 20_000
-POLL_EVERY_S = 0.1
+NEXT_STEPS = {
+    "Depths": "sweeping planes",
+    "Depth sweep": "refining surfaces",
+    "Slanted patches": "joining points",
+    "Depth maps": "joining points",
+    "Static cloud": "colouring points",
+    "White balance": "looking behind what is seen",
+}
+"""What follows after a line of the reconstruction, by how the line begins."""
 
 
 def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
@@ -61,78 +70,87 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
     )
 
 
-def make_cloud(
-    capture_path: Path,
-    *,
-    holdout: tuple[int, ...],
-    path: Path,
-    context: JobContext,
-    frames: tuple[int, int] | None = None,
-    follow_links: bool = False,
-) -> Path:
+class CloudJob(msgspec.Struct, frozen=True):
+    """What the first cloud is made of.
+
+    Attributes:
+        capture: The capture.
+        holdout: Cameras to leave out, as training does.
+        path: File for the cloud.
+        frames, follow_links: As of the capture, see engine.capture.capture.
+    """
+
+    capture: Path
+    holdout: tuple[int, ...]
+    path: Path
+    frames: tuple[int, int] | None = None
+    follow_links: bool = False
+
+
+FIRST_CLOUD: ChildKind[CloudJob, str, None] = ChildKind(
+    place="app.playback.preview:FIRST_CLOUD",
+    work="app.playback.preview:write_cloud",
+    what="the process that builds it",
+    job=CloudJob,
+    event=str,
+    priority="lower",
+)
+
+
+def make_cloud(job: CloudJob, context: JobContext) -> Path:
     """Build the first cloud in a process and wait for it. To be run on a job's thread.
 
     Args:
-        capture_path: The capture.
-        holdout: Cameras to leave out, as training does.
-        path: File for the cloud.
         context: Receives signs of life; cancelling it ends the process.
-        frames, follow_links: As of the capture, see engine.capture.capture.
     Raises:
-        PreparationError: There is no cloud; the log says why.
+        PreparationError: There is no cloud; says why.
     """
-    process = multiprocessing.get_context("spawn").Process(
-        target=write_cloud,
-        args=(str(capture_path), holdout, str(path), frames, follow_links),
-        name="first cloud",
-        daemon=True,
-    )
-    with undisturbed():
-        process.start()
+    doing = "starting a process"
+
+    def tell(what: str) -> None:
+        nonlocal doing
+        doing = what
+        context.report(0.0, what)
+
     try:
-        while process.is_alive():
-            context.report(0.0, "from a single frame, at reduced size")
-            process.join(POLL_EVERY_S)
-    finally:
-        if process.is_alive():
-            process.terminate()
-            process.join(2.0)
-    if process.exitcode != 0 or not path.is_file():
-        raise PreparationError(f"The first cloud could not be built (exit code {process.exitcode}).")
-    return path
+        run_child(FIRST_CLOUD, job, report=tell, alive=lambda: context.report(0.0, doing))
+    except (ChildFailed, EngineError) as error:
+        raise PreparationError(f"The first cloud could not be built: {error}") from error
+    return job.path
 
 
-def write_cloud(
-    capture_path: str, holdout: tuple[int, ...], path: str, frames: tuple[int, int] | None, follow_links: bool
-) -> None:
-    """Build and write the first cloud. Runs in the child; its exit code is 1 when there is none."""
-    lower_process()
+def write_cloud(job: CloudJob, parent: Parent[str]) -> None:
+    """Build and write the first cloud. Runs in the child, which reports what it does."""
+
+    def report(line: str) -> None:
+        logger.debug(line)
+        parent.report(NEXT_STEPS.get(line.partition(":")[0], "finding surfaces"))
+
+    parent.report("loading")
     from engine.cloud.stereo.static_cloud import build_static_cloud
 
-    try:
-        capture = open_capture(capture_path, frames=frames, follow_links=follow_links)
-        widest = int(capture.rig.image_sizes[:, 0].max())
-        if widest > CLOUD_WIDTH_PX:
-            capture = capture.resized(CLOUD_WIDTH_PX / widest, frames)
-        cameras = capture.training_cameras(holdout)
-        pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
-        is_valid = capture.valid_of(cameras)
-        cloud = build_static_cloud(
-            pictures,
-            np.ones(pictures.shape[:3], bool) if is_valid is None else is_valid,
-            capture.rig.subset(cameras),
-            is_valid=is_valid,
-            max_points=MAX_CLOUD_POINTS,
-            report=logger.debug,
-        )
-        arrays = {
-            "points": np.ascontiguousarray(cloud.points, np.float32),
-            "colors": np.ascontiguousarray(np.clip(cloud.colors, 0.0, 1.0), np.float32),
-        }
-        write_arrays(path, arrays, {}, what="The first cloud")
-    except EngineError as error:
-        logger.warning("no first cloud: %s", error)
-        raise SystemExit(1) from error
+    capture = open_capture(job.capture, frames=job.frames, follow_links=job.follow_links)
+    widest = int(capture.rig.image_sizes[:, 0].max())
+    if widest > CLOUD_WIDTH_PX:
+        capture = capture.resized(CLOUD_WIDTH_PX / widest, job.frames)
+    cameras = capture.training_cameras(job.holdout)
+    parent.report(f"reading {len(cameras)} pictures")
+    pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
+    parent.report("looking for the depth range")
+    is_valid = capture.valid_of(cameras)
+    cloud = build_static_cloud(
+        pictures,
+        np.ones(pictures.shape[:3], bool) if is_valid is None else is_valid,
+        capture.rig.subset(cameras),
+        is_valid=is_valid,
+        max_points=MAX_CLOUD_POINTS,
+        report=report,
+    )
+    arrays = {
+        "points": np.ascontiguousarray(cloud.points, np.float32),
+        "colors": np.ascontiguousarray(np.clip(cloud.colors, 0.0, 1.0), np.float32),
+    }
+    write_arrays(job.path, arrays, {}, what="The first cloud")
 
 
 def read_cloud(path: Path) -> PointArrays:

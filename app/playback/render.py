@@ -13,16 +13,17 @@ import numpy as np
 
 from app.background.kernels import prepare_drawing
 from app.background.latest import LatestWorker, nothing
-from app.playback.arrays import BACKGROUND, GaussianArrays, Picture
 from app.playback.frame_decoder import FrameKey, ShownFrame
-from app.playback.mode_arrays import drawn_arrays
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import BACKGROUND, GaussianArrays, Picture
+from app.playback.modes.mode_arrays import drawn_arrays
+from app.playback.modes.view_modes import MODES, PLAIN, ShownAs, range_of
 from app.playback.picture_source import PictureSource
-from app.playback.view_modes import MODES, PLAIN, ShownAs, range_of
-from engine.backends.table import backend_called
+from app.playback.views.orbit_view import OrbitView
+from engine.backends.table import process_backend
 from engine.byte_cache import ByteCache
 
 if TYPE_CHECKING:
+    from engine.backends.backend import Backend
     from engine.raster import Gaussians
 
 CACHE_BYTES = 256 << 20
@@ -181,27 +182,27 @@ class Renderer:
         known = self._cache.get(request.key)
         if known is not None:  # it was asked for and planned, or by two views
             return known
-        picture = render(request)
+        picture = render(request, process_backend())
         if self.worker.is_still_wanted:
             n_bytes = picture.image.nbytes + (0 if picture.values is None else picture.values.nbytes)
             self._cache.put(request.key, picture, n_bytes)
         return picture
 
 
-def render(request: RenderRequest) -> Picture:
+def render(request: RenderRequest, backend: Backend) -> Picture:
     """Rasterize one request over BACKGROUND. Runs on the renderer's thread, or wherever no window waits."""
     started_s = time.perf_counter()
     mode = MODES[request.look.shown_as.mode]
     arrays, values = drawn_arrays(request.shown, mode.name), None
     if mode.is_picture:
-        image, values = _numbers(arrays, request.look)
+        image, values = _numbers(arrays, request.look, backend)
     else:
-        image = _colors(arrays, request.look)
+        image = _colors(arrays, request.look, backend)
     duration_s = time.perf_counter() - started_s
     return Picture(image, request.key, duration_s=duration_s, source=request.source, values=values)
 
 
-def _colors(arrays: GaussianArrays, look: Look) -> np.ndarray:
+def _colors(arrays: GaussianArrays, look: Look, backend: Backend) -> np.ndarray:
     """[H, W, 3] uint8"""
     import torch
 
@@ -209,28 +210,30 @@ def _colors(arrays: GaussianArrays, look: Look) -> np.ndarray:
 
     with torch.no_grad():
         rendering = rasterize(
-            _gaussians(arrays, look),
+            _gaussians(arrays, look).to(backend.device, backend.dtype),
             torch.from_numpy(look.world_to_camera.astype(np.float32))[None],
             torch.from_numpy(look.K.astype(np.float32))[None],
             look.width,
             look.height,
-            backend=backend_called(),
+            backend=backend,
             background=torch.tensor(BACKGROUND),
             near_plane=max(arrays.near_plane, look.near),
         )
-        return (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
+        return (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).cpu().numpy()
 
 
-def _numbers(arrays: GaussianArrays, look: Look) -> tuple[np.ndarray, np.ndarray | None]:
-    """Picture and values, see app.playback.mode_pictures."""
+def _numbers(arrays: GaussianArrays, look: Look, backend: Backend) -> tuple[np.ndarray, np.ndarray | None]:
+    """Picture and values, see app.playback.modes.mode_pictures."""
     import torch
 
-    from app.playback.mode_pictures import mode_picture
+    from app.playback.modes.mode_pictures import mode_picture
     from engine.raster.pinhole_view import pinhole_views
 
     poses, Ks = (torch.from_numpy(m.astype(np.float32))[None] for m in (look.world_to_camera, look.K))
     (view,) = pinhole_views(poses, Ks, look.width, look.height, max(arrays.near_plane, look.near))
-    return mode_picture(look.shown_as.mode, _gaussians(arrays, look), view, look.value_range, look.set_back)
+    return mode_picture(
+        look.shown_as.mode, _gaussians(arrays, look), view, look.value_range, look.set_back, backend=backend
+    )
 
 
 def _gaussians(arrays: GaussianArrays, look: Look) -> Gaussians:

@@ -25,7 +25,8 @@ class Timeline:
         n_frames: Frames of the capture.
         fps: Frames per second of the capture.
         is_playing, is_looping: Play state.
-        is_every_frame: Whether playing waits for each frame to be shown, instead of leaving some out.
+        is_every_frame: Whether playing waits for each frame to be shown, instead of leaving some out; around a seam it
+            does so unless `is_skipping_around`.
         direction: 1 plays forward, -1 backward.
         speed: Multiple of the capture's own speed, one of SPEEDS.
         in_frame, out_frame: Where playing begins and ends; None where the capture does. in_frame <= out_frame.
@@ -43,6 +44,7 @@ class Timeline:
         self.is_playing = False
         self.is_looping = True
         self.is_every_frame = False
+        self.is_skipping_around = False
         self.direction = 1
         self.speed = 1.0
         self.in_frame: int | None = None
@@ -133,6 +135,7 @@ class Timeline:
     def play_around(self, seam_frame: int, reach: int = SEAM_REACH) -> None:
         """Play the frames on either side of a clip's first frame over and over."""
         self.seek(seam_frame - reach)
+        self.is_skipping_around = False
         self.around = (self.frame_index, self.clamped(seam_frame + reach - 1))
         self._start(1)
 
@@ -145,6 +148,18 @@ class Timeline:
             self.play_around(self.nearest_seam)
 
     # ---------------------------------------------------------------- playing
+
+    @property
+    def plays_every_frame(self) -> bool:
+        """Whether playing waits for each frame now."""
+        return self.is_every_frame if self.around is None else not self.is_skipping_around
+
+    def toggle_every_frame(self) -> None:
+        """Wait for each frame, or leave some out to keep the speed; around a seam for as long as that is played."""
+        if self.around is None:
+            self.is_every_frame = not self.is_every_frame
+        else:
+            self.is_skipping_around = not self.is_skipping_around
 
     def toggle_play(self) -> None:
         """Play forward or hold; playing from the last frame starts over."""
@@ -200,7 +215,7 @@ class Timeline:
         self._carried += dt_s * self.fps * self.speed
         # the small addition keeps 3 ticks of 1/30 s at 10 fps from falling one ulp short of a frame
         n_frames = math.floor(self._carried + 1e-9)
-        if self.is_every_frame:
+        if self.plays_every_frame:
             n_frames = min(n_frames, 1 if is_shown else 0)
             self._carried = min(self._carried, 1.0 + n_frames)  # time lost is not caught up with
         if n_frames == 0:

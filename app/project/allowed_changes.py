@@ -1,4 +1,6 @@
-"""Which changes of a project's document are allowed, whoever makes them: the window, a command or a script."""
+"""Which changes of a project's document are allowed, whoever makes them: the window, a command or a script; and what
+goes with a change of settings.
+"""
 
 from __future__ import annotations
 
@@ -6,31 +8,62 @@ from dataclasses import replace
 
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
-from app.project.project import Project, check_settings
+from app.project.disk.discarding import Discarded, discard, progress_of, training_of
+from app.project.project import Project
+from app.project.project_access import check_settings
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
+
+
+class SettingsFixed(ProjectError):
+    """What all clips share cannot change, because a clip is finished or being trained."""
 
 
 def check_change(
     project: Project, capture: Capture, before: ProjectDocument, after: ProjectDocument, *, is_training: bool = False
 ) -> None:
-    """See that settings fit the capture, and that nothing was learned with those that change.
+    """See that settings fit the capture, and that no clip is finished with those that change.
 
     Args:
         is_training: Whether a clip trains now.
     Raises:
-        ProjectError: They do not, or something was.
+        SettingsFixed: One is, or is being trained.
+        ProjectError: They do not fit.
     """
     if before.settings == after.settings:
         return
     check_settings(after.settings, capture)
-    if is_other_cut(before.settings, after.settings):
+    if not is_shared_change(before.settings, after.settings):
         return
-    if project.has_progress or is_training:
-        raise ProjectError(
-            "What all clips share is fixed once training has begun.",
-            hint="What was learned with them would be worthless. Use another project folder for other values.",
+    if is_training:
+        raise SettingsFixed("A clip is being trained with the settings as they are.", hint="Stop the training first.")
+    if project.has_finished_clips:
+        raise SettingsFixed(
+            f"What all clips share is fixed once a clip is finished: there {_are(training_of(project))}.",
+            hint="Start over with other settings, which discards that, or make a new project of the capture.",
+            path=project.folder,
         )
+
+
+def discard_unfitting(project: Project, before: ProjectSettings, after: ProjectSettings) -> Discarded:
+    """The settings have changed: the progress of trainings that were stopped goes.
+
+    Returns:
+        What went.
+    Raises:
+        DiskError: The disk refused.
+    """
+    if not is_shared_change(before, after):
+        return Discarded()
+    found = progress_of(project)
+    discard(project, found)
+    return found
+
+
+def is_shared_change(before: ProjectSettings, after: ProjectSettings) -> bool:
+    """Whether something differs that every clip depends on."""
+    placed = replace(after, capture=before.capture, follow_links=before.follow_links)
+    return placed != before and not is_other_cut(before, placed)
 
 
 def is_other_cut(before: ProjectSettings, after: ProjectSettings) -> bool:
@@ -39,3 +72,7 @@ def is_other_cut(before: ProjectSettings, after: ProjectSettings) -> bool:
     return (
         before != after and replace(before, clip_bounds=after.clip_bounds, reference_clip=after.reference_clip) == after
     )
+
+
+def _are(training: Discarded) -> str:
+    return f"{'is' if training.n_clips == 1 else 'are'} {training.words}"

@@ -13,7 +13,8 @@ import numpy as np
 from engine.camera.lens import Lens
 from engine.capture.capture import FORMATS, Capture
 from engine.capture.capture_summary import describe
-from engine.capture.frame_files import VIDEO_SUFFIXES, listed
+from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed
+from engine.capture.pixels.frame_fit import FrameFit
 from engine.errors import CaptureError, EngineError
 from engine.text import duration_text, printable
 
@@ -73,6 +74,9 @@ class CaptureReport:
         rig_extent: Largest distance between two cameras, scene units.
         points: Name of a point cloud that came along; empty without one.
         warnings: Sentences about what is odd but usable.
+        misfit_px: By how many pixels frames have another shape than their calibration; 0 where they have not.
+        fit: What was said of these.
+        needs_fit: Whether that has to be said before they can be used.
     """
 
     path: Path
@@ -85,6 +89,9 @@ class CaptureReport:
     rig_extent: float
     points: str
     warnings: tuple[str, ...]
+    misfit_px: float = 0.0
+    fit: FrameFit | None = None
+    needs_fit: bool = False
 
     @property
     def rows(self) -> tuple[tuple[str, str], ...]:
@@ -180,6 +187,9 @@ def report_of(capture: Capture) -> CaptureReport:
         rig_extent=found["rig_extent"],
         points="" if points is None else points.name,
         warnings=capture.warnings,
+        misfit_px=capture.layout.misfit_px,
+        fit=capture.layout.fit,
+        needs_fit=bool(capture.layout.far_off),
     )
 
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from app.project.header_cache import FoundHeader
 from app.project.metrics_file import read_metrics
@@ -34,7 +35,9 @@ class ClipRecord:
         state: untrained; stopped, with a checkpoint that its training goes on from; trained; stale, trained on
             something that is not there any more; damaged, a finished clip that cannot be read.
         step, n_steps: Of the state that is shown.
-        held_out_psnr: Newest figure, dB; None when not measured.
+        held_out_psnr: dB: an evaluation's where there is one, else what the training measured last; None when not
+            measured.
+        held_out_whole: Whether that is over all frames in all held-out cameras; else it is over at most three pictures.
         file: The state to show; None when there is none.
         revision: Names that state; empty when there is none.
         resume_step: The step that training this clip goes on from; None when it starts from the beginning.
@@ -46,6 +49,7 @@ class ClipRecord:
         exposure_change: How far the cameras' exposure is from the reference clip's, a share; None where not known.
         n_anchors: Inherited ones, and those of the clip itself; zeros where the file does not say.
         origin: By which edits name the anchors of a trained clip, see ClipHeader.origin; empty of others.
+        inherits: The same of those that a trained clip inherits; empty where it has its own only.
     """
 
     state: str = "untrained"
@@ -62,6 +66,8 @@ class ClipRecord:
     exposure_change: float | None = None
     n_anchors: tuple[int, int] = (0, 0)
     origin: str = ""
+    inherits: str = ""
+    held_out_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +103,7 @@ class ClipCatalog:
         self._clips: list[FoundHeader | None] = [None] * n_clips
         self._checkpoints: list[FoundHeader | None] = [None] * n_clips
         self._curve_psnr: dict[int, float | None] = {}
+        self._evaluated: dict[int, tuple[str, float]] = {}
         config = project.settings.config()
         self._inherits, self._goes_on = not config.independent, config.field == "continue" or config.start == "previous"
         if project.has_progress:
@@ -118,9 +125,9 @@ class ClipCatalog:
         return self._n_trained
 
     @property
-    def has_progress(self) -> bool:
-        """Whether there is any clip or checkpoint."""
-        return self._has_progress
+    def has_finished_clips(self) -> bool:
+        """Whether there is any clip; see Project.has_finished_clips."""
+        return self._has_finished_clips
 
     def update(self, clip_index: int) -> None:
         """Read the files of one clip again; the others are judged anew by what was read before."""
@@ -132,6 +139,21 @@ class ClipCatalog:
         """The document has changed: judge all clips by what was read before."""
         self._records = self._judged()
         self.revision += 1
+
+    def note_evaluated(self, psnr: Sequence[float | None]) -> None:
+        """Take up what an evaluation says of the clips as they are now.
+
+        Args:
+            psnr: Held-out PSNR of each, over all frames in all held-out cameras, dB; None where not all are measured.
+        """
+        found = {
+            index: (self[index].revision, value)
+            for index, value in enumerate(psnr)
+            if value is not None and self[index].state == "trained"
+        }
+        if found != self._evaluated:
+            self._evaluated = found
+            self.judge_anew()
 
     def note_damage(self, path: Path | None, reason: str) -> bool:
         """Somebody found that the arrays of a finished clip are damaged, which its header does not show.
@@ -250,7 +272,7 @@ class ClipCatalog:
     def _judged(self) -> list[ClipRecord]:
         records = [self._record(index, basis) for index, basis in enumerate(self._bases())]
         self._n_trained = sum(record.state == "trained" for record in records)
-        self._has_progress = any(found is not None for found in (*self._clips, *self._checkpoints))
+        self._has_finished_clips = self._project.has_finished_clips
         return records
 
     def _record(self, index: int, basis: Basis) -> ClipRecord:
@@ -282,14 +304,13 @@ class ClipCatalog:
             return ClipRecord(reason=reason, **resume)
         if header is None:
             return ClipRecord("damaged", reason=found.damage, **resume)
-        psnr = header.figures.held_out_psnr
-        psnr = psnr if psnr is not None or kept is not None else self._curve_psnr.get(index)
-        figures = {"held_out_psnr": psnr, "seconds": header.figures.seconds, "n_anchors": anchor_counts(header)}
+        revision = f"trained-{header.fingerprint}"
+        figures = self._held_out(index, header, "" if basis.reason else revision)
+        figures |= {"seconds": header.figures.seconds, "n_anchors": anchor_counts(header)}
         figures["exposure_change"] = found.exposure_change
         if basis.reason:  # it cannot be shown without what it was trained on
             return ClipRecord("stale", header.step, header.n_steps, reason=basis.reason, **figures, **resume)
         reason = reason or self._other_pictures(header)
-        revision = f"trained-{header.fingerprint}"
         path = self._project.clip_path(index)
         return ClipRecord(
             "trained",
@@ -299,9 +320,21 @@ class ClipCatalog:
             revision=revision,
             reason=reason,
             origin=header.origin,
+            inherits=header.reference_fingerprint or "" if _inherits(header) else "",
             **figures,
             **resume,
         )
+
+    def _held_out(self, index: int, header: ClipHeader, revision: str) -> dict[str, Any]:
+        """The one figure that everybody shows of a finished clip: an evaluation's, else what its file says, else what
+        the curve of its training ends with."""
+        of_revision, evaluated = self._evaluated.get(index, ("", 0.0))
+        if revision and of_revision == revision:
+            return {"held_out_psnr": evaluated, "held_out_whole": True}
+        psnr = header.figures.held_out_psnr
+        if psnr is None and self._checkpoints[index] is None:
+            psnr = self._curve_psnr.get(index)
+        return {"held_out_psnr": psnr, "held_out_whole": header.figures.held_out_whole}
 
     def _other_pictures(self, header: ClipHeader) -> str:
         """That what is excluded of its pictures has changed since; empty where it has not. Such a clip is good."""
@@ -324,10 +357,15 @@ class ClipCatalog:
 def anchor_counts(header: ClipHeader) -> tuple[int, int]:
     """Anchors of a clip by its header: those it inherits, and those it holds itself. Zeros where it does not say."""
     n_all = sum(header.n_anchors.values())
-    if header.role != "source" or header.config.get("inherit") in ("trainable", "off"):
+    if not _inherits(header):
         return 0, n_all
     n_inherited = sum(n for role, n in header.n_anchors.items() if role in REFERENCE_ROLES)
     return n_inherited, n_all - n_inherited
+
+
+def _inherits(header: ClipHeader) -> bool:
+    """Whether some of its anchors are those of the reference clip, as they are there."""
+    return header.role == "source" and header.config.get("inherit") not in ("trainable", "off")
 
 
 def _is_number(value: object) -> bool:

@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from app.document.kept_json import kept_text, read_kept, write_kept
+from app.document.storing.kept_json import kept_text, read_kept, write_kept
+from app.project.clip_names import is_clip_file
 from engine.errors import ProjectError
 from engine.storage.files import disk_error, replace_file
 
@@ -68,7 +69,7 @@ def finish_exchange(folder: Path) -> None:
         return
     content = read_kept(place / LIST_FILE, "The list of exchanged clips", hint="Remove the folder 'exchange'.")
     names = [] if content is None else content.get("files")
-    if not isinstance(names, list) or not all(isinstance(name, str) and name == Path(name).name for name in names):
+    if not isinstance(names, list) or not all(isinstance(name, str) and is_clip_file(name) for name in names):
         raise ProjectError(
             "The list of exchanged clips is damaged.", hint="Remove the folder 'exchange'.", path=place / LIST_FILE
         )

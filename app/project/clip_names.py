@@ -40,9 +40,15 @@ def _names(clip_bounds: tuple[int, ...], clip_length: int) -> tuple[str, ...]:
     return tuple(names)
 
 
+def is_clip_file(name: str) -> bool:
+    """Whether this is a file name that clips have."""
+    stem, _, suffix = name.rpartition(".")
+    return suffix == "safetensors" and PROGRAM_NAME.fullmatch(stem) is not None
+
+
 def finished_files(folder: Path, clip_bounds: tuple[int, ...] | None, clip_length: int) -> list[tuple[int, Path]]:
     """Index and file of every finished clip in a project folder, in order; without those of other cuts."""
-    found = [path for path in (folder / "clips").glob("*.safetensors") if PROGRAM_NAME.fullmatch(path.stem)]
+    found = [path for path in (folder / "clips").glob("*.safetensors") if is_clip_file(path.name)]
     if clip_bounds is None:
         return sorted((int(path.stem), path) for path in found if path.stem.isdecimal())
     rank = {name: index for index, name in enumerate(_names(clip_bounds, clip_length))}

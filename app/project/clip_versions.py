@@ -15,6 +15,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from app.project.clip_names import PROGRAM_NAME
 from app.project.project import Project
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, read_clip_state
@@ -210,8 +211,8 @@ def remove_version(project: Project, clip_index: int, number: int) -> None:
     """
     path = version_path(project, clip_index, number)
     try:
+        path.with_suffix(".jsonl").unlink(missing_ok=True)  # first: curves alone are those of a version that came back
         path.unlink(missing_ok=True)
-        path.with_suffix(".jsonl").unlink(missing_ok=True)
     except OSError as error:
         raise disk_error(error, what="The removal of a version", path=path) from error
     with suppress(OSError):  # others are left
@@ -249,9 +250,29 @@ def restore_version(project: Project, clip_index: int, number: int) -> None:
             with suppress(OSError, ProjectError):
                 remove_version(project, clip_index, set_aside_number)
         raise disk_error(error, what="The clip", path=clip_path) from error
+    _bring_curves(path.with_suffix(".jsonl"), project.metrics_path(clip_index))
+
+
+def _bring_curves(source: Path, target: Path) -> None:
+    """Put the curves of a version that came back in the place of those of the clip that was set aside."""
     with suppress(OSError):
-        project.metrics_path(clip_index).unlink(missing_ok=True)  # those of the clip that was set aside
-        path.with_suffix(".jsonl").rename(project.metrics_path(clip_index))
+        if source.is_file():
+            os.replace(source, target)
+        else:
+            target.unlink(missing_ok=True)
+
+
+def finish_restoring(folder: Path) -> None:
+    """Bring the curves of a version that came back when the program was killed just then. folder: Of the project."""
+    for curves in sorted((folder / "versions").glob("*/*.jsonl")):
+        name = curves.parent.name
+        if (
+            not (curves.stem.isdecimal() and PROGRAM_NAME.fullmatch(name))
+            or curves.with_suffix(".safetensors").exists()
+        ):
+            continue
+        if (folder / "clips" / f"{name}.safetensors").is_file():
+            _bring_curves(curves, folder / "metrics" / f"{name}.jsonl")
 
 
 def why_not(project: Project, clip_index: int, header: ClipHeader) -> str:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
 
+from app.project.clip_versions import finish_restoring
+from app.project.mends.in_place import recover
+from app.project.project import Project
 from engine.errors import ProjectError
-
-if TYPE_CHECKING:
-    from app.project.project import Project
 
 logger = logging.getLogger(__name__)
 
 
 def finish_interrupted(project: Project) -> None:
-    """Take back clips that were put in place in part. A disk that refuses keeps it for the next time."""
-    from app.project.mends.in_place import recover  # knows projects itself
-
+    """Take back clips that were put in place in part, and end what was being restored. A disk that refuses keeps it for
+    the next time."""
+    finish_restoring(project.folder)
     try:
         recover(project)
     except (ProjectError, OSError) as error:

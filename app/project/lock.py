@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from engine.errors import ProjectError
-from engine.storage.files import atomic_path
+from engine.storage.files import atomic_path, disk_error
 from engine.storage.json_files import JsonError, read_json_object
 from engine.text import printable
 
@@ -235,6 +235,8 @@ class ProcessLock:
         return ProjectError(f"{who} has this project open for writing{since}.", hint=hint, path=self.path.parent)
 
     def _cannot_be_written(self, error: OSError) -> ProjectError:
+        if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
+            return disk_error(error, what="The project's lock", path=self.path.parent)
         return ProjectError(
             f"The project folder cannot be written ({error.strerror or error}).",
             hint="Choose a folder you may write to.",

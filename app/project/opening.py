@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from app.background.jobs import JobContext
-from app.document.document_file import DamagedDocument
-from app.document.journal_file import JournalDamage
-from app.document.recovery import damaged_project, plain_history
+from app.document.project_settings import ProjectSettings
+from app.document.storing.document_file import PROJECT_FILE, DamagedDocument
+from app.document.storing.journal_file import JournalDamage
+from app.document.storing.recovery import damaged_project, plain_history
 from app.project.clip_catalog import ClipCatalog
 from app.project.clip_names import finished_files
 from app.project.opening_answers import OpeningAnswers, window_scale
-from app.project.project import (
-    PROJECT_FILE,
-    Project,
-    ProjectSettings,
+from app.project.project import LOCK_FILE, Project
+from app.project.project_access import (
     create_project,
-    default_project_dir,
     default_settings,
     is_project,
     open_project,
@@ -26,9 +26,13 @@ from app.project.project import (
     repair_project,
 )
 from app.project.project_choices import AS_USUAL, ProjectChoices
-from app.project.recents import RecentProject, project_name
+from app.project.projects_folder import new_project_dir, project_name, projects_dir, usual_project_dir
+from app.project.recents import RecentProject
 from engine.capture.capture import Capture, open_capture
+from engine.capture.writers.capture_json import Corrections, write_corrections
 from engine.errors import CaptureError, ProjectError
+from engine.training.presets import closest_preset
+from engine.user_folders import data_dir
 
 Note = tuple[str, str, str, str]
 
@@ -62,6 +66,8 @@ class Opened:
         notes: Kind, title, detail and hint of what the user has to know.
         follow_links: Of a choice: whether the user allows the capture's files to lie outside of its folder.
         is_asking: There is no project yet, and the user is to see the capture before one is made.
+        folder: Where the project would be made then; None elsewhere.
+        is_new: The project was made just now.
     """
 
     capture: Capture
@@ -71,6 +77,20 @@ class Opened:
     notes: tuple[Note, ...] = ()
     follow_links: bool = False
     is_asking: bool = False
+    folder: Path | None = None
+    is_new: bool = False
+
+    def leave(self) -> None:
+        """Nobody wants it after all: let go of it, and take back a project that was made for it."""
+        if self.project is not None:
+            if self.is_new:
+                self.project.remove_files()
+            self.project.close()
+            if self.is_new:
+                with suppress(OSError):  # not empty: somebody has put something there
+                    (self.project.folder / LOCK_FILE).unlink(missing_ok=True)
+                    self.project.folder.rmdir()
+        self.capture.close()
 
 
 def open_for_window(
@@ -87,23 +107,27 @@ def open_for_window(
     answers: OpeningAnswers | None = None,
     known: Capture | None = None,
     choices: ProjectChoices = AS_USUAL,
+    projects: Path | None = None,
 ) -> Opened:
-    """Open a capture folder or a project folder.
+    """Open a capture folder or a project folder. Where a capture has projects, they are offered, also a single one.
 
     Args:
         path: A capture folder, or a project folder.
         scale: Working size; None picks one.
-        project_dir: Where the capture's project goes; when None, one that is there already is taken, else a folder in
-            the user's data folder.
+        project_dir: Where the capture's project is, or goes; when None, those that there are are offered, else it goes
+            into `projects`.
         current: Project folder that this program has open already.
         context: Receives progress.
         recent: Projects opened lately; those of this capture may be opened.
         is_new_project: Start another project, whatever there is.
         follow_links: Whether the user allows the capture's files to lie outside of its folder; noted in the project.
-        is_asking: Only look at the capture where a project would have to be made.
-        answers: What a new project begins with; None takes the scale and what the capture suggests.
+        is_asking: Only look at the capture where a project would have to be made; so it is, too, where somebody has to
+            say what became of its frames.
+        answers: What a new project begins with; None takes the scale and what the capture suggests. Its `fit` is
+            written into the capture's capture.json.
         known: The capture where it was opened already.
         choices: How a project is opened.
+        projects: The folder of projects without a place of their own; None for the usual one.
     Raises:
         DamagedProject: Its document is damaged; says what is left.
         LostCapture: The capture of a project is not where it was.
@@ -112,7 +136,13 @@ def open_for_window(
     context.report(0.0, path.name)
     if is_project(path):
         return _open_project(path, current, context, follow_links=follow_links, choices=choices)
-    capture = known or open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
+    capture = known or open_capture(
+        path, scale=1.0 if scale is None else scale, follow_links=follow_links, is_shape_asked=True
+    )
+    if answers is not None and answers.fit is not None and answers.fit != capture.layout.fit:
+        write_corrections(capture.layout, path, Corrections(fit=answers.fit))
+        capture = open_capture(path, follow_links=follow_links)
+    is_asking = is_asking or bool(capture.layout.far_off)
     if answers is not None:
         capture = capture.resized(answers.scale, answers.frames)
     elif scale is None:
@@ -123,19 +153,14 @@ def open_for_window(
         if (project_dir / PROJECT_FILE).is_file():
             return _open_project(project_dir, current, context, there, follow_links=follow_links, choices=choices)
         return _make_project(project_dir, capture, answers, choices, is_asking=is_asking)
-    found = projects_of(capture, recent)
-    if not found and not is_new_project:
-        for folder in _kept_dirs(capture):
-            _read_settings(folder, choices)  # one that is damaged is asked about, not passed over
-    if is_new_project or not found:
-        return _make_project(new_project_dir(capture), capture, answers, choices, is_asking=is_asking)
-    if len(found) > 1:
+    projects = projects_dir() if projects is None else projects
+    found = [] if is_new_project else projects_of(capture, recent, projects)
+    if found:
         return Opened(capture, choices=tuple(found), follow_links=follow_links)
-    opened = _open_project(found[0].folder, current, context, there, follow_links=follow_links, choices=choices)
-    if opened.project is None or opened.catalog is None or opened.notes:
-        return opened
-    told = f"{opened.catalog.n_trained} of {len(opened.catalog)} clips trained - {opened.project.folder}"
-    return replace(opened, notes=(("info", "The project of this capture was opened", told, ""),))
+    if not is_new_project:
+        for folder in _kept_dirs(capture, projects):
+            _read_settings(folder, choices)  # one that is damaged is asked about, not passed over
+    return _make_project(new_project_dir(capture, projects), capture, answers, choices, is_asking=is_asking)
 
 
 def _make_project(
@@ -148,12 +173,12 @@ def _make_project(
             path=capture.path,
         )
     if is_asking:
-        return Opened(capture, follow_links=capture.follow_links, is_asking=True)
+        return Opened(capture, follow_links=capture.follow_links, is_asking=True, folder=folder)
     settings = default_settings(capture)
     if answers is not None:
         settings = default_settings(capture, clip_length=answers.clip_length, holdout=answers.holdout)
     project = create_project(folder, settings)
-    return Opened(capture, project, ClipCatalog(project, len(project.clips(capture.n_frames))))
+    return Opened(capture, project, ClipCatalog(project, len(project.clips(capture.n_frames))), is_new=True)
 
 
 def _open_project(
@@ -223,29 +248,40 @@ def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project
     if choices.is_read_only:
         notes.append(("info", "The project is open for reading only", "", "Open it again to change something."))
         why = "It was opened so. Open it again to change something."
-        return open_project(folder, is_writable=False, why_read_only=why)
+        project = open_project(folder, is_writable=False, why_read_only=why)
+        notes += _missing(project)
+        return project
     try:
         project = open_project(folder)
+        notes += _recovered(project)
     except ProjectError as error:  # most likely locked; looking at it does no harm
         notes.append(("warn", "The project is open for reading only", str(error), "Nothing can be changed in it."))
-        return open_project(folder, is_writable=False, why_read_only=f"{error.message} {error.hint}".strip())
-    notes += _recovered(project)
+        why = f"{error.message} {error.hint}".strip()
+        project = open_project(folder, is_writable=False, why_read_only=why)
+    notes += _missing(project)
     return project
 
 
 def _recovered(project: Project) -> list[Note]:
     """What a user has to know whose project was not closed the last time."""
-    n, found = project.store.n_replayed, project.store.notes
+    n = project.store.n_replayed
     steps = f"{n} step{'s were' if n != 1 else ' was'} taken from the journal, up to: {project.history.undo_name}."
     told = f"It was not closed the last time. {steps if project.history.undo_name else steps.partition(',')[0] + '.'}"
-    notes: list[Note] = [("info", "What was edited last was recovered", told, "")] if n else []
-    return notes + [("warn", "Something of the project is missing", note, "") for note in found]
+    return [("info", "What was edited last was recovered", told, "")] if n else []
 
 
-def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[RecentProject]:
-    """Projects of a capture: those that the window keeps, and those of the recent ones that were made for it."""
+def _missing(project: Project) -> list[Note]:
+    """What reading the project's document found missing."""
+    return [("warn", "Something of the project is missing", note, "") for note in project.store.notes]
+
+
+def projects_of(
+    capture: Capture, recent: Sequence[RecentProject] = (), projects: Path | None = None
+) -> list[RecentProject]:
+    """Projects of a capture, the one that was open last first: those that the window keeps, and those of the recent
+    ones that were made for it. projects: See `open_for_window`."""
     place = Path(capture.path).resolve()
-    kept = _kept_dirs(capture)
+    kept = _kept_dirs(capture, projects_dir() if projects is None else projects)
     folders = [entry.folder for entry in recent if entry.project and Path(entry.capture) == place]
     found = []
     for folder in dict.fromkeys(path.resolve() for path in [*folders, *kept]):
@@ -257,27 +293,30 @@ def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[
             n_trained = len(finished_files(folder, settings.clip_bounds, settings.clip_length))
             first, stop = settings.frames or (0, capture.layout.n_frames)
             n_clips = len(settings.clips(stop - first))
-            name = project_name(folder, capture.path)
-            opened = next((entry.opened for entry in recent if entry.folder == folder), "")
-            found.append(RecentProject(str(folder), str(place), name, n_trained, n_clips, opened))
-    return found
+            name, preset = project_name(folder, capture.path), closest_preset(settings.overrides)
+            known = next((entry.opened for entry in recent if entry.folder == folder), "")
+            opened = known or _changed(folder)
+            found.append(RecentProject(str(folder), str(place), name, n_trained, n_clips, opened, preset))
+    return sorted(found, key=lambda entry: entry.opened, reverse=True)
 
 
-def _kept_dirs(capture: Capture) -> list[Path]:
-    """Folders of projects of a capture that the window has made."""
-    usual = default_project_dir(capture)
-    return [folder for folder in sorted(usual.parent.glob(f"{usual.name}*")) if is_project(folder)]
+def _changed(folder: Path) -> str:
+    """When the document of a project was written last."""
+    try:
+        written_s = (folder / PROJECT_FILE).stat().st_mtime
+        return datetime.fromtimestamp(written_s, UTC).isoformat(timespec="seconds")
+    except (OSError, ValueError, OverflowError):
+        return ""
 
 
-def new_project_dir(capture: Capture) -> Path:
-    """A folder for a new project of a capture: the usual one, or that with a number where it is taken."""
-    usual = default_project_dir(capture)
-    number = 2
-    folder = usual
-    while folder.exists() and any(child.name != "lock" for child in folder.iterdir()):
-        folder = usual.with_name(f"{usual.name}-{number}")
-        number += 1
-    return folder
+def _kept_dirs(capture: Capture, projects: Path) -> list[Path]:
+    """Folders of projects of a capture that the window has made, there and where it usually makes them."""
+    kept: list[Path] = []
+    for parent in dict.fromkeys((projects, data_dir() / "projects")):
+        usual = usual_project_dir(capture, parent)
+        with suppress(OSError):
+            kept += [one for one in sorted(parent.iterdir()) if one.name.startswith(usual.name) and is_project(one)]
+    return kept
 
 
 def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:

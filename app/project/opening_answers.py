@@ -8,9 +8,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from app.project.project import DEFAULT_CLIP_LENGTH
+from app.project.project_access import DEFAULT_CLIP_LENGTH
 from engine.capture.capture import Capture, working_sizes
 from engine.capture.holdout_choice import suggested_holdout
+from engine.capture.pixels.frame_fit import FrameFit
 from engine.errors import CaptureError
 
 WINDOW_WIDTH_PX = 960
@@ -40,12 +41,14 @@ class OpeningAnswers:
         scale: Working size divided by stored size, in (0, 1].
         clip_length: Frames per clip.
         holdout: Names of cameras kept out of training, to measure with.
+        fit: What became of frames of another shape than their calibration; None where that is not asked or not said.
     """
 
     frames: tuple[int, int] | None
     scale: float
     clip_length: int
     holdout: tuple[str, ...]
+    fit: FrameFit | None = None
 
 
 def window_scale(capture: Capture, width_px: int | None = WINDOW_WIDTH_PX) -> float:

@@ -7,12 +7,13 @@ import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from app.document.document_file import BACKUP_FILE, PROJECT_FILE
-from app.document.document_store import DocumentStore
 from app.document.history import DocumentHistory
-from app.document.history_file import HISTORY_FILE
-from app.document.recovery import DAMAGED_FOLDER
-from app.document.replay import JOURNAL_FOLDER
+from app.document.storing.document_file import BACKUP_FILE, PROJECT_FILE
+from app.document.storing.document_store import DocumentStore
+from app.document.storing.history_file import HISTORY_FILE
+from app.document.storing.recovery import DAMAGED_FOLDER
+from app.document.storing.replay import JOURNAL_FOLDER
+from app.project.folders import check_folders
 from app.project.project import LOCK_FILES, Project
 from engine.errors import ProjectError
 from engine.storage.files import PARTIAL_PREFIX, atomic_folder, disk_error
@@ -31,9 +32,10 @@ def copy_project(project: Project, target: Path, report: Callable[[float, str], 
         target: A folder that is not there yet, or an empty one.
         report: Told the share that is done, and what is copied. What it raises ends the copying; nothing stays then.
     Raises:
-        ProjectError: The folder lies in the project, or holds something.
+        ProjectError: The folder lies in the project, or holds something; or a folder of the project is a link.
         DiskError: The disk refused; nothing stays.
     """
+    check_folders(project.folder, "copied")
     target = target.absolute()
     if target.resolve().is_relative_to(project.folder.resolve()):
         raise ProjectError("A copy cannot lie in the project itself.", hint="Choose another folder.", path=target)
@@ -63,9 +65,13 @@ def copy_bytes(project: Path) -> int:
 
 
 def _files(folder: Path) -> Iterator[tuple[Path, int]]:
-    """Files to copy, with their sizes in bytes."""
+    """Files to copy, with their sizes in bytes. Links are not followed."""
     for child in folder.iterdir():
-        if child.name in _LEFT_OUT or child.name.startswith((f"{DAMAGED_FOLDER}-", PARTIAL_PREFIX)):
+        if (
+            child.is_symlink()
+            or child.name in _LEFT_OUT
+            or child.name.startswith((f"{DAMAGED_FOLDER}-", PARTIAL_PREFIX))
+        ):
             continue
         for path in [child] if child.is_file() else child.rglob("*"):
             if path.is_file() and not path.is_symlink() and not path.name.startswith(PARTIAL_PREFIX):

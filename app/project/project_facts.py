@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.background.kernels import COMPILING
+from app.document.project_settings import ProjectSettings
+from app.document.storing.document_file import PROJECT_FILE
 from app.project.clip_bytes import storage_of
-from app.project.project import PROJECT_FILE, Project, ProjectSettings, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from engine.clip_files.clip_header import ClipHeader, Coverage
 from engine.clip_files.clip_state import DamagedClip, look_at_clip
 from engine.errors import ProjectError

@@ -7,8 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from app.document.document_file import PROJECT_FILE
-from engine.user_folders import data_dir
+from app.document.storing.document_file import PROJECT_FILE
 
 MAX_RECENT = 12
 
@@ -23,6 +22,7 @@ class RecentProject:
         name: As shown to the user.
         n_trained, n_clips: Clips that are finished, and all of them; both 0 where unknown.
         opened: When it was last open, as ISO 8601 in UTC; empty where unknown.
+        preset: The one that its settings begin with; empty where unknown.
     """
 
     project: str
@@ -31,6 +31,7 @@ class RecentProject:
     n_trained: int = 0
     n_clips: int = 0
     opened: str = ""
+    preset: str = ""
 
     @property
     def folder(self) -> Path:
@@ -43,11 +44,6 @@ class RecentProject:
         if not self.project:
             return "capture"
         return f"{self.n_trained} of {self.n_clips} clips trained" if self.n_clips else "project"
-
-
-def project_name(folder: Path, capture: Path | str) -> str:
-    """What a project is called: by its folder, or by its capture where the program has chosen the folder."""
-    return Path(capture).name if folder.parent == data_dir() / "projects" else folder.name
 
 
 def read_recents(document: dict[str, Any]) -> list[RecentProject]:
@@ -99,7 +95,7 @@ def _entry(values: Any) -> RecentProject | None:
     if not isinstance(values, dict) or not all(isinstance(values.get(key), str) for key in ("project", "capture")):
         return None
     folder = values["project"] or values["capture"]
-    name, opened = values.get("name"), values.get("opened")
+    name, opened, preset = values.get("name"), values.get("opened"), values.get("preset")
     n_trained, n_clips = values.get("n_trained"), values.get("n_clips")
     return RecentProject(
         values["project"],
@@ -108,4 +104,5 @@ def _entry(values: Any) -> RecentProject | None:
         n_trained if isinstance(n_trained, int) else 0,
         n_clips if isinstance(n_clips, int) else 0,
         opened if isinstance(opened, str) else "",
+        preset if isinstance(preset, str) else "",
     )

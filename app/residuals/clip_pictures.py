@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.playback.frame_decoder import ClipFiles, FrameDecoder, FrameRequest, ModelKey
+from engine.backends.table import process_backend
 from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
@@ -63,7 +64,7 @@ class ClipPictures:
         with self._lock:
             known = self._clips.get(request.model_key)
             if known is None:
-                known = self._files.read(request).trained
+                known = self._files.read(request, process_backend()).trained
                 if known is None:
                     raise ProjectError(
                         f"Clip {request.clip_index} does not say what the cameras make of its colours.",

@@ -97,7 +97,8 @@ class Figures:
         n_cameras: Of the capture.
         is_usable: Pictures that can be measured, because they are not excluded; None for all. [F, C] bool
         cells: By column of CELL_COLUMNS, NaN where not known. [F, C] float64
-        has_row, has_pair: What was measured, whether or not there is a figure. [F, C] bool
+        has_psnr, has_row, has_pair: What was measured, whether or not there is a figure; quick rows have PSNR alone.
+            [F, C] bool
         is_wanted: Frames of trained clips. [F] bool
         is_wanted_pair: Frames whose pair with the frame before can be measured. [F] bool
         seams: One per boundary between clips.
@@ -108,6 +109,7 @@ class Figures:
     n_cameras: int
     is_usable: np.ndarray | None = None
     cells: dict[str, np.ndarray] = field(init=False)
+    has_psnr: np.ndarray = field(init=False)
     has_row: np.ndarray = field(init=False)
     has_pair: np.ndarray = field(init=False)
     is_wanted: np.ndarray = field(init=False)
@@ -126,7 +128,7 @@ class Figures:
         before = np.concatenate([np.zeros((1, self.n_cameras), bool), usable[:-1]])[: shape[0]]
         self._usable, self._usable_pair = usable, usable & before
         self.cells = {column: np.full(shape, np.nan) for column in CELL_COLUMNS}
-        self.has_row, self.has_pair = (np.zeros(shape, bool) for _ in range(2))
+        self.has_psnr, self.has_row, self.has_pair = (np.zeros(shape, bool) for _ in range(3))
         self.is_wanted, self.is_wanted_pair = (np.zeros(shape[0], bool) for _ in range(2))
         self._excess_static, self._change_static = (np.full(shape, np.nan) for _ in range(2))
         self.seams = [SeamStatus(clip.clip_index, clip.start) for clip in self.clips[1:]]
@@ -149,7 +151,7 @@ class Figures:
         for column in CELL_COLUMNS:
             self.cells[column][frames] = np.nan
         self._excess_static[frames] = self._change_static[frames] = np.nan
-        self.has_row[frames] = self.has_pair[frames] = False
+        self.has_psnr[frames] = self.has_row[frames] = self.has_pair[frames] = False
         if clip.stop < len(self.has_pair):
             for values in (self.cells["E"], self._excess_static, self._change_static):
                 values[clip.stop] = np.nan
@@ -165,6 +167,7 @@ class Figures:
         for row in found.rows:
             at = row.frame_index, row.camera_index
             self.cells["psnr"][at] = _number(row.psnr)
+            self.has_psnr[at] = True
             if row.has_flip:
                 self.cells["flip"][at] = _number(row.flip)
                 self.has_row[at] = True
@@ -204,12 +207,32 @@ class Figures:
             if score is not None:
                 scores[int(camera)] = score
         ratio = ratio_of(_known(self._change_static[after.start]), _known(self._change_static[inside]))
-        if not scores:
-            return SeamStatus(later, after.start, ratio=ratio)
-        worst = max(scores, key=lambda camera: scores[camera])
-        return SeamStatus(later, after.start, mean_of(list(scores.values())), ratio, len(scores), worst)
+        is_seen = self._usable_pair[after.start]
+        around = np.r_[inside, after.start]
+        is_in = is_seen & (self.has_pair[around] | ~self._usable_pair[around]).all(0)
+        worst = max(scores, key=lambda camera: scores[camera], default=None)
+        score = mean_of(list(scores.values()))
+        return SeamStatus(later, after.start, score, ratio, int(is_in.sum()), int(is_seen.sum()), worst)
+
+    def held_out_psnr(self, holdout: Sequence[int]) -> list[float | None]:
+        """What an evaluation says of each clip: mean PSNR of its frames in the held-out cameras, dB. None until every
+        one of them is measured, and without held-out cameras."""
+        cameras = sorted(holdout)
+        if not cameras:
+            return [None] * len(self.clips)
+        values = self.cells["psnr"][:, cameras]
+        is_in = (self.has_psnr | ~self._usable)[:, cameras].all(1) & self.is_wanted
+        frames = [slice(clip.start, clip.stop) for clip in self.clips]
+        return [mean_of(_known(values[found].T)) if is_in[found].all() else None for found in frames]
 
     # ---------------------------------------------------------------- what is left
+
+    @property
+    def measured(self) -> dict[str, tuple[int, int]]:
+        """By column of CELL_COLUMNS: of how many pictures it is measured, and of how many it can be."""
+        rows, pairs = self._usable & self.is_wanted[:, None], self._usable_pair & self.is_wanted_pair[:, None]
+        known = {"psnr": (self.has_psnr, rows), "flip": (self.has_row, rows), "E": (self.has_pair, pairs)}
+        return {column: (int((has & wanted).sum()), int(wanted.sum())) for column, (has, wanted) in known.items()}
 
     @property
     def n_all(self) -> int:

@@ -200,12 +200,12 @@ class Heat:
         last = "last" if is_before else "first"
         if neighbour.is_held_beyond if is_before else neighbour.is_held_ahead:
             image = self._pictures.frame(capture, other, camera)
-            note = f"Clip {other.clip_index} ends there and answers with its {last} frame, so that this equals R."
-            note = note if is_before else note.replace("ends there", "begins later")
+            own = "ends before" if is_before else "begins after"
+            note = f"Clip {other.clip_index} {own} this frame: its {last} one stands in, which shows no more than R"
         else:
             clip_time = neighbour.beyond if is_before else neighbour.ahead
             image = self._pictures.render(capture, other, camera, clip_time)
-            note = f"Clip {other.clip_index} is extrapolated beyond its {last} frame."
+            note = f"Clip {other.clip_index} is extrapolated beyond its {last} frame"
         return LEVELS * change_of(self._pictures.frame(capture, main, camera), image), note, True
 
 

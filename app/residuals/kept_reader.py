@@ -8,9 +8,9 @@ import threading
 import time
 from collections.abc import Sequence
 
-from app.background.priority import lower_thread
 from app.project.opened_project import OpenedProject
 from app.residuals.figures import ClipFigures
+from engine.children.priority import lower_thread
 from engine.errors import EngineError
 
 logger = logging.getLogger(__name__)

@@ -8,8 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from app.evaluation.evaluation import Scope, kept_figures
-from app.evaluation.headless import TrainedProject
-from app.residuals.figures import ClipFigures, PairFigures, RowFigures, pair_figures, row_figures
+from app.evaluation.headless import TrainedProject, open_trained
+from app.project.clip_catalog import ClipCatalog
+from app.project.project import Project
+from app.residuals.figures import ClipFigures, Figures, PairFigures, RowFigures, pair_figures, row_figures
+from engine.capture.capture import Capture
 from engine.errors import EngineError
 
 if TYPE_CHECKING:
@@ -20,6 +23,21 @@ WINDOW_METRICS: Choice = "all"
 the other has. It takes half as long again as PSNR and FLIP alone would, rendering included."""
 READ_METRICS: tuple[Choice, ...] = ("quick", WINDOW_METRICS)
 """What is read: quick figures have PSNR and pairs too."""
+
+
+def note_kept(catalog: ClipCatalog, project: Project, capture: Capture) -> None:
+    """Let a catalog know what evaluations say of its clips, as far as they are kept and can be read."""
+    trained = [index for index in range(len(catalog)) if catalog[index].state == "trained"]
+    try:
+        opened = open_trained(project, capture)
+    except EngineError:  # nothing is trained, or the reference is damaged
+        return
+    usable = project.document.exclusions.usable(capture.rig.names, capture.n_frames)
+    figures = Figures(opened.clips, len(capture.rig), usable)
+    figures.set_trained(trained)
+    for found in read_kept(opened, trained, trained, lambda sentence: None):
+        figures.take(found)
+    catalog.note_evaluated(figures.held_out_psnr(capture.camera_indices(project.settings.holdout)))
 
 
 def read_kept(

@@ -31,8 +31,10 @@ START_AFTER_S = 2.0
 """Quiet before the process is started: not while a project opens, nor between two clips of a queue."""
 STATUS_EVERY_S = 0.25
 """Figures come more often than anybody looks."""
-RATE_TIME_CONSTANT_S = 30.0
-"""Items begin slowly, with the background of a camera."""
+RATE_TIME_CONSTANT_S = 300.0
+"""Items begin slowly, with the background of a camera: a forecast by the last half minute jumps by twice its value."""
+FORECAST_AFTER_S = 60.0
+"""Of measuring at full speed: before, nobody can know how long the rest takes."""
 
 
 class Measuring:
@@ -177,6 +179,8 @@ class Measuring:
                     process.end()
                     self._process, self._is_given_up = None, True
         if n_new:
+            if self._is_held_back:
+                self._rate.pause()  # that speed says nothing of the rest
             self._rate.update(self._figures.n_done, self._clock())
 
     def _say(self, message: str) -> None:
@@ -237,21 +241,25 @@ class Measuring:
     def _remake(self) -> None:
         figures, opened = self._figures, self._opened
         holdout: Sequence[int] = () if opened is None else opened.holdout
+        if self._catalog is not None:
+            self._catalog.note_evaluated(figures.held_out_psnr(holdout))
         cells = {column: figures.cells[column].astype(np.float32) for column in CELL_COLUMNS}
         for values in cells.values():
             values.flags.writeable = False
         n_done, n_all = figures.n_done, figures.n_all
         is_measuring = self._process is not None
+        is_known = is_measuring and self._rate.seconds >= FORECAST_AFTER_S
         self.status = ResidualStatus(
             seams=tuple(figures.seams),
             cells=cells,
             is_held_out=tuple(camera in holdout for camera in range(figures.n_cameras)),
+            measured=figures.measured,
             n_done=n_done,
             n_all=n_all,
             is_measuring=is_measuring,
             is_held_back=self._is_held_back,
             rate=self._rate.per_s if is_measuring else 0.0,
-            eta_s=self._rate.eta_s(n_all - n_done) if is_measuring else None,
+            eta_s=self._rate.eta_s(n_all - n_done) if is_known else None,
             message=" ".join(self._messages),
             revision=figures.revision,
         )

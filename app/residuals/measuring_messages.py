@@ -1,18 +1,16 @@
-"""Messages between the window's process and the one that measures: small typed values, sent as JSON."""
+"""Messages between the window's process and the one that measures: small typed values."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
 from app.residuals.figures import PairFigures, RowFigures
 from app.residuals.measuring_order import Look
+from engine.backends.table import chosen_name
 
 
-@dataclass(frozen=True, slots=True)
-class MeasureJob:
+class MeasureJob(msgspec.Struct, frozen=True, eq=False):
     """Everything that the process is started with.
 
     Attributes:
@@ -23,6 +21,7 @@ class MeasureJob:
         is_kept: Whether figures are written into the project.
         look: What the user looks at.
         share: Of the time that may be computed, see SetShare.
+        backend: Name of what is computed with.
     """
 
     project: str
@@ -36,6 +35,7 @@ class MeasureJob:
     is_kept: bool
     look: Look
     share: float = 1.0
+    backend: str = msgspec.field(default_factory=chosen_name)
 
 
 class LookAt(msgspec.Struct, frozen=True, tag=True):
@@ -65,26 +65,8 @@ class Trouble(msgspec.Struct, frozen=True, tag=True):
 
 
 class MeasuringEnded(msgspec.Struct, frozen=True, tag=True):
-    """Nothing is left that could be measured."""
+    """Nothing is left that could be measured, or nobody is left to do it. Made by MeasuringProcess, never sent."""
 
 
 Command = LookAt | SetShare
 Event = Measured | Trouble | MeasuringEnded
-
-_COMMANDS = msgspec.json.Decoder(Command)
-_EVENTS = msgspec.json.Decoder(Event)
-
-
-def encode(message: Command | Event) -> bytes:
-    """One message as JSON."""
-    return msgspec.json.encode(message)
-
-
-def decode_command(data: bytes) -> Command:
-    """Inverse of `encode`. Raises msgspec.DecodeError."""
-    return _COMMANDS.decode(data)
-
-
-def decode_event(data: bytes) -> Event:
-    """Inverse of `encode`. Raises msgspec.DecodeError."""
-    return _EVENTS.decode(data)

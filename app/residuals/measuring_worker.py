@@ -7,12 +7,8 @@ memory traffic or its turns were in the training's way, they would be for that s
 
 from __future__ import annotations
 
-import logging
-import signal
 import time
 from collections import OrderedDict
-from contextlib import suppress
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -20,11 +16,10 @@ import numpy as np
 
 from app.background.kernels import use_threads
 from app.background.logs import start_logging
-from app.background.priority import idle_process
 from app.evaluation.evaluation import Scope, kept_figures
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.kept_figures import KeptFigures
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.residuals.figures import pair_figures, row_figures
 from app.residuals.kept_reading import WINDOW_METRICS
 from app.residuals.measuring_messages import (
@@ -32,14 +27,13 @@ from app.residuals.measuring_messages import (
     LookAt,
     Measured,
     MeasureJob,
-    MeasuringEnded,
     SetShare,
     Trouble,
-    decode_command,
-    encode,
 )
 from app.residuals.measuring_order import Item, Look, first_item
+from engine.backends.table import choose_backend
 from engine.capture.capture import open_capture
+from engine.children.child import Parent
 from engine.errors import EngineError
 from engine.kernels.cache import use_kernel_cache
 from engine.metrics.clips.summary import EvalRow
@@ -49,35 +43,23 @@ if TYPE_CHECKING:
     from engine.metrics.clips.seams import PairRow
     from engine.metrics.clips.trained_clip import TrainedClip
 
-logger = logging.getLogger(__name__)
-
 MAX_CLIPS = 3
 """Clips and their kept figures in memory."""
 CAPTURE_CACHE_BYTES = 64 << 20
 """Pictures of one camera and clip are needed again and again, those of others are not."""
 
 
-class ParentGone(Exception):
-    """Nobody listens any more."""
-
-
-def main(job: MeasureJob, commands: Connection, events: Connection) -> None:
+def main(job: MeasureJob, parent: Parent[Event]) -> None:
     """Runs in the child until everything is measured."""
-    idle_process()  # before any thread is started, since threads take over the priority
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
     start_logging()
     use_kernel_cache()  # before kernels are imported
     use_threads(1)
-    with suppress(ParentGone):
-        talk = Talk(job, commands, events)
-        try:
-            measure(job, talk)
-        except EngineError as error:
-            talk.say(str(error))
-        except Exception as error:  # the edge of the process
-            logger.exception("measuring has failed")
-            talk.say(f"Measuring has failed ({type(error).__name__}: {error}); the log has more.")
-        talk.send(MeasuringEnded())
+    choose_backend(job.backend)
+    talk = Talk(job, parent)
+    try:
+        measure(job, talk)
+    except EngineError as error:
+        talk.say(str(error))
 
 
 class Talking(Protocol):
@@ -89,23 +71,23 @@ class Talking(Protocol):
         ...
 
     def send(self, event: Event) -> None:
-        """Tell the window's process. Raises ParentGone."""
+        """Tell the window's process. Raises Unwanted."""
         ...
 
     def say(self, message: str) -> None:
-        """Tell the user, once. Raises ParentGone."""
+        """Tell the user, once. Raises Unwanted."""
         ...
 
     def rest(self) -> None:
-        """Take in commands, and leave time to others. Raises ParentGone."""
+        """Take in commands, and leave time to others. Raises Unwanted."""
         ...
 
 
 class Talk:
-    """`Talking` through pipes."""
+    """`Talking` with the process that has started this one."""
 
-    def __init__(self, job: MeasureJob, commands: Connection, events: Connection) -> None:
-        self._commands, self._events = commands, events
+    def __init__(self, job: MeasureJob, parent: Parent[Event]) -> None:
+        self._parent = parent
         self._look, self._share = job.look, job.share
         self._said: set[str] = set()
         self._cpu_s = 0.0  # what was computed before it began counts too
@@ -117,10 +99,7 @@ class Talk:
 
     def send(self, event: Event) -> None:
         """See `Talking`."""
-        try:
-            self._events.send_bytes(encode(event))
-        except OSError as error:
-            raise ParentGone from error
+        self._parent.report(event)
 
     def say(self, message: str) -> None:
         """See `Talking`."""
@@ -130,7 +109,7 @@ class Talk:
 
     def rest(self) -> None:
         """Take in commands, and wait for as long as the share demands for what was computed since the last call. Raises
-        ParentGone."""
+        Unwanted."""
         spent_s = time.process_time() - self._cpu_s
         began_s = time.monotonic()
         while True:  # the share may change while it waits
@@ -140,17 +119,12 @@ class Talk:
         self._cpu_s = time.process_time()
 
     def _receive(self, wait_s: float) -> bool:
-        try:
-            if not self._commands.poll(wait_s):
-                return False
-            command = decode_command(self._commands.recv_bytes())
-        except (OSError, EOFError) as error:
-            raise ParentGone from error
+        command = self._parent.receive(wait_s)
         if isinstance(command, LookAt):
             self._look = command.look
         elif isinstance(command, SetShare):
             self._share = command.share
-        return True
+        return command is not None
 
 
 class _TrainedAgain(Exception):
@@ -205,7 +179,7 @@ def measure(job: MeasureJob, talk: Talking) -> None:
 
     Raises:
         CaptureError, ProjectError: The capture or the project cannot be opened.
-        ParentGone: Nobody listens any more.
+        Unwanted: Nobody listens any more.
     """
     project = open_project(Path(job.project), is_writable=False)
     capture = open_capture(

@@ -4,6 +4,8 @@ anchors, and figures of every picture, measured in the background.
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from typing import Any
 
 from app.background.latest import LatestWorker
@@ -27,13 +29,20 @@ class Residuals:
     Args:
         playback: Of the session.
         launch: Starts the process that measures.
+        clock: Seconds; tests bring their own.
     """
 
-    def __init__(self, playback: Playback, *, launch: LaunchMeasuring = MeasuringProcess) -> None:
+    def __init__(
+        self,
+        playback: Playback,
+        *,
+        launch: LaunchMeasuring = MeasuringProcess,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._pictures = ClipPictures(playback.decoder)
         self._heat = Heat(playback, self._pictures, self._why_none)
         self._anchors = AnchorHeats(playback, self._pictures, self._why_none)
-        self.measuring = Measuring(launch=launch)
+        self.measuring = Measuring(launch=launch, clock=clock)
         self._opened: OpenedProject | None = None
         self._catalog: ClipCatalog | None = None
         self._seen = self._finished

@@ -13,54 +13,33 @@ What cannot be done raises an EngineError that says why; nothing is half done. A
 """
 
 from app.document.project_document import ProjectDocument
+from app.export.jobs.video import Turntable
 from app.export.picked_frames import PickedFrames
-from app.export.video.job import Turntable
 from app.scripting.functions import apply_edit, change, export, open_project, redo, render, train_clip, undo
 from app.scripting.scripted_project import ScriptedProject
-from engine.editing.edit import (
-    EVERYWHERE,
-    Box,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Transform,
-)
+from engine.editing import actions
+from engine.editing.actions import *  # noqa: F403 - every action
+from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, Picked, PickedRows, Scope, Sphere
 from engine.errors import CaptureError, DiskError, EngineError, PreparationError, ProjectError, TrainingError
 
 __all__ = [
     "EVERYWHERE",
     "Box",
     "CaptureError",
-    "Delete",
     "DiskError",
     "Edit",
     "EngineError",
     "Everything",
-    "Expose",
-    "Hide",
-    "Hold",
     "Picked",
     "PickedFrames",
     "PickedRows",
     "PreparationError",
     "ProjectDocument",
     "ProjectError",
-    "Recolor",
     "Scope",
     "ScriptedProject",
-    "Smooth",
     "Sphere",
     "TrainingError",
-    "Transform",
     "Turntable",
     "apply_edit",
     "change",
@@ -71,3 +50,4 @@ __all__ = [
     "train_clip",
     "undo",
 ]
+__all__ += actions.__all__

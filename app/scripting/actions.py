@@ -5,22 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from msgspec import Struct
-
-from engine.editing.edit import Action, Hide
+from engine.editing.actions import ACTIONS, Action
 from engine.errors import ProjectError
 from engine.storage.typed_json import EntryError, to_type
 from engine.text import shown
 
-ISOLATE = "isolate"
-"""Hide everything but the target."""
-ACTION_NAMES = ("hide", "delete", "transform", "recolor", "expose", "hold", "smooth", ISOLATE)
-
-
-class _Said(Struct):
-    """A tagged union is read as an entry of something."""
-
-    action: Action
+_OPPOSITES = {kind.opposite: kind for kind in ACTIONS.values() if kind.opposite}
+"""Actions that act on everything but the target, by the name that they have then."""
 
 
 def action_called(action: Action | str, values: Mapping[str, Any]) -> tuple[Action, bool]:
@@ -38,11 +29,10 @@ def action_called(action: Action | str, values: Mapping[str, Any]) -> tuple[Acti
                 hint="Put it into the action, or give the action by its name.",
             )
         return action, False
-    if action == ISOLATE and not values:
-        return Hide(), True
-    if action not in ACTION_NAMES:
-        raise ProjectError(f"There is no edit {shown(action)}.", hint=f"Edits are {', '.join(ACTION_NAMES)}.")
+    known = ACTIONS | _OPPOSITES
+    if action not in known:
+        raise ProjectError(f"There is no edit {shown(action)}.", hint=f"Edits are {', '.join(known)}.")
     try:
-        return to_type({"action": {"type": action, **values}}, _Said).action, False
+        return to_type(dict(values), known[action]), action in _OPPOSITES
     except EntryError as error:
-        raise ProjectError(f"The edit {shown(action)} makes no sense ({error}).") from error
+        raise ProjectError(f"The edit {shown(action)} is not valid ({error}).") from error

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from app.document.project_document import ProjectDocument
 from app.export.export_progress import ExportResult
 from app.scripting.scripted_project import ScriptedProject, open_scripted
-from engine.editing.edit import Action, Edit, Target
+from engine.editing.actions import Action
+from engine.editing.edit import Edit, Target
 
 if TYPE_CHECKING:
     from app.evaluation.headless import ClipOutcome

@@ -4,21 +4,26 @@ does is done by the functions that the window and the command line use.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from app.document.edit_changes import edit_with
+from app.document.changes.edit_changes import edit_with
+from app.document.changes.reach_words import check_acts, reach_note
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
 from app.document.project_document import ProjectDocument
-from app.document.stored_document import document_of, plain_document
+from app.document.storing.stored_document import document_of, plain_document
 from app.export.export_progress import ExportProgress, ExportResult
-from app.export.named_jobs import VIDEO_FORMATS, run_named_job
-from app.project.allowed_changes import check_change
+from app.export.jobs.table import formats_of, named_job
+from app.project.allowed_changes import check_change, discard_unfitting
+from app.project.clip_anchors import clip_anchors
+from app.project.clip_catalog import ClipCatalog
 from app.project.clip_versions import restore_version
 from app.project.opening import open_capture_of
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from app.scripting.actions import action_called
 from app.session.editing.edit_commands import (
     AddEdit,
@@ -35,8 +40,10 @@ from app.training.process import ProcessWorker
 from app.training.service import Launch
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.editing.edit import EVERYWHERE, Action, Box, Edit, Everything, Picked, Scope, Sphere, Target
-from engine.errors import ProjectError
+from engine.editing.actions import Action
+from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, Picked, Scope, Sphere, Target
+from engine.editing.reach import ClipAnchors, Reach, reach_of_edit
+from engine.errors import EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
 from engine.storage.typed_json import EntryError
 
@@ -47,6 +54,7 @@ if TYPE_CHECKING:
 
 TellTraining = Callable[[TrainingStatus], None]
 TellExport = Callable[[ExportProgress], None]
+TellNote = Callable[[str], None]
 
 
 class ScriptedProject:
@@ -201,10 +209,11 @@ class ScriptedProject:
     def _happen(self, event: Event) -> None:
         self._check_open()
         self._project.check_writable()
-        after = self.history.after(event).present
-        if after.settings != self.document.settings:  # the capture may be gone, which is nothing to an edit
-            check_change(self._project, self.capture, self.document, after)
+        before, after = self.document, self.history.after(event).present
+        if after.settings != before.settings:  # the capture may be gone, which is nothing to an edit
+            check_change(self._project, self.capture, before, after)
         self._project.happen(event)
+        discard_unfitting(self._project, before.settings, after.settings)
 
     # ---------------------------------------------------------------- edits
 
@@ -216,6 +225,7 @@ class ScriptedProject:
         scope: Scope = EVERYWHERE,
         is_inverted: bool = False,
         name: str = "",
+        on_note: TellNote | None = None,
         **values: Any,
     ) -> Edit:
         """Put an edit on top of the stack.
@@ -227,19 +237,47 @@ class ScriptedProject:
             scope: In which frames.
             is_inverted: Whether it acts on everything but the target.
             name: For people; an empty one is put into words where the edit is shown.
+            on_note: Told, before it is made, what is unexpected about where it acts; a warning of Python by default.
         Returns:
             The edit with its number.
         Raises:
-            ProjectError: A value is out of range or not known, or what `change` raises.
+            ProjectError: A value is out of range or not known, the edit can act in no frame, or what `change` raises.
         """
         chosen, inverts = action_called(action, values)
         target = Everything() if target is None else target
-        self._carry_out(AddEdit(chosen, target, scope, is_inverted=is_inverted != inverts, name=name))
+        command = AddEdit(chosen, target, scope, is_inverted=is_inverted != inverts, name=name)
+        made = changed(self.document, command).document.edits[-1]
+        reach = reach_of_edit(made, self._anchors())
+        check_acts(reach, scope)
+        self._tell(reach_note(reach, scope), on_note)
+        self._carry_out(command)
         return self.edits[-1]
 
-    def replace_edit(self, edit: Edit) -> None:
-        """Put an edit in the place of the one with its number. Raises ProjectError."""
+    def replace_edit(self, edit: Edit, *, on_note: TellNote | None = None) -> None:
+        """Put an edit in the place of the one with its number. on_note: See `apply_edit`. Raises ProjectError."""
+        self._tell(reach_note(reach_of_edit(edit, self._anchors()), edit.scope), on_note)
         self._carry_out(ChangeEdit(edit))
+
+    @property
+    def reaches(self) -> dict[int, Reach]:
+        """In which frames each edit of the stack acts, by its number."""
+        anchors = self._anchors()
+        return {edit.edit_id: reach_of_edit(edit, anchors) for edit in self.edits}
+
+    def _anchors(self) -> tuple[ClipAnchors, ...]:
+        """Which anchors each clip has; none while the capture cannot be opened, which is nothing to an edit."""
+        try:
+            clips = self.clips
+        except EngineError:
+            return ()
+        return clip_anchors(self._project, clips, ClipCatalog(self._project, len(clips)))
+
+    @staticmethod
+    def _tell(note: str, on_note: TellNote | None) -> None:
+        if note and on_note is not None:
+            on_note(note)
+        elif note:
+            warnings.warn(note, stacklevel=3)
 
     def switch_edit(self, edit_id: int, *, is_on: bool) -> None:
         """Let an edit count or not. Raises ProjectError."""
@@ -391,7 +429,6 @@ class ScriptedProject:
         out: Path | str,
         *,
         format: str | None = None,
-        frames: range | None = None,
         on_progress: TellExport | None = None,
         **options: Any,
     ) -> ExportResult:
@@ -400,21 +437,16 @@ class ScriptedProject:
         Args:
             out: A file, or a new folder for pictures.
             format: "mp4", "webm", "png" or "exr"; None goes by the name.
-            frames: Of the capture; None for all that are trained.
             on_progress: Told how far it is; what it raises ends the work, and then nothing is left.
-            options: Entries of app.export.video.job.VideoJob, such as camera="cam00" or turntable=Turntable(2).
+            options: Entries of app.export.jobs.video.VideoJob, such as camera="cam00" or turntable=Turntable(2).
         Raises:
             EngineError: It cannot be rendered; nothing is left.
         """
         from app.export.video.formats import format_of
 
         format_name = format_of(Path(out)) if format is None else format
-        if format_name not in VIDEO_FORMATS:
-            raise ProjectError(f"'{format_name}' is not a format.", hint=f"Formats are {', '.join(VIDEO_FORMATS)}.")
-        if frames is not None:
-            if frames.step != 1 or not frames:
-                raise ProjectError("A video has frames without gaps, at least one.", hint="Give a range without step.")
-            options["frames"] = (frames.start, frames.stop)
+        if format_name not in (known := formats_of("render")):
+            raise ProjectError(f"'{format_name}' is not a format.", hint=f"Formats are {', '.join(known)}.")
         return self._run_job(format_name, out, on_progress, options)
 
     def export(
@@ -429,7 +461,7 @@ class ScriptedProject:
 
         Args:
             out: A new or empty folder; of a player and of figures a file.
-            format: One of app.export.named_jobs.JOB_FORMATS, such as "spz", "player" or "metrics-csv".
+            format: One of app.export.jobs.table.formats_of(), such as "spz", "player" or "metrics-csv".
             on_progress: Told how far it is; what it raises ends the work, and then nothing is left.
             options: Entries of the format's job, such as frames=range(10).
         Raises:
@@ -441,7 +473,8 @@ class ScriptedProject:
         self, format_name: str, out: Path | str, on_progress: TellExport | None, options: dict[str, Any]
     ) -> ExportResult:
         report = on_progress if on_progress is not None else _tell_nobody
-        return run_named_job(self.open_trained(), report, format_name, out, **options)
+        job = named_job(format_name, out, **options)
+        return job.load().run(self.open_trained(), job, report)
 
     def open_trained(self) -> TrainedProject:
         """The finished clips as they are now, for reading. Raises what `capture` raises."""

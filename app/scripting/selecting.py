@@ -13,6 +13,7 @@ from app.session.editing.attributes import ATTRIBUTES
 from app.session.editing.finding import Ground, found_by, selection_after
 from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.editing.selection_commands import How, SelectAll, SelectByAttribute, SelectionCommand, SelectVolume
+from engine.backends.table import process_backend
 from engine.editing.edit import Box, Edit, Picked, Sphere
 from engine.editing.effects import EditStack
 from engine.errors import ProjectError
@@ -51,7 +52,7 @@ def select(
         clip=clip,
         effects=EditStack(edits).at(frame_index),
     )
-    loaded = ClipFiles().read(request)
+    loaded = ClipFiles().read(request, process_backend())
     gaussians = decode_frame(loaded, request).gaussians
     if gaussians.rows is None:
         raise ProjectError(f"The Gaussians of clip {clip.clip_index} cannot be told apart.", hint="Train it again.")

@@ -41,6 +41,8 @@ TITLES: dict[type, str] = {
     commands.GoToStep: "That step of the history cannot be reached",
     **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
     **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
+    commands.AskStartOver: "Training cannot start over",
+    commands.StartOver: "Training cannot start over",
     commands.CorrectCapture: "The capture cannot be corrected",
     **dict.fromkeys(get_args(commands.FileCommand), "That cannot be done with the project"),
 }

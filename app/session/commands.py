@@ -18,14 +18,14 @@ from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
-from app.session.path_commands import PathCommand
+from app.session.paths.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
 
 @dataclass(frozen=True, slots=True)
 class OpenCapture:
-    """Open a capture folder, and the project that belongs to it; asks where there are several. A project folder is
-    opened as such."""
+    """Open a capture folder; where it has projects, ask which, or whether to make a new one. A project folder is opened
+    as such."""
 
     path: Path
     scale: float | None = None
@@ -48,6 +48,42 @@ class OpenProject:
 
     path: Path
     choices: ProjectChoices = AS_USUAL
+
+
+@dataclass(frozen=True, slots=True)
+class CancelJob:
+    """Give up a job of this name, such as building a first cloud."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class NewProject:
+    """Ask what another project of the open capture begins with; the others stay as they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveTraining:
+    """Stop the training, keep its progress, and go to the project that was opened."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskStartOver:
+    """Ask with which settings training is to start over, and say what is discarded."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartOver:
+    """Discard everything that is trained in the open project, and take a preset."""
+
+    preset: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetProjectsFolder:
+    """Where projects go that are made from now on; an empty text for the usual place."""
+
+    folder: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,21 +229,21 @@ class ShowHeat:
 
 @dataclass(frozen=True, slots=True)
 class SetHoldout:
-    """Camera indices that training never sees. Only before the first clip is trained."""
+    """Camera indices that training never sees. Only before the first clip is finished."""
 
     camera_indices: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class SetClipLength:
-    """Frames per clip. Only before the first clip is trained."""
+    """Frames per clip. Only before the first clip is finished."""
 
     n_frames: int
 
 
 @dataclass(frozen=True, slots=True)
 class SetTrainSetting:
-    """One setting of engine.training.config by its name. Only before the first clip is trained."""
+    """One setting of engine.training.config by its name. Only before the first clip is finished."""
 
     name: str
     value: int | float | str | bool
@@ -215,7 +251,7 @@ class SetTrainSetting:
 
 @dataclass(frozen=True, slots=True)
 class SetPreset:
-    """Training settings of a preset in place of all that were set. Only before the first clip is trained."""
+    """Training settings of a preset in place of all that were set. Only before the first clip is finished."""
 
     name: str
 
@@ -280,14 +316,14 @@ class SetCompareWith:
 
 @dataclass(frozen=True, slots=True)
 class SetMode:
-    """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
+    """Let colours mean something else. mode: See app.playback.modes.view_modes.MODES."""
 
     mode: str
 
 
 @dataclass(frozen=True, slots=True)
 class SetContent:
-    """Draw a part of the clips. content: See app.playback.view_modes.CONTENTS."""
+    """Draw a part of the clips. content: See app.playback.modes.view_modes.CONTENTS."""
 
     content: str
 
@@ -369,6 +405,11 @@ class CalibrateVideos:
 
 
 @dataclass(frozen=True, slots=True)
+class KeepCalibration:
+    """Write a calibration that has failed all the same, with doubtful cameras in use."""
+
+
+@dataclass(frozen=True, slots=True)
 class StopCalibration:
     """End the calibration that runs; nothing is written."""
 
@@ -410,7 +451,7 @@ class ApplyOffsets:
 SynchronisationCommand = SynchroniseCameras | ApplyOffsets
 """Cameras that are ahead of others."""
 
-CalibrationCommand = LookAtVideos | CalibrateVideos | StopCalibration
+CalibrationCommand = LookAtVideos | CalibrateVideos | KeepCalibration | StopCalibration
 """From plain videos to a capture."""
 
 
@@ -472,9 +513,14 @@ ExportCommand = (
 )
 """What leaves the project for other programs."""
 
+ProjectCommand = NewProject | LeaveTraining | AskStartOver | StartOver | SetProjectsFolder
+"""Which project is trained, and where projects lie."""
+
 Command = (
     OpenCapture
     | OpenProject
+    | ProjectCommand
+    | CancelJob
     | FileCommand
     | TrainNextClip
     | QueueCommand

@@ -9,6 +9,7 @@ from app.document.project_document import AS_CAPTURED, World
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.editing.edit import Edit
 from engine.editing.lost_picks import LostPicks
+from engine.editing.reach import UNKNOWN, ClipAnchors, Reach
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,8 @@ class EditsStatus:
         labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
         world: Up and scale.
         lost: Which of them have lost what was picked, because a clip was trained anew.
+        clips: Which anchors each clip has; none while that is not known.
+        reaches: Where each edit acts, by its number.
         can_edit: Whether anything can be changed now.
         why_not: The reason if not, and what to do.
     """
@@ -44,12 +47,18 @@ class EditsStatus:
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     world: World = AS_CAPTURED
     lost: tuple[LostPicks, ...] = ()
+    clips: tuple[ClipAnchors, ...] = ()
+    reaches: Mapping[int, Reach] = field(default_factory=dict)
     can_edit: bool = False
     why_not: str = ""
 
     def edit(self, edit_id: int | None) -> Edit | None:
         """The edit of that number; None without one."""
         return next((edit for edit in self.edits if edit.edit_id == edit_id), None)
+
+    def reach(self, edit_id: int) -> Reach:
+        """Where an edit acts; one that knows nothing where that is not known."""
+        return self.reaches.get(edit_id, UNKNOWN)
 
     def label(self, kind: str, name: str) -> str:
         """The user's own name for a clip or a camera; empty without one."""

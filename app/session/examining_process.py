@@ -2,90 +2,75 @@
 
 from __future__ import annotations
 
-import logging
-import multiprocessing
-import signal
-from contextlib import suppress
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.background.children import undisturbed
-from engine.capture.capture import Capture, open_capture
-from engine.errors import CaptureError, EngineError
+import msgspec
+
+from engine.capture.capture import ONE_PASS_CACHE_BYTES, Capture, open_capture
+from engine.children.child import Parent
+from engine.children.kind import ChildFailed, ChildKind
+from engine.children.process import run_child
+from engine.errors import CaptureError
 from engine.progress import Progress, ReportProgress
 
 if TYPE_CHECKING:  # loading what examines takes a second: that is left to the process
     from engine.doctor.doctor import Diagnosis
 
-logger = logging.getLogger(__name__)
-CACHE_BYTES = 32 << 20
-"""Each picture is looked at once."""
-POLL_S = 0.1
-ENDED = "The process that examines the capture ended unexpectedly."
+
+class ExamineJob(msgspec.Struct, frozen=True):
+    """How the capture is opened."""
+
+    capture: Path
+    scale: float
+    follow_links: bool
+
+
+EXAMINING: ChildKind[ExamineJob, Progress, Diagnosis] = ChildKind(
+    place="app.session.examining_process:EXAMINING",
+    work="app.session.examining_process:examine_here",
+    what="The process that examines the capture",
+    job=ExamineJob,
+    result="engine.doctor.doctor:Diagnosis",
+    priority="idle",
+)
 
 
 def examine_apart(capture: Capture, report: ReportProgress) -> Diagnosis:
-    """Have a spawned process examine a capture, and wait for it.
+    """Have a process examine a capture, and wait for it.
 
     Args:
         report: Called several times a second; what it raises ends the process.
     Raises:
-        CaptureError: What the process raised, or that it died.
+        EngineError: What the process raised, or that it died.
     """
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    job = (str(capture.path), capture.scale, capture.follow_links, theirs)
-    process = context.Process(target=main, args=job, name="capture doctor", daemon=True)
+    seen = Progress("Capture doctor", 0.0, "starting")
+
+    def see(progress: Progress) -> None:
+        nonlocal seen
+        seen = progress
+
+    job = ExamineJob(capture.path, capture.scale, capture.follow_links)
     try:
-        with undisturbed():
-            process.start()
-        theirs.close()
-        seen = Progress("Capture doctor", 0.0, "starting")
-        while True:
-            report(seen)
-            if not ours.poll(POLL_S):
-                continue
-            try:
-                said = ours.recv()
-            except (EOFError, OSError):
-                raise CaptureError(ENDED, hint="Try again; the log may say more.", path=capture.path) from None
-            if isinstance(said, Progress):
-                seen = said
-            elif isinstance(said, tuple):
-                message, hint, path = said
-                raise CaptureError(message, hint=hint, path=path)
-            else:
-                return said
-    finally:
-        if process.pid is not None:
-            process.kill()
-            process.join()
-        ours.close()
+        return run_child(EXAMINING, job, report=see, alive=lambda: report(seen))
+    except ChildFailed as error:
+        raise CaptureError(f"{error}.", hint="Try again; the log may say more.", path=capture.path) from error
 
 
-def main(path: str, scale: float, follow_links: bool, events: Connection) -> None:
+def examine_here(job: ExamineJob, parent: Parent[Progress]) -> Diagnosis:
     """Runs in the child."""
     from app.background.kernels import use_threads
     from app.background.logs import start_logging
-    from app.background.priority import idle_process
     from engine.kernels.cache import use_kernel_cache
 
-    idle_process()  # before any thread is started, since threads take over the priority
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
     start_logging()
     use_kernel_cache()  # before kernels are imported
-    use_threads(None)
-    with suppress(OSError):  # nobody listens any more
-        try:
-            from engine.doctor.doctor import examine
+    use_threads(None, with_torch=False)
+    parent.report(Progress("Capture doctor", 0.0, "loading"))
+    from engine.doctor.doctor import examine
 
-            capture = open_capture(Path(path), scale=scale, cache_bytes=CACHE_BYTES, follow_links=follow_links)
-            events.send(examine(capture, report=events.send))
-        except EngineError as error:
-            events.send((error.message, error.hint, None if error.path is None else str(error.path)))
-        except OSError:
-            raise
-        except Exception as error:  # the edge of the process
-            logger.exception("examining has failed")
-            events.send((f"Examining has failed ({type(error).__name__}: {error}).", "The log has more.", None))
+    parent.report(Progress("Capture doctor", 0.0, "opening the capture"))
+    capture = open_capture(
+        job.capture, scale=job.scale, cache_bytes=ONE_PASS_CACHE_BYTES, follow_links=job.follow_links
+    )
+    return examine(capture, report=parent.report)

@@ -15,14 +15,15 @@ from app.export.export_plan import ExportPlan, plan_export, suggested_out
 from app.export.export_process import Exporter, ExportProcess
 from app.export.export_queue import ExportQueue
 from app.export.export_status import ExportStatus
-from app.export.forms.table import FORMS, answers_to
+from app.export.jobs.answers import Answers
+from app.export.jobs.table import KINDS
 from app.export.show_in_folder import show_in_folder
 from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject
-from app.project.recents import project_name
+from app.project.projects_folder import project_name
 from app.session import commands
 from app.session.notices import Notices
-from app.session.settings import Settings
+from app.session.projects.settings import Settings
 from engine.capture.frames import VideoFrames
 from engine.errors import EngineError, ProjectError
 
@@ -88,6 +89,7 @@ class Exporting:
         self._planner: LatestWorker[_Wish, ExportPlan] = LatestWorker("export plan", self._plan)
         self._namer: LatestWorker[_Wish, str] = LatestWorker("export name", _name)
         self._opened: OpenedProject | None = None
+        self._project = Path()
         self._n_asked = 0
         self._settle: Callable[[], object] = nothing
         self._read: tuple[object, TrainedProject] | None = None  # belongs to the planner's thread
@@ -96,8 +98,8 @@ class Exporting:
 
     @property
     def statuses(self) -> tuple[ExportStatus, ...]:
-        """The queue: what runs, what waits, what has ended."""
-        return self._queue.statuses
+        """The queue: what runs, what waits, and what has ended of the open project."""
+        return tuple(one for one in self._queue.statuses if not one.is_over or one.project == self._project)
 
     @property
     def is_busy(self) -> bool:
@@ -108,6 +110,11 @@ class Exporting:
     def finished(self) -> tuple[object, ...]:
         """Differs whenever there is something else to show."""
         return self._revision, self._queue.revision, self._planner.newest, self._namer.newest
+
+    def open(self, opened: OpenedProject) -> None:
+        """Another project is open: what has ended of others is not listed. What runs goes on."""
+        self._project = opened.project.folder.absolute()
+        self._revision += 1
 
     # ---- the dialog
 
@@ -136,8 +143,8 @@ class Exporting:
             raise ProjectError("There is nothing to export yet: no clip is trained.", hint="Train a clip first.")
         context = _context(opened, timeline, trained, paths)
         last = self._settings.last_export
-        if last.kind not in FORMS:
-            last = last.changed(kind=next(iter(FORMS)))
+        if last.kind not in KINDS:
+            last = last.changed(kind=next(iter(KINDS)))
         self._opened, self._settle = opened, settle
         self._n_asked += 1
         self.page = ExportPage(context, last.changed(out=""))
@@ -212,11 +219,10 @@ class Exporting:
         page, opened = self.page, self._opened
         if page is None or opened is None:
             return
-        answers = answers_to(page.context, choices)
+        answers = Answers(page.context, choices)
         capture = opened.capture
         task = ExportTask(
-            kind=choices.kind,
-            job=answers.form.make_job(answers),
+            job=answers.make_job(),
             project=str(opened.project.folder.absolute()),
             capture=str(Path(capture.path).absolute()),
             scale=capture.scale,
@@ -236,8 +242,10 @@ class Exporting:
         self._queue.remove(export_id)
 
     def clear(self) -> None:
-        """See ExportQueue."""
-        self._queue.clear()
+        """Take all that have ended out of the list."""
+        for status in self.statuses:
+            if status.is_over:
+                self._queue.remove(status.export_id)
 
     def move(self, export_id: int, place: int) -> None:
         """See ExportQueue."""

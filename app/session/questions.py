@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from app.project.capture_report import CaptureReport
 from app.project.clip_catalog import ClipCatalog
 from app.project.opening_answers import OpeningAnswers
+from app.project.project_choices import AS_USUAL, ProjectChoices
 from app.project.recents import RecentProject
 from app.session.clips.clip_questions import ClipQuestion
 from app.session.files.file_questions import FileQuestion
@@ -21,7 +23,8 @@ class RetrainQuestion:
         clip_index: The clip.
         is_damaged: Its file cannot be read, and is replaced for good.
         reason: What is wrong with it; empty for a good one.
-        held_out_psnr: Of the finished clip, dB; None where not measured or damaged.
+        held_out_psnr, held_out_whole: Of the finished clip, dB, and what it is over, see ClipRecord; None where not
+            measured or damaged.
         outdated: Clips that are good now and will be out of date with another result of this one.
         seconds: What training it again is expected to take: as long as the last time, or as clips took on average;
             None where nothing was recorded.
@@ -41,21 +44,63 @@ class RetrainQuestion:
     outdated_seconds: float | None
     resume_step: int | None
     settings: tuple[tuple[str, int | float | str | bool], ...] = ()
+    held_out_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class ProjectQuestion:
-    """Which of several projects of a capture is to be opened?
+    """Which of the projects of a capture is to be opened, or a new one made?
 
     Attributes:
         capture: Folder of the capture.
         choices: The projects there are, latest first.
         follow_links: Whether the user allows the capture's files to lie outside of its folder.
+        opened: Folder of the project that is open; None where none is.
+        how: In which way it is opened.
     """
 
     capture: str
     choices: tuple[RecentProject, ...]
     follow_links: bool = False
+    opened: Path | None = None
+    how: ProjectChoices = AS_USUAL
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveQuestion:
+    """Is the training to be stopped, because another project was opened?
+
+    Attributes:
+        name: Of the other project.
+        clip_index: What trains.
+        step, n_steps: How far it is; zeros before its first step.
+        n_waiting: Clips that wait.
+    """
+
+    name: str
+    clip_index: int
+    step: int
+    n_steps: int
+    n_waiting: int
+
+
+@dataclass(frozen=True, slots=True)
+class StartOverQuestion:
+    """Is everything that is trained to be discarded, to start over with other settings?
+
+    Attributes:
+        project: Its folder.
+        discards: What goes, as "2 trained clips (4:10 of training), 3.1 MB"; empty for nothing.
+        presets: Names to choose from.
+        preset: The one that the settings begin with now.
+        is_working: It is being done.
+    """
+
+    project: Path
+    discards: str
+    presets: tuple[str, ...]
+    preset: str
+    is_working: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,15 +165,26 @@ class OpeningPage:
         answers: What is offered.
         is_new_project: Whether there are projects of it already, and another one was asked for.
         follow_links: Whether its files may lie outside of its folder.
+        folder: Where the project would be made.
     """
 
     report: CaptureReport
     answers: OpeningAnswers
     is_new_project: bool
     follow_links: bool
+    folder: Path = Path()
 
 
-Question = RetrainQuestion | SettingsQuestion | ProjectQuestion | CorrectionQuestion | ClipQuestion | FileQuestion
+Question = (
+    RetrainQuestion
+    | SettingsQuestion
+    | ProjectQuestion
+    | LeaveQuestion
+    | StartOverQuestion
+    | CorrectionQuestion
+    | ClipQuestion
+    | FileQuestion
+)
 
 
 def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:
@@ -145,6 +201,7 @@ def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:
         is_damaged=record.state == "damaged",
         reason=record.reason,
         held_out_psnr=record.held_out_psnr,
+        held_out_whole=record.held_out_whole,
         outdated=tuple(outdated),
         seconds=seconds,
         is_average=record.seconds is None,

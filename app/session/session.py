@@ -16,32 +16,33 @@ from app.background.jobs import Jobs
 from app.background.log_reader import LogView
 from app.background.usage import UsageMeter
 from app.document.project_document import ProjectDocument
-from app.playback.bookmarks import Bookmarks
+from app.document.project_settings import ProjectSettings
 from app.playback.markers import Markers
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.playback.views import Views
-from app.project.allowed_changes import check_change, is_other_cut
+from app.playback.views.bookmarks import Bookmarks
+from app.playback.views.views import Views
+from app.project.allowed_changes import check_change, discard_unfitting, is_other_cut
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
-from app.project.project import Project, check_settings
+from app.project.project import Project
+from app.project.project_access import check_settings
 from app.project.project_choices import AS_USUAL
-from app.project.recents import project_name
+from app.project.projects_folder import project_name, projects_dir
 from app.residuals.residuals import Residuals
 from app.session import commands
-from app.session.attention import Attention
-from app.session.calibrating import Calibrating
-from app.session.camera_paths import CameraPaths
-from app.session.capture_doctor import CaptureDoctor
-from app.session.capture_opening import CaptureOpening
-from app.session.clip_versions import Versions
+from app.session.captures.calibrating import Calibrating
+from app.session.captures.capture_doctor import CaptureDoctor
+from app.session.captures.capture_opening import CaptureOpening
+from app.session.captures.synchronising import Synchronising
 from app.session.clips.clip_commands import ClipCommand, CompareVersion
 from app.session.clips.clip_work import ClipWork
 from app.session.clips.comparing import show_version
 from app.session.command_titles import SETTING_NAMES, TITLES
 from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
@@ -53,21 +54,24 @@ from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.exporting import Exporting
 from app.session.files.file_commands import SaveProjectAs
 from app.session.files.project_files import ProjectFiles
-from app.session.following import follow_training
-from app.session.live_training import LiveTraining
-from app.session.looking import LookCommand, look
 from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import Mending
 from app.session.notices import Notices
-from app.session.project_opener import ProjectOpener
-from app.session.questions import ProjectQuestion, Question
-from app.session.queue_commands import QueueCommands
-from app.session.recent_projects import RecentProjects
+from app.session.paths.camera_paths import CameraPaths
+from app.session.projects.project_opener import ProjectOpener
+from app.session.projects.recent_projects import RecentProjects
+from app.session.projects.setting_changes import changed_settings
+from app.session.projects.settings import Settings
+from app.session.projects.starting_over import StartingOver
+from app.session.questions import LeaveQuestion, ProjectQuestion, Question
+from app.session.recent_input import Attention
 from app.session.session_face import SessionFace
-from app.session.setting_changes import changed_settings
-from app.session.settings import Settings
-from app.session.synchronising import Synchronising
+from app.session.training.clip_versions import Versions
+from app.session.training.follow_training import follow_training
+from app.session.training.live_training import LiveTraining
+from app.session.training.queue_commands import QueueCommands
+from app.session.view_commands import LookCommand, look
 from app.status import (
     ClipStatus,
     PlanStatus,
@@ -108,7 +112,7 @@ class Session(SessionFace):
         notices: What the user has to know.
 
     Args:
-        project_dir: Folder for the project of the next capture; the user's data folder when None.
+        project_dir: Folder for the project of the next capture; one in the folder of projects when None.
         launch: Starts a training worker; a process by default.
         settings: Preferences; the user's own when None.
         opener: Opens captures; tests bring their own.
@@ -141,7 +145,9 @@ class Session(SessionFace):
         self._jobs = Jobs(self._fail)
         self._settings = settings = Settings() if settings is None else settings
         self.opening = CaptureOpening(can_measure=is_preloading)
-        self._is_new_asked = False
+        self._is_new_asked, self._how_asked = False, AS_USUAL
+        self._unopened: Opened | None = None
+        """Opened, and held back until the user has agreed to stop the training."""
         self.calibrating, self.synchronising = Calibrating(), Synchronising()
         self.exporting = Exporting(self.notices, settings)
         self.live_training = LiveTraining(
@@ -164,7 +170,12 @@ class Session(SessionFace):
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self._shown_as)
         )
         self.selection = SelectionStatus()
-        self.editing = Edits(self.document, self.selecting, LostEdits(lambda: self.live_training.service))
+        self.editing = Edits(
+            self.document,
+            self.selecting,
+            LostEdits(lambda: self.live_training.service),
+            EditReaches(lambda: self.live_training.service),
+        )
         self.command_texts = CommandTexts(lambda: self.project, self.live_training.is_finished)
         self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
@@ -182,6 +193,9 @@ class Session(SessionFace):
         )
         self.files = ProjectFiles(
             self._jobs, self.notices, ask=self._ask, open_project=self.dispatch, settle=self.document.settle
+        )
+        self.starting_over = StartingOver(
+            self._jobs, self.notices, self.document, ask=self._ask, reopen=self._follow_settings
         )
         self.doctor = CaptureDoctor(self._jobs, self.notices, self.dispatch)
         self._attention = Attention()
@@ -215,6 +229,8 @@ class Session(SessionFace):
                     self.document.settle()
                 known = self._take_answers(command) if isinstance(command, commands.OpenCapture) else None
                 self.opener.open(command, current=current, recent=self.recent.entries, known=known)
+            case _ if isinstance(command, commands.ProjectCommand):
+                self._obey_about_project(command)
             case _ if isinstance(command, commands.FileCommand):
                 self.question = None
                 if isinstance(command, SaveProjectAs):  # what is written meanwhile would be half of it
@@ -242,6 +258,8 @@ class Session(SessionFace):
                 self.calibrating.look(folder)
             case commands.CalibrateVideos(request=request):
                 self.calibrating.start(request)
+            case commands.KeepCalibration():
+                self.calibrating.keep()
             case commands.StopCalibration():
                 self.calibrating.stop()
             case commands.TrainNextClip():
@@ -270,6 +288,8 @@ class Session(SessionFace):
                 look(command, self.timeline, self.views, self.playback)
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
+            case commands.CancelJob(name=name):
+                self._jobs.give_up(name)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
             case commands.ExamineCapture():
@@ -294,6 +314,38 @@ class Session(SessionFace):
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
+    def _obey_about_project(self, command: commands.ProjectCommand) -> None:
+        asked, self.question = self.question, None
+        match command:
+            case commands.SetProjectsFolder(folder=folder):
+                self.question = asked
+                self.opener.projects = projects_dir(folder)
+            case commands.LeaveTraining():
+                found, self._unopened = self._unopened, None
+                if found is not None:
+                    self._enter(found)
+            case _ if self.opened is None:
+                self.live_training.tell_nothing_open()
+            case commands.NewProject():
+                capture = self.opened.capture
+                self._obey(
+                    commands.OpenCapture(
+                        capture.path, is_new_project=True, is_asking=True, follow_links=capture.follow_links
+                    )
+                )
+            case commands.AskStartOver():
+                self._check_idle()
+                self.starting_over.ask(self.opened)
+            case commands.StartOver(preset=preset):
+                self._check_idle()
+                self.starting_over.start(self.opened, preset, asked)
+
+    def _check_idle(self) -> None:
+        """See that nothing works on clips. Raises ProjectError."""
+        self.live_training.check_idle()
+        self.clip_work.check_idle()
+        self.mending.check_idle()
+
     def _ask(self, question: Question | None) -> None:
         self.question = question
 
@@ -305,19 +357,11 @@ class Session(SessionFace):
         self.exporting.ask(self.opened, self.timeline, trained, names, settle=self.document.settle)
 
     def _change_settings(self, command: commands.SettingCommand) -> None:
-        """Replace settings that every clip shares; only while nothing was learned with the old ones."""
+        """Replace settings that every clip shares."""
         opened = self.opened
         if opened is None:
             return
         changed = changed_settings(opened.project.settings, command, opened.rig)
-        if opened.project.has_progress or self.live_training.is_busy:
-            self.notices.add(
-                "warn",
-                "What all clips share is fixed once training has begun",
-                "What was learned with them would be worthless.",
-                "Use another project folder for other values.",
-            )
-            return
         check_settings(changed, opened.capture)
         name = SETTING_NAMES.get(type(command), "change settings")
         self.document.change(replace(opened.project.document, settings=changed), name)
@@ -327,25 +371,31 @@ class Session(SessionFace):
             self.question = question
 
     def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
-        """See that nothing was learned with settings that change. Raises ProjectError."""
+        """See that no clip is finished with settings that change. Raises ProjectError."""
         opened = self.opened
         if opened is None:
             return
         if is_other_cut(before.settings, after.settings):
-            self.live_training.check_idle()
-            self.clip_work.check_idle()
-            self.mending.check_idle()
+            self._check_idle()
         check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """The document has changed: show what follows from it."""
         if before.settings != after.settings:
+            self._discard_unfitting(before.settings, after.settings)
             self._follow_settings()
         elif before.exclusions != after.exclusions and self.opened is not None:
             if self.live_training.service is not None:
                 self.live_training.service.catalog.judge_anew()
             self._open_residuals(self.opened)
         self._show_notes(after)
+
+    def _discard_unfitting(self, before: ProjectSettings, after: ProjectSettings) -> None:
+        assert self.opened is not None
+        found = discard_unfitting(self.opened.project, before, after)
+        if found.progress:
+            words = found.progress_words
+            self.notices.add("info", "Settings changed", f"{words[0].upper()}{words[1:]} is discarded.")
 
     def _show_notes(self, document: ProjectDocument) -> None:
         """Let the timeline show the document's markers, and views stand upright as it says."""
@@ -372,7 +422,7 @@ class Session(SessionFace):
         known = None if command.answers is None else self.opening.take(Path(command.path))
         if known is not None and command.answers is not None:
             self._settings.set_last_answers(answers_to_keep(command.answers, known))
-        self._is_new_asked = command.is_new_project
+        self._is_new_asked, self._how_asked = command.is_new_project, command.choices
         self.opening.close_page()
         self.calibrating.close_page()
         self.synchronising.close_page()
@@ -381,14 +431,33 @@ class Session(SessionFace):
 
     def _take_opened(self, found: Opened) -> None:
         if found.is_asking:
-            self.opening.ask(found.capture, self._settings.last_answers, is_new_project=self._is_new_asked)
+            self.opening.ask(
+                found.capture,
+                self._settings.last_answers,
+                is_new_project=self._is_new_asked,
+                folder=found.folder or Path(),
+            )
             return
         if found.choices:
-            self.question = ProjectQuestion(str(found.capture.path), found.choices, found.follow_links)
+            opened = None if self.project is None else self.project.folder.resolve()
+            self.question = ProjectQuestion(
+                str(found.capture.path), found.choices, found.follow_links, opened, self._how_asked
+            )
             return
         if found.project is None:  # it is open already
             self.view.home()
             return
+        if self.live_training.is_busy:
+            self._unopened = found
+            status = self.live_training.status(None)
+            name = project_name(found.project.folder.absolute(), found.project.settings.capture)
+            self.question = LeaveQuestion(name, status.clip_index or 0, status.step, status.n_steps, len(status.queue))
+            return
+        self._enter(found)
+
+    def _enter(self, found: Opened) -> None:
+        """Go to a project that was opened; the one that was open is left."""
+        assert found.project is not None
         self._keep_recent()  # the one that is left
         generation = 1 if self.opened is None else self.opened.generation + 1
         opened = opened_project(found.capture, found.project, generation)
@@ -400,6 +469,7 @@ class Session(SessionFace):
         self.versions.open(opened)
         self.clip_work.open(opened)
         self.mending.open(opened)
+        self.exporting.open(opened)
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
@@ -520,6 +590,9 @@ class Session(SessionFace):
 
     def _refresh(self) -> None:
         """Remake the status values."""
+        if self._unopened is not None and not isinstance(self.question, LeaveQuestion):  # the user stays
+            self._unopened.leave()
+            self._unopened = None
         follow_training(self.timeline, self.live_training)
         live, clip, opened = self.live_training, self.timeline.clip, self.opened
         live.note_anchors(self.playback.live_anchors(self.timeline))
@@ -556,6 +629,8 @@ class Session(SessionFace):
         if self._is_closed:
             return
         self._is_closed = True
+        if self._unopened is not None:
+            self._unopened.leave()
         self.document.close()
         self.selecting.close()
         self.live_training.close()

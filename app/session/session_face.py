@@ -8,27 +8,27 @@ import numpy as np
 
 from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
-from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
-from app.playback.coverage import Coverage
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.modes.coverage import Coverage
+from app.playback.modes.trails import Trails
+from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.playback.trails import Trails
-from app.playback.view_modes import MODES, ShownAs
-from app.playback.views import Views
+from app.playback.views.orbit_view import OrbitView
+from app.playback.views.views import Views
 from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject
 from app.project.project import Project
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HeatMap
 from app.residuals.residuals import Residuals
-from app.session.capture_doctor import CaptureDoctor
-from app.session.clip_versions import Versions
+from app.session.captures.capture_doctor import CaptureDoctor
+from app.session.captures.doctor_status import DoctorStatus
 from app.session.clips.clip_work import ClipWork
-from app.session.doctor_status import DoctorStatus
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting
-from app.session.live_training import LiveTraining
+from app.session.training.clip_versions import Versions
+from app.session.training.live_training import LiveTraining
 from app.status import (
     DependencyStatus,
     JobStatus,
@@ -233,6 +233,11 @@ class SessionFace:
             view_id=view_id,
             state_of=state_of,
         )
+
+    @property
+    def loading(self) -> tuple[int, int] | None:
+        """Frames around a seam that are ready, and all of them, while playing waits for that; None else."""
+        return self.playback.loading
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once: first and stop of each run, in order."""

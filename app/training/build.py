@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from app.background.kernels import warm_up_reporting
 from app.project.clip_versions import read_finished
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from app.training.interface import Training
 from app.training.messages import TrainJob
-from engine.backends.table import backend_called
+from engine.backends.table import process_backend
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
@@ -92,7 +93,7 @@ def clip_training(
         clip,
         config=config,
         method=method_of(config, previous=previous),
-        backend=backend_called(config.backend),
+        backend=process_backend(),
         holdout=holdout,
         reference=reference,
         seed=seed,

@@ -34,8 +34,8 @@ class Training(Protocol):
         """Build what the first step needs; may take a minute and report often."""
         ...
 
-    def step(self) -> StepStats:
-        """One optimiser step."""
+    def step(self, n: int = 1) -> StepStats:
+        """So many optimiser steps, or fewer where a phase ends."""
         ...
 
     def state(self) -> ClipState:

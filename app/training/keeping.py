@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from app.project.project import PROJECT_FILE
+from app.document.storing.document_file import PROJECT_FILE
 from app.training.messages import WarningRaised
 from engine.errors import ProjectError, TrainingError
 

@@ -10,6 +10,7 @@ import json
 import typing
 from dataclasses import asdict, dataclass, field, fields
 
+from engine.backends.table import chosen_name
 from engine.clip_files.clip_header import SettingValue
 from engine.storage.typed_json import to_type
 
@@ -31,6 +32,7 @@ class TrainJob:
         holdout: Camera indices never trained on.
         follow_links: Whether files of the capture may lie outside of its folder.
         frames: Of the capture, as in the project.
+        backend: Name of what is computed with.
         is_window_open: Leave a core, or at least right of way, to a window.
         live_view: How often snapshots are written, one of LIVE_VIEWS.
     """
@@ -47,6 +49,7 @@ class TrainJob:
     follow_links: bool = False
     live_view: str = "live"
     frames: tuple[int, int] | None = None
+    backend: str = field(default_factory=chosen_name)
 
 
 # ---------------------------------------------------------------- commands

@@ -6,7 +6,7 @@ import multiprocessing
 from contextlib import suppress
 from typing import Protocol
 
-from app.background.children import undisturbed
+from app.background.children import start_child
 from app.background.logs import tail
 from app.project.project import Project
 from app.training.build import build_training
@@ -61,8 +61,7 @@ class ProcessWorker:
             name=f"clip {job.clip_index}",
             daemon=True,
         )
-        with undisturbed():
-            self.process.start()
+        start_child(self.process)
         child_commands.close()  # the child has its own; ours would hide its end
         child_events.close()
 

@@ -37,6 +37,11 @@ class Rate:
         self._is_paused = True
 
     @property
+    def seconds(self) -> float:
+        """How much time is behind the rate; what has faded counts as far as it does."""
+        return self._seconds
+
+    @property
     def per_s(self) -> float:
         """Units per second; 0 when unknown."""
         return self._units / self._seconds if self._seconds > 0 else 0.0

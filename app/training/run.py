@@ -19,7 +19,8 @@ from typing import Any
 from app.background.memory import peak_mb
 from app.project.clip_versions import forget_oldest, set_aside
 from app.project.metrics_file import read_metrics
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from app.project.stage_seconds import memory_of, stages_of
 from app.training.interface import MakeTraining, Training
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
@@ -52,6 +53,7 @@ from engine.clip_files.clip_state import read_clip_header
 from engine.clip_files.compact import CompactClip
 from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError
 from engine.progress import Progress, StepStats
+from engine.storage.files import disk_error, open_to_append
 from engine.storage.json_files import checked_line
 from engine.training.preparation.stages import remove_stages
 
@@ -117,7 +119,10 @@ class TrainingRun:
         self._is_in_step = False
         self._is_checkpointed_in_step = False
         self._reported: tuple[str, str, float] = ("", "", -math.inf)
-        self._losses: list[float] = []
+        self._n_at_once = 1
+        """Steps until numbers are read: about as many as go into REPORT_EVERY_S."""
+        self._loss_sum, self._n_losses = 0.0, 0
+        """Of the steps since the last report."""
         self._gradient_norms: list[float] = []
         """Of all steps of this process."""
         self._n_clipped = 0
@@ -137,6 +142,7 @@ class TrainingRun:
         self._snapshots = SnapshotWriter(Path(job.project) / "live", job.clip_index)
         self._snapshot_refusals = Refusals("The live view could not be written", send)
         self._checkpoint_refusals = Refusals("What was learned so far could not be kept", send)
+        self._curve_refusals = Refusals("The curves could not be written", send)
         self._folder: FolderWatch | None = None
         self._finished: CompactClip | None = None
         """Trained to the end, but not in its place yet."""
@@ -145,7 +151,7 @@ class TrainingRun:
     # ---------------------------------------------------------------- the loop
 
     def advance(self) -> bool:
-        """Prepare, or do one step and what is due after it. False when the run has ended and said so."""
+        """Prepare, or do some steps and what is due after them. False when the run has ended and said so."""
         try:
             try:
                 return self._advance()
@@ -167,9 +173,14 @@ class TrainingRun:
             return self._finish(training)
         self._is_in_step, self._is_checkpointed_in_step = True, False
         self._watch.enter(TRAINING)
-        stats = training.step()
+        started_s = self._clock()
+        stats = training.step(self._n_at_once)
         self._is_in_step = False
-        self._after_step(training, stats)
+        took_s = self._clock() - started_s
+        if self._can_wait and took_s > 0.0:
+            wanted = round(len(stats.gradient_norms) * REPORT_EVERY_S / took_s)
+            self._n_at_once = min(max(wanted, 1), 2 * self._n_at_once)
+        self._after_steps(training, stats)
         return True
 
     def _start(self) -> Training:
@@ -214,20 +225,20 @@ class TrainingRun:
         self._rate.update(training.steps_done, self._clock())
         return training
 
-    def _after_step(self, training: Training, stats: StepStats) -> None:
+    def _after_steps(self, training: Training, stats: StepStats) -> None:
         self._watch.enter(KEEPING)
         now_s = self._clock()
-        self._losses.append(stats.loss)
-        self._gradient_norms.append(stats.gradient_norm)
-        self._n_clipped += stats.is_clipped
+        self._loss_sum += stats.loss * len(stats.gradient_norms)
+        self._n_losses += len(stats.gradient_norms)
+        self._gradient_norms += stats.gradient_norms
+        self._n_clipped += stats.n_clipped
         is_last = training.is_finished
         if self._report_cadence.is_due(now_s) or is_last:
             self._report_cadence.done(now_s, now_s)
             self._check_folder()
             self._rate.update(stats.step, now_s)
-            loss = sum(self._losses) / len(self._losses)
-            gradient_norm = max(self._gradient_norms[-len(self._losses) :])
-            self._losses = []
+            loss, gradient_norm = self._loss_sum / self._n_losses, max(self._gradient_norms[-self._n_losses :])
+            self._loss_sum, self._n_losses = 0.0, 0
             self._send(
                 StepReported(
                     step=stats.step,
@@ -268,11 +279,15 @@ class TrainingRun:
         return False
 
     def _try_again(self, training: Training, error: DiskError) -> bool:
-        """The disk refused a finished clip: keep it as a checkpoint meanwhile. Whether to go on trying.
+        """The disk refused a finished clip: make room, or keep it as a checkpoint meanwhile. Whether to go on trying.
 
         Raises:
             DiskError: It is given up.
         """
+        assert self._project is not None
+        self._snapshots.clear()
+        if remove_stages(self._project.prep_dir, self._job.clip_index):  # of no more use, and often what fills a disk
+            return True
         is_first = self._retries.is_first
         is_kept = self._checkpoint_step() == training.steps_done or self._write_checkpoint(training)
         if not self._retries.failed(is_kept=is_kept):
@@ -473,10 +488,10 @@ class TrainingRun:
         row = {key: round(value, 6) if isinstance(value, float) else value for key, value in row.items()}
         try:
             path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
-            with path.open("a", encoding="utf-8") as file:
+            with open(open_to_append(path), "a", encoding="utf-8") as file:
                 file.write(checked_line(row))
         except OSError as error:
-            logger.warning("a metrics row could not be written (%s) - %s", error.strerror, path)
+            self._curve_refusals.refused(disk_error(error, what="A point of them", path=path))
 
     # ---------------------------------------------------------------- ends
 

@@ -557,12 +557,13 @@ class TrainingService:
     def _clip_status(self, clip_index: int, live_counts: tuple[int, int] | None) -> ClipStatus:
         record, run = self.catalog[clip_index], self._run
         n_inherited, n_own = record.n_anchors if live_counts is None else live_counts
-        shown, step, n_steps, psnr = record.state, record.step, record.n_steps, record.held_out_psnr
-        reason = record.reason
+        shown, step, n_steps, reason = record.state, record.step, record.n_steps, record.reason
+        psnr, is_whole = record.held_out_psnr, record.held_out_whole
         if clip_index == self.running_clip and run is not None:
             words = {"starting": "preparing", "preparing": "preparing", "paused": "paused"}
             shown, step, n_steps = words.get(self.state, "training"), run.step, run.n_steps
-            psnr = record.held_out_psnr if run.held_out_psnr is None else run.held_out_psnr
+            if run.held_out_psnr is not None:
+                psnr, is_whole = run.held_out_psnr, False
         elif clip_index in self.queue:
             shown = "queued"
         elif clip_index in self.queue.failed and shown in ("untrained", "stopped"):
@@ -578,4 +579,5 @@ class TrainingService:
             resume_step=record.resume_step,
             reason=reason,
             exposure_change=record.exposure_change,
+            held_out_whole=is_whole,
         )

@@ -16,12 +16,15 @@ from pathlib import Path
 
 from app.background.kernels import use_threads
 from app.background.logs import FORMAT, PrintableFormatter
-from app.background.priority import lower_process
 from app.training.interface import MakeTraining
-from app.training.messages import Command, Event, TrainJob, decode, encode
+from app.training.messages import Command, Event, TrainJob, WarningRaised, decode, encode
 from app.training.run import TrainingRun
+from engine.backends.table import choose_backend
+from engine.children.priority import lower_process
+from engine.errors import DiskError
 from engine.kernels.cache import use_kernel_cache
 from engine.parallel import n_cores
+from engine.storage.files import disk_error, open_to_append
 
 logger = logging.getLogger(__name__)
 
@@ -33,26 +36,33 @@ def n_training_threads(cores: int, *, is_window_open: bool) -> int:
 
 def main(job_bytes: bytes, commands: Connection, events: Connection, log_path: str, make: MakeTraining) -> None:
     """Runs in the child until the clip is finished, stopped or failed."""
-    _redirect_output(Path(log_path))
+    refused = _redirect_output(Path(log_path))
     use_kernel_cache()  # before the training imports kernels
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
     job = decode(job_bytes)
     assert isinstance(job, TrainJob)
     n_threads = _set_threads(is_window_open=job.is_window_open)
+    choose_backend(job.backend)
     logger.info("worker %d trains clip %d with %d threads", os.getpid(), job.clip_index, n_threads)
-    run = TrainingRun(job, receive=_receiver(commands), send=_sender(events), make_training=make, n_threads=n_threads)
+    send = _sender(events)
+    if refused is not None:
+        send(WarningRaised("The log of the training could not be written", str(refused)))
+    run = TrainingRun(job, receive=_receiver(commands), send=send, make_training=make, n_threads=n_threads)
     while run.advance():
         pass
     logger.info("worker %d ends", os.getpid())
     _flush_output()
 
 
-def _redirect_output(path: Path) -> None:
-    """Everything printed, by us, by libraries or by a crash, goes to the log file; nowhere where that cannot be."""
+def _redirect_output(path: Path) -> DiskError | None:
+    """Everything printed, by us, by libraries or by a crash, goes to the log file; nowhere where that cannot be, which
+    is returned."""
+    refused = None
     try:
         path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
-        descriptor = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o644)
-    except OSError:
+        descriptor = open_to_append(path)
+    except OSError as error:
+        refused = disk_error(error, what="The log", path=path)
         descriptor = os.open(os.devnull, os.O_WRONLY)
     sys.stdout.flush()
     sys.stderr.flush()
@@ -61,6 +71,7 @@ def _redirect_output(path: Path) -> None:
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, force=True)
     for handler in logging.getLogger().handlers:
         handler.setFormatter(PrintableFormatter(FORMAT))
+    return refused
 
 
 def _point_output_to(descriptor: int) -> None:

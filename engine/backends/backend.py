@@ -8,6 +8,7 @@ from typing import Protocol
 
 from torch import Tensor
 
+from engine.backends.phase import Phase, PhasePlan
 from engine.model.model_backend import ModelBackend
 
 ADAM_BETAS = 0.9, 0.999
@@ -22,24 +23,35 @@ class PhotometricLoss:
     Attributes:
         loss: Scalar, differentiable in image and gain.
         mean_square: Mean of (image * gain - truth)^2 over the whole picture; what does not count adds zero, and so do
-            tiles that are not active.
+            tiles that are not active. Scalar, without gradient.
     """
 
     loss: Tensor
-    mean_square: float
+    mean_square: Tensor
 
 
 class Adam(Protocol):
     """Moments of the parameters. Owns neither parameters nor rates. A parameter without a gradient is left alone,
-    moments and step count included."""
+    moments and step count included.
 
-    def norm(self, gradients: Mapping[str, Tensor]) -> float:
-        """Euclidean norm over all gradients; not finite if one of them is not."""
-        ...
+    Attributes:
+        steps: How often each parameter was updated; whoever takes back a step that changed nothing sets it back.
+    """
 
-    def update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
-        """One step of the parameters that have a gradient, which is multiplied by `scale`. Called after `norm` of the
-        same gradients."""
+    steps: dict[str, int]
+
+    def step(
+        self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], *, max_norm: float, is_sound: Tensor
+    ) -> Tensor:
+        """One step of the parameters that have a gradient. It counts, but changes no value, where `is_sound` is false
+        or the norm is not finite; the host need not know.
+
+        Args:
+            max_norm: Gradients of a larger norm are scaled down to it; 0 for none.
+            is_sound: Scalar bool, on the device.
+        Returns:
+            Euclidean norm over all gradients, not finite if one of them is not. Scalar
+        """
         ...
 
     def state(self) -> dict[str, dict[str, Tensor]]:
@@ -65,6 +77,14 @@ class Backend(ModelBackend, Protocol):
     @property
     def name(self) -> str:
         """As in `engine.backends.table`."""
+        ...
+
+    def is_available(self) -> bool:
+        """Whether it works on this machine, tried on something small; at most a second, and without compiling."""
+        ...
+
+    def warm_up(self, *, is_training: bool) -> None:
+        """Load what its operations need into this process: those of a training step, or of pictures alone."""
         ...
 
     def photometric_loss(
@@ -97,4 +117,8 @@ class Backend(ModelBackend, Protocol):
 
     def adam(self, parameters: Mapping[str, Tensor]) -> Adam:
         """Fresh moments for these parameters, which must keep their memory; of this back end's dtype and device."""
+        ...
+
+    def phase(self, plan: PhasePlan) -> Phase | None:
+        """Its own way to do all steps of a phase; None where they are done one by one by the operations above."""
         ...

@@ -1,8 +1,9 @@
 """How far cameras agree with the matches that were found before there were any cameras.
 
 A small error of sightings says nothing about misplaced cameras, since matches that do not fit are left out of it. Two
-cameras that see the same have matches that fit one motion, and the cameras either explain nearly all of these or hardly
-any: then the pattern repeats, or one of the two stands elsewhere.
+cameras that see the same have matches that fit one motion. Right cameras explain all of these, but for patterns that
+repeat; cameras that stand elsewhere explain hardly any, or, in a room that looks alike from several sides, four fifths:
+so what counts is whom a camera explains all matches with.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from engine.calibration.cameras import Cameras
 from engine.calibration.matching import KeyPoints, Pair
@@ -20,44 +22,63 @@ REACH_PX = 6.0
 MIN_MATCHES = 15
 """Of two cameras; fewer fit one motion by chance."""
 AGREES = 0.8
-"""Share of a pair's matches that is explained where both cameras are right and the pattern does not repeat."""
+"""Share of a pair's matches that is explained where both cameras may be right."""
 CONTRADICTS = 0.4
 """Share at most of a pair's matches that is explained where a camera is misplaced, or a pattern repeats."""
 MIN_AGREEING = 2
 """Other cameras that have to agree: one neighbour may be misplaced together with it."""
+FIRM, MIN_FIRM_MATCHES = 0.97, 30
+"""Share, and matches, from which on a pair holds together: right neighbours explain 99 to 100 %, while at most 95 % are
+explained by chance where a room looks alike from several sides."""
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Of each camera with the verified matches it has with others.
+    """Of cameras with the verified matches they have with each other.
 
     Attributes:
-        n_matches: Verified matches. [C]
-        n_explained: Those the cameras explain. [C]
-        n_agreeing: Matches with the camera that has most of those that agree with it. [C]
-        n_contradicting: Matches with the camera that has most of those that contradict. [C]
-        n_neighbours: Cameras that agree with it. [C]
+        n_matches: Of every two cameras. [C, C]
+        n_explained: Those the cameras explain. [C, C]
     """
 
     n_matches: np.ndarray
     n_explained: np.ndarray
-    n_agreeing: np.ndarray
-    n_contradicting: np.ndarray
-    n_neighbours: np.ndarray
 
     @property
     def shares(self) -> np.ndarray:
         """Of each camera's matches, those that are explained. [C]"""
-        return self.n_explained / np.maximum(self.n_matches, 1)
+        return self.n_explained.sum(1) / np.maximum(self.n_matches.sum(1), 1)
 
     @property
-    def is_doubtful(self) -> np.ndarray:
-        """Whether the strongest witness speaks against a camera's place, or too few speak for it. [C]
+    def is_plausible(self) -> np.ndarray:
+        """Whether two others agree with each camera, among them its strongest witness. For rough estimates. [C]"""
+        agrees = (self.n_matches > 0) & (self.n_explained >= AGREES * self.n_matches)
+        contradicts = self.n_explained <= CONTRADICTS * self.n_matches
+        most_for, most_against = ((self.n_matches * chosen).max(1) for chosen in (agrees, contradicts))
+        return (most_for >= most_against) & (agrees.sum(1) >= MIN_AGREEING)
 
-        Nearest neighbours have most matches, far more than patterns that repeat, so a camera that its strongest
-        witness contradicts stands elsewhere.
+    @property
+    def is_firm(self) -> np.ndarray:
+        """Whether two cameras explain all of their matches, as good as. [C, C]"""
+        return (self.n_matches >= MIN_FIRM_MATCHES) & (self.n_explained >= FIRM * self.n_matches)
+
+    @property
+    def is_placed(self) -> np.ndarray:
+        """Which cameras hold together: the largest group of firm pairs, three by three, and who has two firm partners
+        in it. [C]
+
+        In a chain of pairs each can be as far from the next as it likes; three cameras that all agree cannot.
         """
-        return (self.n_agreeing < self.n_contradicting) | (self.n_neighbours < MIN_AGREEING)
+        firm = self.is_firm.astype(np.int64)
+        links = (firm > 0) & (firm @ firm > 0)
+        _, groups = connected_components(links, directed=False)
+        sizes = np.bincount(groups[links.any(1)], minlength=len(firm) + 1)
+        is_placed, n_placed = groups == sizes.argmax(), 0
+        is_placed &= links.any(1)
+        while is_placed.sum() > n_placed:
+            n_placed = is_placed.sum()
+            is_placed |= firm[:, is_placed].sum(1) >= MIN_AGREEING
+        return is_placed
 
 
 def agreement(
@@ -78,11 +99,8 @@ def agreement(
         if a in place and b in place and len(found) >= MIN_MATCHES
     }
     fitting = fitting_matches(matches, [key_points[row] for row in rows], cameras, REACH_PX * width / 640)
-    sums, most = np.zeros((3, len(rows)), dtype=np.int64), np.zeros((2, len(rows)), dtype=np.int64)
-    for pair, found in matches.items():
-        n, n_fitting = len(found), len(fitting[pair])
-        agrees, contradicts = n_fitting >= AGREES * n, n_fitting <= CONTRADICTS * n
-        for camera in pair:
-            sums[:, camera] += (n, n_fitting, agrees)
-            most[:, camera] = np.maximum(most[:, camera], (agrees * n, contradicts * n))
-    return Agreement(sums[0], sums[1], most[0], most[1], sums[2])
+    n_matches, n_explained = np.zeros((2, len(rows), len(rows)), dtype=np.int64)
+    for (a, b), found in matches.items():
+        n_matches[a, b] = n_matches[b, a] = len(found)
+        n_explained[a, b] = n_explained[b, a] = len(fitting[a, b])
+    return Agreement(n_matches, n_explained)

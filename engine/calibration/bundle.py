@@ -6,7 +6,6 @@ lens numbers shared among cameras or not. Levenberg-Marquardt with the points el
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +15,6 @@ from engine.calibration.cameras import Cameras, distort, lens_jacobian, plane_ja
 
 MIN_SCALE_PX = 0.25
 """No key point is found more exactly than this."""
-POINTS_AT_ONCE = 1000
-"""Points that are eliminated together; bounds memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,7 +207,7 @@ class _System:
 
     def __init__(self, A, B, target, seen: Observations, n_cameras: int, n_points: int, share) -> None:
         n_params = A.shape[2]
-        self._seen, self._share, self._size = seen, share, n_cameras * n_params
+        self._share, self._size = share, n_cameras * n_params
         self._H, self._g = np.zeros((self._size, self._size)), np.zeros(self._size)
         for camera in range(n_cameras):
             rows = np.flatnonzero(seen.cameras == camera)
@@ -220,9 +217,11 @@ class _System:
             self._g[place] = of_camera.T @ target[rows].reshape(-1)
         self._V = _sums(np.einsum("nki,nkj->nij", B, B).reshape(-1, 9), seen.points, n_points).reshape(-1, 3, 3)
         self._g_points = _sums(np.einsum("nki,nk->ni", B, target), seen.points, n_points)
-        self._joints = np.einsum("nki,nkj->nij", A, B)
-        self._order = np.argsort(seen.points, kind="stable")
-        self._ends = np.searchsorted(seen.points[self._order], np.arange(n_points + 1))
+        rows = seen.cameras[:, None, None] * n_params + np.arange(n_params)[:, None]
+        columns = seen.points[:, None, None] * 3 + np.arange(3)
+        joints = np.einsum("nki,nkj->nij", A, B)
+        places = (np.broadcast_to(place, joints.shape).reshape(-1) for place in (rows, columns))
+        self._joints = sparse.csr_matrix((joints.reshape(-1), tuple(places)), shape=(self._size, 3 * n_points))
 
     def expect(self, stiffness: np.ndarray, expected: np.ndarray) -> None:
         """Add what is expected of cameras: both [C, P]."""
@@ -233,31 +232,17 @@ class _System:
         """What to take from the numbers of the cameras [C P] and from the points [M, 3]."""
         diagonal = np.maximum(np.einsum("mii->mi", self._V), 1e-9)
         inverse = np.linalg.inv(self._V + damping * diagonal[:, :, None] * np.eye(3))
-        H, g = self._H.copy(), self._g.copy()
-        for first, W in self._chunks():
-            m = W.shape[1]
-            weighted = np.einsum("cmi,mij->cmj", W, inverse[first : first + m]).reshape(self._size, -1)
-            H -= weighted @ W.reshape(self._size, -1).T
-            g -= weighted @ self._g_points[first : first + m].reshape(-1)
+        blocks = (inverse, np.arange(len(inverse)), np.arange(len(inverse) + 1))
+        weighted = self._joints @ sparse.bsr_matrix(blocks, shape=(3 * len(inverse), 3 * len(inverse)))
+        H = self._H - (weighted @ self._joints.T).toarray()
+        g = self._g - weighted @ self._g_points.reshape(-1)
         reduced = self._share.T @ (self._share.T @ H.T).T
         size = 1 / np.sqrt(np.maximum((self._share.T @ (self._share.T @ self._H).T).diagonal(), 1e-12))
         scaled = reduced * size[:, None] * size + max(damping, 1e-9) * np.eye(len(size))
         sought = size * np.linalg.solve(scaled, size * (self._share.T @ g))
         cameras_step = self._share @ sought
-        points_right = self._g_points.copy()
-        for first, W in self._chunks():
-            points_right[first : first + W.shape[1]] -= np.tensordot(cameras_step, W, axes=1)
+        points_right = self._g_points - (self._joints.T @ cameras_step).reshape(-1, 3)
         return cameras_step, np.einsum("mij,mj->mi", inverse, points_right)
-
-    def _chunks(self) -> Iterator[tuple[int, np.ndarray]]:
-        """First point, and what joins some points to all cameras: [C P, m, 3]."""
-        n_params = self._joints.shape[1]
-        for first in range(0, len(self._V), POINTS_AT_ONCE):
-            last = min(first + POINTS_AT_ONCE, len(self._V))
-            rows = self._order[self._ends[first] : self._ends[last]]
-            W = np.zeros((self._size // n_params, last - first, n_params, 3))
-            W[self._seen.cameras[rows], self._seen.points[rows] - first] = self._joints[rows]
-            yield first, np.ascontiguousarray(W.transpose(0, 2, 1, 3)).reshape(self._size, last - first, 3)
 
 
 def _moved(cameras: Cameras, step: np.ndarray) -> Cameras:

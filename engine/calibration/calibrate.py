@@ -5,31 +5,49 @@ Nothing is written but temporary files, and the folder of videos is only read.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
-from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCamera
+from engine.calibration.calibrated import Calibration
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.videos import find_videos
-from engine.camera.lens import Lens
-from engine.camera.rig import CameraRig
-from engine.children.running import STALL_S, child_folder, run_child
-from engine.errors import CaptureError, PreparationError
+from engine.children.folder import child_folder
+from engine.children.kind import STALL_S, ChildFailed, ChildKind
+from engine.children.process import run_child
+from engine.errors import CaptureError, EngineError, PreparationError
 from engine.progress import Progress, ReportProgress
-from engine.storage.files import disk_error
 
 FOLDER_PREFIX = "clipgstream-calibration-"
+
+
+class CalibrationJob(msgspec.Struct, frozen=True):
+    """What the child is asked; see `calibrate`. scratch: A folder for its files."""
+
+    folder: Path
+    options: CalibrationOptions
+    follow_links: bool
+    scratch: Path
+
+
+CALIBRATING: ChildKind[CalibrationJob, Progress, Calibration] = ChildKind(
+    place="engine.calibration.calibrate:CALIBRATING",
+    work="engine.calibration.child:main",
+    what="The calibration process",
+    job=CalibrationJob,
+    result=Calibration,
+    stall_s=STALL_S,
+    is_spreading=True,
+)
 
 
 def calibrate(
     folder: Path,
     options: CalibrationOptions,
     *,
+    follow_links: bool = False,
     report: ReportProgress,
     alive: Callable[[], None] = lambda: None,
     stall_s: float = STALL_S,
@@ -39,6 +57,7 @@ def calibrate(
     Args:
         folder: One video, or one folder of images, per camera.
         options: Lens, scale, up.
+        follow_links: Whether links in the folder may lead out of it.
         report: Told stage and share of the whole that is done. What it raises ends the work.
         alive: Called several times a second; what it raises ends the work within a moment.
         stall_s: Seconds without any work of the child after which it is taken for hung.
@@ -47,26 +66,18 @@ def calibrate(
         PreparationError: The cameras could not be found from these videos; says what helps.
         DiskError: There is no room for temporary files.
     """
-    names = [video.name for video in find_videos(folder)]
+    names = [video.name for video in find_videos(folder, follow_links=follow_links)]
     check_distance(options, names, folder)
     with child_folder(FOLDER_PREFIX, what="Temporary files of the calibration") as scratch:
-        job, result = scratch / "job.json", scratch / "result.npz"
-        told = _Told(job.with_name("progress.json"), report)
-
-        def look() -> None:
-            alive()
-            told.look()
-
+        job = CalibrationJob(folder.absolute(), options, follow_links, scratch)
+        report(Progress("Starting", 0.0))
         try:
-            job.write_bytes(msgspec.json.encode({"folder": str(folder.absolute()), "options": options}))
-        except OSError as error:
-            raise disk_error(error, what="Temporary files of the calibration", path=job) from error
-        reason, _ = run_child(
-            "engine.calibration.child", job, result, what="The calibration process", alive=look, stall_s=stall_s
-        )
-        if reason:
-            raise PreparationError(f"{reason}.", hint="Try again; the log may say more.", path=folder)
-        return _read_result(result, folder)
+            return run_child(CALIBRATING, job, report=report, alive=alive, stall_s=stall_s, folder=scratch)
+        except ChildFailed as error:
+            raise PreparationError(f"{error}.", hint="Try again; the log may say more.", path=folder) from error
+        except EngineError as error:
+            error.path = folder
+            raise
 
 
 def check_distance(options: CalibrationOptions, names: list[str], folder: Path) -> None:
@@ -81,45 +92,3 @@ def check_distance(options: CalibrationOptions, names: list[str], folder: Path) 
     if known.first == known.second or not (np.isfinite(known.metres) and known.metres > 0):
         text = f"The distance from {known.first} to {known.second} is {known.metres:g} m."
         raise CaptureError(text, hint="Give a distance above 0 between two cameras.", path=folder)
-
-
-class _Told:
-    """What the child has said last."""
-
-    def __init__(self, path: Path, report: ReportProgress) -> None:
-        self._path, self._report, self._last = path, report, b""
-
-    def look(self) -> None:
-        """Pass on what is new."""
-        with suppress(OSError):
-            said = self._path.read_bytes()
-            if said == self._last:
-                return
-            self._last = said
-            document = json.loads(said)
-            self._report(Progress(document["stage"], document["done"], document["message"]))
-
-
-def _read_result(path: Path, folder: Path) -> Calibration:
-    with np.load(path) as arrays:
-        document = json.loads(str(arrays["document"]))
-        if "error" in document:
-            kind = CaptureError if document["is_bad_input"] else PreparationError
-            raise kind(document["error"], hint=document["hint"], path=folder)
-        rig = CameraRig(
-            tuple(document["names"]), arrays["world_to_camera"], arrays["Ks"], arrays["image_sizes"].astype(np.int64)
-        )
-        found = CalibratedRig(
-            rig=rig,
-            lenses=tuple(Lens(document["lens_model"], tuple(row)) for row in arrays["lens_params"].tolist()),
-            points=arrays["points"],
-            point_errors_px=arrays["point_errors_px"],
-            camera_errors_px=arrays["camera_errors_px"],
-            n_sightings=arrays["n_sightings"],
-            explained_shares=arrays["explained_shares"],
-            doubts=tuple(document["doubts"]),
-            is_metric=document["is_metric"],
-            up=document["up"],
-        )
-    missing = tuple(MissingCamera(**row) for row in document["missing"])
-    return Calibration(found, missing, tuple(document["warnings"]))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from engine.calibration.pair_lines import PairCounts
 from engine.camera.lens import Lens
 from engine.camera.rig import CameraRig
 
@@ -24,7 +25,7 @@ class CalibratedRig:
         n_sightings: Points that each camera sees. [C]
         explained_shares: Of the matches each camera has with others, found before there were cameras, those that the
             cameras explain; low where patterns repeat or a camera is misplaced. [C]
-        doubts: Why each camera may be misplaced; empty for one that nothing speaks against.
+        doubts: Why the place of each camera cannot be trusted; empty for one that nothing speaks against.
         is_metric: Whether units are metres, by a known distance.
         up: What the up axis was found from: "floor" or "cameras".
     """
@@ -66,8 +67,12 @@ class Calibration:
         found: The cameras that were found, in natural order.
         missing: Those that were not.
         warnings: What is doubtful about it, in sentences.
+        failure: Why it has failed although cameras were found; empty where it has not.
+        pairs: Every two cameras that were found, with their matches.
     """
 
     found: CalibratedRig
     missing: tuple[MissingCamera, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    failure: str = ""
+    pairs: tuple[PairCounts, ...] = ()

@@ -1,4 +1,4 @@
-"""Key points of one camera: SIFT by pycolmap, in a process of its own (engine.calibration.child)."""
+"""Key points of one camera: SIFT by pycolmap, in a process of its own (engine.calibration.features_child)."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ def extract(pictures: CameraPictures) -> KeyPoints:
 
     Backgrounds get affine shapes and descriptors pooled over sizes, which find three times as many right matches
     between cameras 20 degrees apart, and cost a second each; moving parts get plain ones.
+
+    Args:
+        pictures: Of one camera.
     """
     found = [_key_points(_extractor(MAX_KEY_POINTS, is_careful=True), pictures.background)]
     moments = [np.zeros(len(found[0][0]), dtype=np.int64)]

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from engine.calibration.agreement import MIN_AGREEING, Agreement, agreement
+from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCamera
 from engine.calibration.cameras import Cameras
-from engine.calibration.matching import KeyPoints, Pair
+from engine.calibration.matching import KeyPoints, Pair, all_pairs
 from engine.calibration.options import CalibrationOptions
+from engine.calibration.pair_lines import FEW_MATCHES, PairCounts
 from engine.calibration.solving import Solution
-from engine.calibration.videos import PlainVideo
+from engine.calibration.strain import is_strained
+from engine.calibration.videos import MIN_CAMERAS, PlainVideo
 from engine.calibration.world import find_up, known_scale, unit_scale, upright
+from engine.camera.lens import Lens, LensModel
+from engine.camera.rig import CameraRig
 
 FEW_KEY_POINTS = 150
-FEW_MATCHES = 30
 WEAK_SIGHTINGS = 60
-MANY_DOUBTFUL = 2
-"""Cameras that matches speak against; with so many, whole groups of cameras have been found in wrong places."""
-ODD_FOCAL = 0.2
-"""Of ln(focal length) from the median: cameras of one rig rarely differ by more, misplaced ones do."""
-LENS_MODEL = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
+MAX_DOUBTFUL = 0.25
+"""Share of the cameras that were found. Where matches contradict more, whole groups of cameras have been found in wrong
+places, and those that agree may be such a group."""
+LENS_MODEL: dict[str, LensModel] = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
 """Names of engine.camera.lens."""
 
 
@@ -32,8 +33,8 @@ def finished(
     verified: dict[Pair, np.ndarray],
     sizes: np.ndarray,
     options: CalibrationOptions,
-) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Arrays and the document of a result, as engine.calibration.calibrate reads them."""
+) -> Calibration:
+    """What is handed back of a solution."""
     rows, tracks, errors = solution.rows, solution.tracks, solution.errors
     names = [videos[row].name for row in rows]
     warnings: list[str] = []
@@ -44,56 +45,63 @@ def finished(
     cameras, points = upright(solution.cameras, tracks.points, up, origin, scale)
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
     agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
-    doubts = _doubts(solution, n_sightings, agreed, sizes)
-    named = [name for name, doubt in zip(names, doubts, strict=True) if doubt]
-    if named:
-        warnings.append(
-            f"The places of these cameras cannot be trusted: {', '.join(named)}. Look at them before you train, and "
-            "leave out those that are wrong, or film again with more that they and their neighbours both see."
-        )
-    if agreed.is_doubtful.sum() >= MANY_DOUBTFUL:
-        warnings.append("Matches contradict several cameras. All others may be misplaced with them.")
+    strained = is_strained(rows, solution.cameras, key_points, verified, sizes, agreed.is_firm)
+    doubts = _doubts(names, n_sightings, agreed, strained)
     native = np.array([videos[row].size for row in rows], dtype=np.int64)
-    arrays = {
-        "world_to_camera": _poses(cameras),
-        "Ks": _matrices(cameras, native / sizes[rows]),
-        "image_sizes": native,
-        "lens_params": cameras.lens_params,
-        "points": points,
-        "point_errors_px": _means(errors, tracks.seen.points, len(points)),
-        "camera_errors_px": _medians(errors, tracks.seen.cameras, len(rows)) * (native / sizes[rows])[:, 0],
-        "n_sightings": n_sightings,
-        "explained_shares": agreed.shares,
-    }
-    document = {
-        "names": names,
-        "lens_model": LENS_MODEL[options.lens],
-        "is_metric": is_metric,
-        "up": up_from,
-        "doubts": doubts,
-        "missing": [_missing(row, rows, videos, key_points, verified) for row in _absent(rows, len(videos))],
-        "warnings": warnings,
-    }
-    return arrays, document
+    poses, Ks = _poses(cameras), _matrices(cameras, native / sizes[rows])
+    found = CalibratedRig(
+        rig=CameraRig(tuple(names), poses, Ks, native),
+        lenses=tuple(Lens(LENS_MODEL[options.lens], tuple(row)) for row in cameras.lens_params.tolist()),
+        points=points,
+        point_errors_px=_means(errors, tracks.seen.points, len(points)),
+        camera_errors_px=_medians(errors, tracks.seen.cameras, len(rows)) * (native / sizes[rows])[:, 0],
+        n_sightings=n_sightings,
+        explained_shares=agreed.shares,
+        doubts=tuple(doubts),
+        is_metric=is_metric,
+        up=up_from,
+    )
+    missing = tuple(_missing(row, rows, videos, key_points, verified) for row in _absent(rows, len(videos)))
+    return Calibration(found, missing, tuple(warnings), _failure(agreed), _pairs(names, agreed))
 
 
-def _doubts(solution: Solution, n_sightings: np.ndarray, agreed: Agreement, sizes: np.ndarray) -> list[str]:
+def _doubts(names: list[str], n_sightings: np.ndarray, agreed: Agreement, strained: np.ndarray) -> list[str]:
     """Why each camera may be misplaced; empty for those that nothing speaks against."""
-    shares = solution.cameras.focals / sizes[solution.rows].max(1)
-    is_odd = np.abs(np.log(shares / np.median(shares))) > ODD_FOCAL
-    doubts = []
+    is_placed, doubts = agreed.is_placed, []
     for row, n in enumerate(n_sightings.tolist()):
-        against, n_for = int(agreed.n_contradicting[row]), int(agreed.n_agreeing[row])
-        if agreed.n_neighbours[row] < MIN_AGREEING:
-            how_many = ("no camera agrees", "one camera agrees")[int(agreed.n_neighbours[row])]
-            doubts.append(f"{how_many} with its place; {MIN_AGREEING} are needed")
-        elif agreed.is_doubtful[row]:
-            doubts.append(f"{against} matches with one camera speak against its place, {n_for} with another for it")
-        elif is_odd[row]:
-            doubts.append("its focal length is far from those of the others; right only if its lens or zoom is another")
-        else:
+        partners = [names[other] for other in np.flatnonzero(agreed.is_firm[row])]
+        if is_placed[row] and strained[row]:
+            doubts.append("its lens was bent to make its place fit: its matches miss, its principal point is far off")
+        elif is_placed[row]:
             doubts.append(f"only {n} points" if n < WEAK_SIGHTINGS else "")
+        elif not partners:
+            doubts.append(f"no camera agrees with its place; {_strongest(row, names, agreed)}")
+        elif len(partners) < MIN_AGREEING:
+            doubts.append(f"one camera agrees with its place ({partners[0]}); {MIN_AGREEING} are needed")
+        else:
+            doubts.append(f"those that agree with its place ({', '.join(partners)}) do not agree with the others")
     return doubts
+
+
+def _strongest(row: int, names: list[str], agreed: Agreement) -> str:
+    other = int(agreed.n_matches[row].argmax())
+    n, n_explained = int(agreed.n_matches[row, other]), int(agreed.n_explained[row, other])
+    return f"{n_explained} of its {n} matches with {names[other]} are explained"
+
+
+def _failure(agreed: Agreement) -> str:
+    """Why nothing of it can be trusted; empty where most cameras hold together."""
+    n, n_placed = len(agreed.is_placed), int(agreed.is_placed.sum())
+    if n_placed >= max(MIN_CAMERAS, (1 - MAX_DOUBTFUL) * n):
+        return ""
+    return f"Matches contradict the places of {n - n_placed} of {n} cameras, so none of them can be trusted."
+
+
+def _pairs(names: list[str], agreed: Agreement) -> tuple[PairCounts, ...]:
+    return tuple(
+        PairCounts(names[a], names[b], int(agreed.n_matches[a, b]), int(agreed.n_explained[a, b]))
+        for a, b in all_pairs(len(names))
+    )
 
 
 def _scale(cameras: Cameras, points, names: list[str], options: CalibrationOptions, warnings: list[str]):
@@ -134,7 +142,7 @@ def _absent(rows: np.ndarray, n: int) -> list[int]:
     return [row for row in range(n) if row not in set(rows.tolist())]
 
 
-def _missing(row: int, rows: np.ndarray, videos, key_points, verified) -> dict[str, Any]:
+def _missing(row: int, rows: np.ndarray, videos, key_points, verified) -> MissingCamera:
     """Why a camera has no place: too little to see in it, or too little in common with the others."""
     counts = {other: len(verified[min(row, other), max(row, other)]) for other in rows.tolist()}
     nearest = max(counts, key=lambda other: counts[other])
@@ -148,4 +156,4 @@ def _missing(row: int, rows: np.ndarray, videos, key_points, verified) -> dict[s
             f"its {n} matches with {videos[nearest].name} do not agree with what the other cameras see; the pattern "
             "may repeat"
         )
-    return {"name": videos[row].name, "reason": reason, "nearest": videos[nearest].name, "n_matches": n}
+    return MissingCamera(videos[row].name, reason, videos[nearest].name, n)

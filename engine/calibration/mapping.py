@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -90,7 +91,14 @@ def focals_to_try(lens: str) -> tuple[float, ...]:
 
 
 def map_cameras(
-    folder: Path, sizes: np.ndarray, lens: str, *, focal: float, are_alike: bool, seed: int = SEED
+    folder: Path,
+    sizes: np.ndarray,
+    lens: str,
+    *,
+    focal: float,
+    are_alike: bool,
+    seed: int = SEED,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> list[FirstEstimate]:
     """Estimates of groups of cameras that hang together, the largest group first. Empty where nothing does.
 
@@ -101,8 +109,16 @@ def map_cameras(
         focal: Per longer side of the picture.
         are_alike: Hold on to this focal length; otherwise every camera's own is sought from there.
         seed: Of all that is tried at random.
+        progress: Told the share of the cameras that has been placed.
     """
     import pycolmap
+
+    n_placed = 0
+
+    def placed(n: int) -> None:
+        nonlocal n_placed
+        n_placed += n
+        progress(min(n_placed / len(sizes), 1.0))
 
     pycolmap.set_random_seed(seed)
     with pycolmap.Database.open(folder / "database.db") as tables:
@@ -125,7 +141,14 @@ def map_cameras(
     model = folder / "model"
     shutil.rmtree(model, ignore_errors=True)
     model.mkdir()
-    found = pycolmap.incremental_mapping(folder / "database.db", folder, model, options)
+    found = pycolmap.incremental_mapping(
+        folder / "database.db",
+        folder,
+        model,
+        options,
+        initial_image_pair_callback=lambda: placed(2),
+        next_image_callback=lambda: placed(1),
+    )
     estimates = [_estimate(reconstruction, lens, are_alike) for reconstruction in found.values()]
     return sorted(estimates, key=lambda estimate: -len(estimate.rows))
 

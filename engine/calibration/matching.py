@@ -6,6 +6,7 @@ is only ever compared with points of the same moment, so that whatever moves hel
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,17 +48,22 @@ def all_pairs(n_cameras: int) -> list[Pair]:
     return [(a, b) for a in range(n_cameras) for b in range(a + 1, n_cameras)]
 
 
-def match_all(key_points: list[KeyPoints], alive=lambda: None) -> dict[Pair, np.ndarray]:
-    """Matches of every two cameras by looks alone: rows of key points in both. {pair: [M, 2]}"""
+def match_all(key_points: list[KeyPoints], advance: Callable[[float], None] = lambda _: None) -> dict[Pair, np.ndarray]:
+    """Matches of every two cameras by looks alone: rows of key points in both. {pair: [M, 2]}
+
+    Args:
+        key_points: Of all cameras.
+        advance: Told 1 by any thread whenever a pair is done.
+    """
 
     def one(pair: Pair) -> np.ndarray:
-        alive()
         first, second = (key_points[i] for i in pair)
         found = [np.zeros((0, 2), dtype=np.int64)]
         for rows_a, rows_b in _equal_moments(first, second):
             alike = first.descriptors[rows_a] @ second.descriptors[rows_b].T
             chosen = _mutual_best(alike, second.pixels[rows_b], first.pixels[rows_a], MAX_RATIO)
             found.append(np.stack([rows_a[chosen[:, 0]], rows_b[chosen[:, 1]]], axis=-1))
+        advance(1.0)
         return np.concatenate(found)
 
     pairs = all_pairs(len(key_points))

@@ -8,9 +8,9 @@ from typing import Literal
 Lens = Literal["simple", "opencv", "fisheye"]
 Up = Literal["floor", "cameras"]
 LENSES: dict[str, str] = {
-    "simple": "one number for the bend of straight lines: most lenses",
-    "opencv": "two for the bend and two for a tilted lens: wide or cheap lenses",
-    "fisheye": "very wide lenses such as those of action cameras",
+    "simple": "one number for how straight lines bend: most lenses",
+    "opencv": "four numbers, two of them for lenses that sit askew: wide-angle and inexpensive lenses",
+    "fisheye": "four numbers for very wide lenses, such as those of action cameras",
 }
 """Lens models by name, and what each is for."""
 UPS: dict[str, str] = {

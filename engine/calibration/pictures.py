@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from engine.calibration.videos import PlainVideo
-from engine.capture.camera_optics import resize_area
+from engine.capture.cameras.camera_optics import resize_area
 from engine.cloud.background.background import estimate_background
 from engine.images.image_filters import dilate, erode
 
@@ -58,19 +59,26 @@ def matching_size(size: tuple[int, int]) -> tuple[int, int]:
     return max(1, round(size[0] * ratio)), max(1, round(size[1] * ratio))
 
 
-def read_pictures(video: PlainVideo, n_frames: int, *, n_moments: int = N_MOMENTS) -> CameraPictures:
+def read_pictures(
+    video: PlainVideo, n_frames: int, *, n_moments: int = N_MOMENTS, advance: Callable[[float], None] = lambda _: None
+) -> CameraPictures:
     """Background and moving parts of one camera.
 
     Args:
         video: The camera.
         n_frames: Frames that all cameras have; moments are chosen from these, the same for each.
         n_moments: 0 takes backgrounds only.
+        advance: Told the share that was done since it was last told.
     Raises:
         CaptureError: Frames cannot be decoded.
     """
     indices = chosen_frames(n_frames, max(N_BACKGROUND_FRAMES, n_moments))
     size = matching_size(video.size)
-    frames = np.stack([resize_area(frame, size) for frame in video.source.read(indices)])
+    read = []
+    for frame in video.source.read(indices):
+        read.append(resize_area(frame, size))
+        advance(1 / len(indices))
+    frames = np.stack(read)
     background = estimate_background(frames).image
     moments = chosen_frames(len(indices), n_moments) if n_moments and len(indices) >= 3 else []
     parts = [_moving_part(number, frames[row], background) for number, row in enumerate(moments, start=1)]

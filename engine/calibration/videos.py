@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine.capture.folder_contents import folder_contents
+from engine.capture.files.folder_contents import folder_contents
+from engine.capture.files.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, listed
+from engine.capture.files.media import read_image_header, read_video_header
+from engine.capture.files.places import place_in
 from engine.capture.format_checks import raise_problems
-from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, listed
 from engine.capture.frames import FrameSource, ImageFrames, VideoFrames
-from engine.capture.media import read_image_header, read_video_header
 from engine.errors import CaptureError
 
 MIN_CAMERAS = 3
@@ -35,12 +36,15 @@ class PlainVideo:
     fps: float
 
 
-def find_videos(folder: Path) -> list[PlainVideo]:
+def find_videos(folder: Path, *, follow_links: bool = False) -> list[PlainVideo]:
     """The cameras of a folder in natural order: its video files, or folders of images where it has no videos.
 
+    Args:
+        folder: Of the videos.
+        follow_links: Whether links in it may lead out of it.
     Raises:
-        CaptureError: The folder cannot be read, or has fewer than MIN_CAMERAS cameras, or files are damaged; lists
-            every problem found.
+        CaptureError: The folder cannot be read, or has fewer than MIN_CAMERAS cameras, or files are damaged, or lie
+            elsewhere; lists every problem found.
     """
     if not folder.is_dir():
         what = "This is a file; name the folder of the videos." if folder.exists() else "There is no such folder."
@@ -56,6 +60,8 @@ def find_videos(folder: Path) -> list[PlainVideo]:
     problems: list[CaptureError] = []
     for path in videos or folders:
         try:
+            for file in (path, *folders.get(path, ())):
+                place_in(folder, str(file.relative_to(folder)), follow_links=follow_links, named_in=folder)
             found.append(_video(path) if videos else _images(path, folders[path]))
         except CaptureError as error:
             problems.append(error)

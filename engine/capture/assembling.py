@@ -7,16 +7,15 @@ together.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from engine.capture.described_camera import DescribedCamera, SeenFiles, mask_source, seen_files
-from engine.capture.duplicates import CameraFiles, check_duplicates
+from engine.capture.cameras.described_camera import DescribedCamera, SeenFiles, mask_source, seen_files
+from engine.capture.files.duplicates import CameraFiles, check_duplicates
 from engine.capture.format_checks import (
-    check_image_size,
     check_K,
     check_names,
     check_pose,
@@ -25,13 +24,12 @@ from engine.capture.format_checks import (
 )
 from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import IndexedFrames
-from engine.capture.timed_frames import at_common_moments, own_times
+from engine.capture.pixels.frame_fit import FIT_WORDS, FrameFit, OtherSize
+from engine.capture.times.timed_frames import at_common_moments, own_times
 from engine.errors import CaptureError
 
 THREADS = 4
 """Videos and images looked at side by side: FFmpeg works, or waits for the disk, without the interpreter."""
-ASPECT_TOLERANCE = 0.01
-"""Share by which the sides of frames and calibration may differ in proportion where one is a smaller copy."""
 MAX_LENS = 1e6
 """Largest parameter of a lens; those of the worst calibrations are in the hundreds."""
 MIN_LENS_RADIUS = 0.01
@@ -54,6 +52,7 @@ def assemble(
     points: Path | None = None,
     points_to_world: np.ndarray | None = None,
     fisheye_fov_deg: float | None = None,
+    fit: FrameFit | None = None,
     problems: Sequence[CaptureError] = (),
     warnings: Sequence[str] = (),
     said_in: Path | None = None,
@@ -68,6 +67,7 @@ def assemble(
         default_holdout: Names of cameras that the capture sets aside; unknown ones are a problem.
         points, points_to_world: See `Layout`.
         fisheye_fov_deg: See `Layout`.
+        fit: What became of frames that have another shape than their calibration; None where nothing says so.
         problems: What the reader found already; they are reported with the others.
         warnings: What the reader found odd but usable.
         said_in: The file that the cameras come from, for messages.
@@ -78,11 +78,21 @@ def assemble(
     said_in = said_in or (cameras[0].said_in if cameras else folder)
     if cameras or not found:
         found += check_names([camera.name for camera in cameras], said_in)
+    looks: list[Future[SeenFiles]] = []
+    looked: dict[tuple[Path, tuple[int, int] | None], Future[SeenFiles]] = {}  # a file of many cameras only once
     with ThreadPoolExecutor(THREADS) as pool:
-        looks = [pool.submit(seen_files, camera) for camera in cameras]
+        for camera in cameras:
+            key = (camera.files, camera.calibrated_size) if isinstance(camera.files, Path) else None
+            if key is None or camera.frame_indices is not None:
+                looks.append(pool.submit(seen_files, camera))
+                continue
+            if key not in looked:
+                looked[key] = pool.submit(seen_files, camera)
+            looks.append(looked[key])
     entries: list[CameraEntry] = []
     files: dict[str, SeenFiles] = {}
     scaled: list[str] = []
+    misfits: list[str] = []
     for camera, look in zip(cameras, looks, strict=True):
         try:
             seen = look.result()
@@ -92,14 +102,13 @@ def assemble(
             continue
         files[camera.name] = seen
         wrong = _check_numbers(camera, camera.calibrated_size or seen.size)
-        K = camera.K
-        if not wrong and camera.calibrated_size not in (None, seen.size):
-            ratios = np.array(seen.size) / np.array(camera.calibrated_size)
-            if abs(ratios[0] / ratios[1] - 1.0) > ASPECT_TOLERANCE:
-                wrong += check_image_size(camera.name, seen.size, camera.calibrated_size or seen.size, seen.paths[0])
-            else:
-                K = K * np.array([[ratios[0]], [ratios[1]], [1.0]])
-                scaled.append(f"{camera.name} {seen.size[0]}x{seen.size[1]}, calibrated at {camera.calibrated_size}")
+        K, calibrated = camera.K, None
+        if not wrong and camera.calibrated_size is not None and camera.calibrated_size != seen.size:
+            calibrated = OtherSize(camera.K, camera.calibrated_size)
+            K = calibrated.fitted_K(seen.size, fit or "scaled")
+            sizes = [f"{width}x{height}" for width, height in (seen.size, camera.calibrated_size)]
+            said_of = f"{camera.name} {sizes[0]}, calibrated at {sizes[1]}"
+            (misfits if any(calibrated.cut_px(seen.size)) else scaled).append(said_of)
         found += wrong
         if not wrong:
             entries.append(
@@ -112,6 +121,7 @@ def assemble(
                     lens=camera.lens,
                     masks=None if camera.masks is None else mask_source(camera.masks, camera.frame_indices),
                     color_matrix=camera.color_matrix,
+                    calibrated=calibrated,
                 )
             )
     if not found:
@@ -123,6 +133,17 @@ def assemble(
     raise_problems(found, folder)
     if scaled:
         said.append(f"Frames have another size than their calibration, which is scaled to them: {shortened(scaled)}.")
+    if misfits and fit is None:
+        most_px = max(entry.misfit_px for entry in entries)
+        said.append(
+            f"Frames have another shape than their calibration: {shortened(misfits)}. They are taken as scaled. If "
+            f"they were cropped, that is wrong by up to {most_px:.3g} px at the border: say so when you open them, or "
+            "by clipgstream inspect --fit."
+        )
+    elif misfits:
+        said.append(
+            f"Frames have another shape than their calibration, {FIT_WORDS[fit or 'scaled']}: {shortened(misfits)}."
+        )
     lying = [name for name, seen in files.items() if seen.is_lying]
     if lying:
         said.append(f"Not turned for display as they ask, because only as stored they fit: {shortened(lying)}.")
@@ -146,6 +167,7 @@ def assemble(
         points=points,
         points_to_world=points_to_world,
         fisheye_fov_deg=fisheye_fov_deg,
+        fit=fit,
     )
 
 

@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.capture.camera_optics import CameraOptics
-from engine.capture.excluded_pixels import ExcludedPixels
+from engine.capture.cameras.camera_optics import CameraOptics
+from engine.capture.cameras.rig_checks import check_rig, rig_extent, rig_warnings
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
-from engine.capture.folder_contents import MAX_LOOKED_AT, folder_contents
+from engine.capture.files.folder_contents import MAX_LOOKED_AT, folder_contents
+from engine.capture.files.foreign_calibrations import foreign_calibrations
 from engine.capture.format_checks import raise_problems
 from engine.capture.format_result import Layout, Probe
 from engine.capture.formats import (
@@ -32,15 +33,17 @@ from engine.capture.formats import (
     n3dv,
     panoptic,
     panoptic_studio,
+    qualisys,
     sample,
     technicolor,
     toml_cameras,
     transforms_json,
+    vicon,
 )
 from engine.capture.frames import FrameStore, IndexedFrames
-from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
-from engine.capture.undistortion import Undistortion
-from engine.capture.user_masks import with_masks
+from engine.capture.pixels.excluded_pixels import ExcludedPixels
+from engine.capture.pixels.undistortion import Undistortion
+from engine.capture.pixels.user_masks import with_masks
 from engine.errors import CaptureError
 
 logger = logging.getLogger(__name__)
@@ -59,10 +62,14 @@ FORMATS = (
     n3dv,
     colmap_frames,
     colmap,
+    qualisys,
+    vicon,
 )
 """Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 DEFAULT_CACHE_BYTES = 512 << 20
 """Decoded frames kept in memory."""
+ONE_PASS_CACHE_BYTES = 32 << 20
+"""The same for those who look at each picture once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,6 +309,7 @@ def open_capture(
     frames: tuple[int, int] | None = None,
     cache_bytes: int = DEFAULT_CACHE_BYTES,
     follow_links: bool = False,
+    is_shape_asked: bool = False,
 ) -> Capture:
     """Open a capture folder of any known layout.
 
@@ -313,6 +321,8 @@ def open_capture(
             no others.
         cache_bytes: Bound on decoded frames kept in memory.
         follow_links: Whether files that the capture names may lie outside of its folder. Only where the user said so.
+        is_shape_asked: Whether frames of quite another shape than their calibration are taken as scaled instead of
+            refused: for those who ask the user what became of them.
     Raises:
         CaptureError: The folder does not hold a capture, or one that cannot be used; lists every problem found.
     """
@@ -320,6 +330,8 @@ def open_capture(
     _check_scale(scale, folder)
     try:
         layout = _read_layout(folder, follow_links=follow_links)
+        if not is_shape_asked:
+            raise_problems(check_shapes(layout), folder)
     except OSError as error:  # rights, a drive that went away, a path too long
         raise CaptureError(
             f"The capture cannot be read ({error.strerror or error}).",
@@ -448,14 +460,34 @@ def _read_layout(folder: Path, *, follow_links: bool) -> Layout:
     raise _not_a_capture(folder, [probe for _, probe in probes])
 
 
+def check_shapes(layout: Layout) -> list[CaptureError]:
+    """Cameras whose frames are of quite another shape than their calibration, where nothing says why."""
+    problems = []
+    for entry in layout.far_off:
+        assert entry.calibrated is not None
+        sizes = [f"{width}x{height}" for width, height in (entry.image_size, entry.calibrated.size)]
+        problems.append(
+            CaptureError(
+                f'Camera "{entry.name}" has {sizes[0]} frames, its calibration is for {sizes[1]}.',
+                hint="Say whether they were scaled or cropped, when you open the folder in the window or by "
+                "clipgstream inspect --fit. Or export the calibration for this size.",
+                path=entry.source.path,
+            )
+        )
+    return problems
+
+
 def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
     """What was seen in the folder, what can be read, and what to do."""
     with os.scandir(folder) as entries:
         inside = sorted(entry.name for entry in islice(entries, MAX_LOOKED_AT) if _is_capture(entry))
     close = [probe for probe in probes if probe.seen]
-    if close:
-        found = "; ".join(f"there is {probe.seen}, but {probe.lacks}" for probe in close)
-        hint = " Or: ".join(dict.fromkeys(probe.hint for probe in close if probe.hint))
+    calibrations = [] if inside else foreign_calibrations(folder)
+    if close or calibrations:
+        seen = [f"there is {probe.seen}, but {probe.lacks}" for probe in close]
+        found = "; ".join(seen + [text for text, _ in calibrations])
+        hints = [probe.hint for probe in close] + [f"{what[0].upper()}{what[1:]}." for _, what in calibrations]
+        hint = " Or: ".join(dict.fromkeys(hint for hint in hints if hint))
     else:
         found, hint = "nothing of a known layout was recognised", ""
     if inside:

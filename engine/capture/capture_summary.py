@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from engine.capture.cameras.rig_checks import rig_extent
 from engine.capture.capture import Capture
-from engine.capture.rig_checks import rig_extent
 
 SCHEMA = 1
 """Version of the keys below. Keys may be added under the same number, never renamed or taken away."""

@@ -14,16 +14,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from engine.capture.files.media import ImageHeader
 from engine.capture.limits import (
     FOCAL_RANGE,
     FPS_RANGE,
     MAX_META_BYTES,
+    MAX_META_VALUES,
     MAX_NAME_LENGTH,
     MAX_PIXELS,
     MAX_POSITION,
     MAX_SIDE,
 )
-from engine.capture.media import ImageHeader
 from engine.errors import CaptureError
 from engine.storage.files import read_bytes
 from engine.storage.json_files import JsonError, parse_json, parse_object
@@ -71,8 +72,12 @@ def read_json_list(path: Path) -> list[Any]:
 
 def _parsed(path: Path, parse: Callable[..., T]) -> T:
     try:
+        data = read_bytes(path, max_bytes=MAX_META_BYTES)
+        if data.count(b",") > MAX_META_VALUES:
+            text = f"The file has {data.count(b','):,} values, at most {MAX_META_VALUES:,} are read."
+            raise CaptureError(text, hint="Keep the calibration in it and take the rest out.", path=path)
         # NaN is let through, so that the camera that has it can be named
-        return parse(read_bytes(path, max_bytes=MAX_META_BYTES), is_nan_allowed=True)
+        return parse(data, is_nan_allowed=True)
     except FileNotFoundError:
         raise CaptureError("The file is missing.", hint="Put it back or export the capture again.", path=path) from None
     except OSError as error:

@@ -10,7 +10,8 @@ import numpy as np
 from engine.camera.lens import PINHOLE, Lens
 from engine.camera.rig import CameraRig
 from engine.capture.frames import FrameSource
-from engine.capture.undistortion import undistorted_K
+from engine.capture.pixels.frame_fit import FrameFit, OtherSize
+from engine.capture.pixels.undistortion import undistorted_K
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,7 @@ class CameraEntry:
         lens: How its lens bends rays.
         masks: Where masks of what moves come from, one per frame, bright where something moves; None without.
         color_matrix: Applied to display-encoded RGB, new = matrix @ old; None leaves colours as they are. [3, 3]
+        calibrated: What K was made of, where the calibration is for another size; None where it is for this one.
     """
 
     name: str
@@ -56,6 +58,12 @@ class CameraEntry:
     lens: Lens = PINHOLE
     masks: FrameSource | None = None
     color_matrix: np.ndarray | None = None
+    calibrated: OtherSize | None = None
+
+    @property
+    def misfit_px(self) -> float:
+        """By how many pixels the shape of the frames differs from the calibrated one; 0 for copies of another size."""
+        return 0.0 if self.calibrated is None else max(self.calibrated.cut_px(self.image_size))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +80,7 @@ class Layout:
         points: File with a point cloud that came along; None without.
         points_to_world: Brings its points into the world of the cameras; None where they are in it. [4, 4]
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to; None takes the usual one.
+        fit: What the user said of frames of another shape than their calibration; None where that is not known.
     """
 
     format: str
@@ -83,6 +92,21 @@ class Layout:
     points: Path | None = None
     points_to_world: np.ndarray | None = None
     fisheye_fov_deg: float | None = None
+    fit: FrameFit | None = None
+
+    @property
+    def misfit_px(self) -> float:
+        """Of the camera whose frames fit their calibration worst; see `CameraEntry.misfit_px`."""
+        return max(entry.misfit_px for entry in self.cameras)
+
+    @property
+    def far_off(self) -> tuple[CameraEntry, ...]:
+        """Cameras that cannot be used before somebody says what became of their frames; see `OtherSize.is_far_off`."""
+        if self.fit is not None:
+            return ()
+        return tuple(
+            entry for entry in self.cameras if entry.calibrated and entry.calibrated.is_far_off(entry.image_size)
+        )
 
     def rig(self) -> CameraRig:
         """The pinhole cameras that the stored frames are brought to, at the size of the stored frames."""

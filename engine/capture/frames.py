@@ -18,9 +18,9 @@ from av.video.reformatter import VideoReformatter
 from PIL import Image
 
 from engine.byte_cache import ByteCache
-from engine.capture.camera_optics import CameraOptics
-from engine.capture.limits import MAX_PIXELS
-from engine.capture.media import (
+from engine.capture.cameras.camera_optics import CameraOptics
+from engine.capture.cameras.orientation import UPRIGHT, Turn, turn_of_frame
+from engine.capture.files.media import (
     IMAGE_FAULTS,
     IMAGE_KINDS,
     VIDEO_FAULTS,
@@ -30,8 +30,8 @@ from engine.capture.media import (
     set_pixel_limit,
     shown_pts,
 )
-from engine.capture.orientation import turn_of_frame
-from engine.capture.video_colors import rgb_picture
+from engine.capture.limits import MAX_PIXELS
+from engine.capture.pixels.video_colors import rgb_picture
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 
@@ -122,7 +122,7 @@ class VideoFrames:
     def __init__(self, path: Path, n_frames: int, *, is_turned: bool = True) -> None:
         self.path = path
         self._n_frames = n_frames
-        self._is_turned = is_turned
+        self._turn: Turn | None = None if is_turned else UPRIGHT  # as its first frame says; None before that
         self._reformatter = VideoReformatter()
         self._lock = threading.Lock()
         self._container: Any = None
@@ -171,8 +171,9 @@ class VideoFrames:
                 frame = self._decoded(frame_index)
                 n_back *= 4
             if frame is not None:
-                picture = rgb_picture(frame, self._reformatter)
-                return turn_of_frame(frame).upright(picture) if self._is_turned else picture
+                if self._turn is None:  # asked once: PyAV never lets go of a frame that was asked
+                    self._turn = turn_of_frame(frame)
+                return self._turn.upright(rgb_picture(frame, self._reformatter))
         except (*VIDEO_FAULTS, OSError, ValueError) as error:  # ValueError: a pixel format that cannot be converted
             self._close()
             raise self._damaged(frame_index, getattr(error, "strerror", None) or "damaged") from error

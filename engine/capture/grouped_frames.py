@@ -12,8 +12,8 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
+from engine.capture.files.frame_files import natural_key
 from engine.capture.format_checks import shortened
-from engine.capture.frame_files import natural_key
 
 POSE_DIGITS = 6
 """Poses that are the same to so many places are of one camera."""
@@ -53,7 +53,8 @@ def grouped(frames: Sequence[ListedFrame]) -> list[FrameGroup]:
     """Cameras with their pictures in the order of time, or of names; cameras in natural order of theirs."""
     by_pose: dict[bytes, FrameGroup] = {}
     for frame in frames:
-        key = (np.round(frame.camera_to_world, POSE_DIGITS) + 0.0).tobytes()  # no minus zeros
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not a pose is refused later
+            key = (np.round(frame.camera_to_world, POSE_DIGITS) + 0.0).tobytes()  # no minus zeros
         by_pose.setdefault(key, FrameGroup()).frames.append(frame)
     groups = list(by_pose.values())
     for group in groups:

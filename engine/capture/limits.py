@@ -17,3 +17,6 @@ MAX_NAME_LENGTH = 100
 """Characters of a camera's name."""
 MAX_META_BYTES = 256 << 20
 """Size of a file with calibration: Panoptic lists each camera anew for each frame, half a kilobyte at a time."""
+MAX_META_VALUES = 6_000_000
+"""Numbers and texts in such a file: each takes up to thirty bytes once it is read. Panoptic's 31 cameras reach it after
+6,000 frames."""

@@ -112,10 +112,10 @@ class Coverage(Struct, frozen=True):
         """The text shown while the clip is prepared."""
         n_outside = self.n_points - self.n_inherited
         percent = 100 * n_outside / max(self.n_points, 1)
-        said = f"{n_outside} of {self.n_points} moving points ({percent:.0f} %) lie outside the inherited anchors; "
-        said += f"{self.n_residual} residual anchors ({self.reason})"
+        said = f"{n_outside:,} of {self.n_points:,} moving points ({percent:.0f} %) lie outside the inherited anchors; "
+        said += f"{self.n_residual:,} residual anchors ({self.reason})"
         if self.n_left_out:
-            said += f", {self.n_left_out} points left to the anchors beside them"
+            said += f", {self.n_left_out:,} points left to the anchors beside them"
         return f"{said}; {100 * self.share:.1f} % of what moves is within reach of an anchor"
 
 
@@ -123,7 +123,8 @@ class ClipFigures(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """What was measured of a finished clip and its training.
 
     Attributes:
-        held_out_psnr: Of a few held-out pictures, dB.
+        held_out_psnr: Of held-out pictures, dB.
+        held_out_whole: Whether that is over all its frames in all held-out cameras; else over at most three pictures.
         gradient_norm_median, gradient_norm_max: Over all steps.
         gradient_clipped_steps: Steps whose gradient was scaled down.
         stages_s: Wall seconds per stage, in the order they were entered.
@@ -132,6 +133,7 @@ class ClipFigures(Struct, frozen=True, kw_only=True, omit_defaults=True):
     """
 
     held_out_psnr: Figure = None
+    held_out_whole: bool = False
     gradient_norm_median: Figure = None
     gradient_norm_max: Figure = None
     gradient_clipped_steps: Count | None = None

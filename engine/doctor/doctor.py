@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.capture.capture import Capture
+from engine.children.kind import ChildFailed
 from engine.cloud.background.exposure_survey import ExposureSurvey
 from engine.doctor.checks.black import check_black
 from engine.doctor.checks.calibration import check_calibration
@@ -23,8 +24,8 @@ from engine.doctor.finding import Finding, in_order
 from engine.doctor.looking import Look, look_at
 from engine.doctor.neighbours import neighbour_pairs
 from engine.doctor.quick import check_numbers
-from engine.features.child import ChildFailed
 from engine.features.matching import match_pairs
+from engine.freed_memory import return_freed_memory
 from engine.progress import Progress, ReportProgress
 
 STAGES = {
@@ -99,6 +100,8 @@ def examine(
     ]
     if not look.unreadable and len(capture.rig) > 1:
         findings += check_synchronisation(capture, _in_turn(part("time")))
+    capture.close()  # no more pictures are looked at, and matching takes memory of its own
+    return_freed_memory()
     found, errors, n_features = _compare(look, part("match"), part("calibration"))
     findings += found
     doubtful = {

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+import msgspec
+
 from engine.capture.writers.capture_json import Corrections
 
 Severity = Literal["error", "warning", "note"]
@@ -14,8 +16,7 @@ Point = tuple[float, float]
 """A place in a picture as shares of its width and height, so that it holds at every size."""
 
 
-@dataclass(frozen=True, slots=True)
-class PictureEvidence:
+class PictureEvidence(msgspec.Struct, frozen=True, tag=True):
     """A picture to look at.
 
     Attributes:
@@ -29,8 +30,7 @@ class PictureEvidence:
     caption: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class PairEvidence:
+class PairEvidence(msgspec.Struct, frozen=True, tag=True):
     """Two cameras and what both see: where it is in each, and the line on which it ought to be in the second.
 
     Attributes:

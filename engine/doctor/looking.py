@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.capture.camera_optics import resize_area
+from engine.capture.cameras.camera_optics import resize_area
 from engine.capture.capture import Capture
 from engine.cloud.background.exposure import at_working_size, gain_of
 from engine.cloud.background.exposure_survey import ExposureCurve, ExposureSurvey

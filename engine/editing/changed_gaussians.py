@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from engine.camera.rotations import matrices_of
-from engine.editing.edit import Expose, Recolor, Transform
+from engine.editing.actions import Expose, Recolor, Transform
 from engine.images.srgb import encoded_of, linear_of
 from engine.model.host_array import host_array
 from engine.raster.gaussians import Gaussians

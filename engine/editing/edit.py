@@ -12,13 +12,11 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from engine.editing.actions import Action, Quat, Vector, check_quat
+
 MAX_NAME_CHARACTERS = 200
-MAX_STOPS = 16.0
 _Count = Annotated[int, Meta(ge=0, lt=2**31)]
 _Name = Annotated[str, Meta(max_length=MAX_NAME_CHARACTERS)]
-Vector = tuple[float, float, float]
-Quat = tuple[float, float, float, float]
-"""wxyz"""
 
 
 class Scope(Struct, frozen=True, forbid_unknown_fields=True):
@@ -80,7 +78,7 @@ class Box(Struct, frozen=True, forbid_unknown_fields=True, tag="box"):
         _check_finite("a box", *self.center, *self.half_sizes)
         if min(self.half_sizes) <= 0.0:
             raise ValueError(f"a box with half sizes {self.half_sizes} is empty")
-        _check_quat(self.quat)
+        check_quat(self.quat)
 
 
 class Sphere(Struct, frozen=True, forbid_unknown_fields=True, tag="sphere"):
@@ -124,103 +122,6 @@ class Picked(Struct, frozen=True, forbid_unknown_fields=True, tag="picked"):
 
 Target = Everything | Box | Sphere | Picked
 
-# ---------------------------------------------------------------- what it does
-
-
-class Hide(Struct, frozen=True, forbid_unknown_fields=True, tag="hide"):
-    """They are drawn nowhere, but stay in the clips when edits are applied permanently."""
-
-
-class Delete(Struct, frozen=True, forbid_unknown_fields=True, tag="delete"):
-    """They are gone; from the clips too, once edits are applied permanently."""
-
-
-class Transform(Struct, frozen=True, forbid_unknown_fields=True, tag="transform"):
-    """They are scaled and turned about a pivot, then moved: x -> pivot + scale R (x - pivot) + translation.
-
-    Raises:
-        ValueError: A number is not finite, the scale not positive, or the quaternion is not a rotation.
-    """
-
-    translation: Vector = (0.0, 0.0, 0.0)
-    quat: Quat = (1.0, 0.0, 0.0, 0.0)
-    scale: float = 1.0
-    pivot: Vector = (0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        _check_finite("a transform", *self.translation, self.scale, *self.pivot)
-        if self.scale <= 0.0:
-            raise ValueError(f"a transform with the scale {self.scale} makes everything vanish")
-        _check_quat(self.quat)
-
-
-class Recolor(Struct, frozen=True, forbid_unknown_fields=True, tag="recolor"):
-    """Their colours, display-encoded, become: mixed with a tint, more or less saturated, times gains; their opacities
-    are multiplied. The result is held in 0..1.
-
-    Attributes:
-        tint: Display-encoded RGB in 0..1.
-        tint_share: How much of the tint is mixed in, 0..1.
-        saturation: 0 is grey, 1 leaves colours alone.
-        gains: Per channel.
-        opacity: Factor of the opacities.
-
-    Raises:
-        ValueError: A number lies outside of its range.
-    """
-
-    tint: Vector = (0.5, 0.5, 0.5)
-    tint_share: float = 0.0
-    saturation: float = 1.0
-    gains: Vector = (1.0, 1.0, 1.0)
-    opacity: float = 1.0
-
-    def __post_init__(self) -> None:
-        numbers = (*self.tint, self.tint_share, self.saturation, *self.gains, self.opacity)
-        _check_finite("a recolouring", *numbers)
-        if min(numbers) < 0.0 or max(*self.tint, self.tint_share) > 1.0 or max(numbers) > 100.0:
-            raise ValueError("a recolouring has a number outside of its range")
-
-
-class Expose(Struct, frozen=True, forbid_unknown_fields=True, tag="expose"):
-    """Their light is multiplied by 2 to the power of `stops`, in linear light.
-
-    Raises:
-        ValueError: There are more than MAX_STOPS, either way.
-    """
-
-    stops: float
-
-    def __post_init__(self) -> None:
-        if not -MAX_STOPS <= self.stops <= MAX_STOPS:
-            raise ValueError(f"an exposure of {self.stops} stops is out of range, {MAX_STOPS:g} are allowed")
-
-
-class Hold(Struct, frozen=True, forbid_unknown_fields=True, tag="hold"):
-    """They stand still, as they are at one frame; in clips without that frame, as at their frame next to it."""
-
-    frame_index: _Count
-
-
-class Smooth(Struct, frozen=True, forbid_unknown_fields=True, tag="smooth"):
-    """They change more slowly: each is a weighted mean of itself over the frames of its clip around the moment.
-
-    Attributes:
-        sigma_frames: Standard deviation of the weights, in frames.
-
-    Raises:
-        ValueError: It is not between 0.1 and 100.
-    """
-
-    sigma_frames: float
-
-    def __post_init__(self) -> None:
-        if not 0.1 <= self.sigma_frames <= 100.0:
-            raise ValueError(f"smoothing over {self.sigma_frames} frames is out of range, 0.1 to 100 are allowed")
-
-
-Action = Hide | Delete | Transform | Recolor | Expose | Hold | Smooth
-
 # ---------------------------------------------------------------- the edit
 
 
@@ -254,9 +155,3 @@ def edits_at(edits: tuple[Edit, ...], frame: float) -> tuple[Edit, ...]:
 def _check_finite(what: str, *numbers: float) -> None:
     if not all(math.isfinite(number) and abs(number) <= 1e12 for number in numbers):
         raise ValueError(f"{what} has a number that is not finite or too large")
-
-
-def _check_quat(quat: Quat) -> None:
-    length = math.sqrt(sum(number * number for number in quat))
-    if not abs(length - 1.0) <= 1e-3:
-        raise ValueError(f"the quaternion {quat} is not a rotation: its length is {length:g}")

@@ -17,9 +17,9 @@ from torch import Tensor
 
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
+from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.changed_gaussians import faded, recolored, transformed
 from engine.editing.clip_rows import ClipRows, NamedSet
-from engine.editing.edit import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.effects import NO_EFFECTS, Effect, Effects
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.over_time import Chosen, IndexedGaussians, held, smoothed

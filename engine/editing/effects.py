@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import Struct
 
-from engine.editing.edit import Action, Edit, Target, edits_at
+from engine.editing.actions import Action
+from engine.editing.edit import Edit, Target, edits_at
 
 
 class Effect(Struct, frozen=True):

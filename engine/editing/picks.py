@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from functools import lru_cache
 
 import numpy as np
 
@@ -36,3 +37,9 @@ def unpack_rows(packed: bytes) -> np.ndarray:
     if len(rows) and (rows[-1] >= MAX_PICKED or (steps[1:] == 0).any()):
         raise ValueError("the numbers of picked Gaussians are damaged")
     return rows
+
+
+@lru_cache(maxsize=256)
+def n_rows(packed: bytes) -> int:
+    """How many were packed. Raises ValueError as `unpack_rows` does."""
+    return len(unpack_rows(packed))

@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.changed_gaussians import faded, recolored, transformed
-from engine.editing.edit import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.effects import Effects
 from engine.editing.selecting import Selecting
 from engine.model.host_array import host_array

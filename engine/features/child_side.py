@@ -1,4 +1,4 @@
-"""What modules share that `engine.features.child.run_child` starts, and the SIFT features that all of them need.
+"""What modules share that `engine.features.child.work_on_arrays` starts, and the SIFT features that all of them need.
 
 Imported by child processes only: pycolmap must stay out of the program's own.
 """
@@ -14,28 +14,19 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from engine.children.child import serve
+from engine.features.sift_memory import MAX_SIDE_PX, n_at_once
 
 MAX_FEATURES = 2048
-MAX_SIDE_PX = 1280
-"""Larger pictures are matched smaller: SIFT on full HD takes minutes, and its users need no more."""
 
 
-def run_as_child(work: Callable[[dict[str, np.ndarray], Path], dict[str, np.ndarray]]) -> None:
-    """The main of a child: read the job, answer it by `work(arrays, empty folder)`, write the answer."""
-
-    def main(job: Path, result: Path) -> None:
-        with np.load(job) as found:
-            arrays = dict(found)
-        folder = job.with_name("colmap")
-        shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
-        folder.mkdir()
-        answer = work(arrays, folder)
-        partial = result.with_name("partial.npz")
-        np.savez(partial, allow_pickle=False, **answer)
-        partial.replace(result)
-
-    serve(main)
+def answer(shared: Path, work: Callable[[dict[str, np.ndarray], Path], dict[str, np.ndarray]]) -> None:
+    """In the child: read the arrays, answer them by `work(arrays, empty folder)`, write the answer."""
+    with np.load(shared / "job.npz") as found:
+        arrays = dict(found)
+    folder = shared / "colmap"
+    shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
+    folder.mkdir()
+    np.savez(shared / "result.npz", allow_pickle=False, **work(arrays, folder))
 
 
 def extract_features(
@@ -45,6 +36,7 @@ def extract_features(
     least_contrast: float | None = None,
     *,
     is_valid: np.ndarray | None = None,
+    max_bytes: int | None = None,
 ) -> tuple[Path, list[str]]:
     """Write pictures into folder/images and their SIFT features into a database. Returns it and the pictures' names.
 
@@ -53,6 +45,7 @@ def extract_features(
         max_features: Of each picture, those with the largest extent.
         least_contrast: SIFT's peak threshold; None takes COLMAP's.
         is_valid: Pixels where features may lie; None for all. [C, H, W] bool
+        max_bytes: Pictures are worked on side by side as long as they take no more; None for one per core.
     """
     import pycolmap
 
@@ -75,6 +68,8 @@ def extract_features(
     extraction = pycolmap.FeatureExtractionOptions()
     extraction.sift.max_num_features = max_features
     extraction.max_image_size = MAX_SIDE_PX
+    if max_bytes is not None:
+        extraction.num_threads = n_at_once(images.shape[2], images.shape[1], max_bytes)
     if least_contrast is not None:
         extraction.sift.peak_threshold = least_contrast
     pycolmap.extract_features(

@@ -1,4 +1,4 @@
-"""The child process of engine.features.matching: `python -m engine.features.match_child JOB.npz RESULT.npz BEAT`.
+"""The child process of engine.features.matching.
 
 Never imported by the program: pycolmap must stay out of its processes.
 """
@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.features.child_side import extract_features, run_as_child, steady_verification
+from engine.children.child import Parent
+from engine.features.child_side import answer, extract_features, steady_verification
+from engine.progress import Progress
 
 LEAST_CONTRAST = 0.002
 """A third of COLMAP's: plain walls have faint features only, and wrong matches are sorted out later."""
@@ -19,7 +21,9 @@ def match_folder(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.nd
     """Key points of all pictures, and which of them each pair shares, verified without any calibration."""
     import pycolmap
 
-    database, names = extract_features(folder, arrays["images"], int(arrays["max_features"]), LEAST_CONTRAST)
+    max_features, max_bytes = int(arrays["max_features"]), int(arrays["max_bytes"])
+    # taken out: pictures are not needed again once they lie in the folder
+    database, names = extract_features(folder, arrays.pop("images"), max_features, LEAST_CONTRAST, max_bytes=max_bytes)
     listed = folder / "pairs.txt"
     listed.write_text("".join(f"{names[a]} {names[b]}\n" for a, b in arrays["pairs"]))
     pairing = pycolmap.ImportedPairingOptions()
@@ -50,5 +54,6 @@ def match_folder(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.nd
     }
 
 
-if __name__ == "__main__":
-    run_as_child(match_folder)
+def main(shared: Path, parent: Parent[Progress]) -> None:
+    """Runs in the child."""
+    answer(shared, match_folder)

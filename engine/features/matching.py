@@ -10,10 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.features.child import run_child
+from engine.features.child import arrays_kind, work_on_arrays
+from engine.features.sift_memory import n_at_once, sift_bytes
 
 MAX_FEATURES = 1536
 """Of one picture: a pair of cameras needs no more to be judged."""
+MAX_SIFT_BYTES = 300 << 20
+"""What pictures may take while their key points are looked for."""
+CHILD_BYTES = 170 << 20
+"""What the child takes apart from that, and from the pictures: its libraries, and matching."""
+MATCHING = arrays_kind("engine.features.matching:MATCHING", "engine.features.match_child:main", "the matching process")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +51,12 @@ class Matches:
     n_features: np.ndarray
 
 
+def matching_bytes(n: int, width: int, height: int) -> int:
+    """What the child process of `match_pairs` takes for n pictures of this size, roughly."""
+    at_once = min(n_at_once(width, height, MAX_SIFT_BYTES), n)
+    return CHILD_BYTES + 3 * n * width * height + at_once * sift_bytes(width, height)
+
+
 def match_pairs(
     images: np.ndarray,
     pairs: Sequence[tuple[int, int]],
@@ -65,8 +77,9 @@ def match_pairs(
         DiskError: There is no room for the pictures that it reads.
     """
     listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    arrays = {"images": images, "pairs": listed, "max_features": np.array(max_features)}
-    answer = run_child("engine.features.match_child", arrays, what="the matching process", alive=alive)
+    limits = {"max_features": np.array(max_features), "max_bytes": np.array(MAX_SIFT_BYTES)}
+    arrays = {"images": images, "pairs": listed, **limits}
+    answer = work_on_arrays(MATCHING, arrays, alive=alive)
     ends = np.cumsum(answer["counts"])
     found = []
     for (first, second), start, end in zip(listed.tolist(), ends - answer["counts"], ends, strict=True):

@@ -201,27 +201,27 @@ def is_cache_warm() -> bool:
     return read_marker(kernel_folder()) == current_key()
 
 
-def read_marker(folder: Path) -> CacheKey | None:
+def read_marker(folder: Path, name: str = MARKER) -> CacheKey | None:
     """What the last completed warm-up in this folder compiled; None when there was none or it cannot be read."""
     from engine.storage.json_files import read_json_object
 
     try:
-        values = read_json_object(folder / MARKER, max_bytes=1 << 20)
+        values = read_json_object(folder / name, max_bytes=1 << 20)
         return CacheKey(**{name: str(values[name]) for name in CacheKey._fields})
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
-def write_marker(folder: Path) -> None:
+def write_marker(folder: Path, name: str = MARKER) -> None:
     """Say that everything is compiled, and remove the oldest folders of other keys. A failure to do so is ignored."""
     import json
 
     key = current_key()
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        new = folder / f"{MARKER}.{os.getpid()}"
+        new = folder / f"{name}.{os.getpid()}"
         new.write_text(json.dumps(key._asdict()) + "\n", "utf-8")
-        new.replace(folder / MARKER)
+        new.replace(folder / name)
     if _is_ours(folder):
         prune(folder.parent, keep=folder)
 

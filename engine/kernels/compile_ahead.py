@@ -17,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine.kernels.cache import VARIABLE, current_key, kernel_folder, read_marker, write_marker
+from engine.kernels.cache import MARKER, VARIABLE, current_key, kernel_folder, read_marker, write_marker
 from engine.parallel import n_cores
 
 if TYPE_CHECKING:
@@ -37,8 +37,10 @@ GROUPS = (
 """Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its
 kernels once. Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the
 same time."""
-_FOR_LATER = ("point clouds", "figures", "view modes", "selection")
-"""Groups that are not part of a training step, and quick to load at their first use."""
+OF_CPU = ("decoder", "rasterizer", "loss and optimiser")
+"""Groups of the back end "cpu"; the others are used whatever the back end."""
+SHARED_MARKER = "warm-shared.json"
+"""Beside the marker of all groups: that of the others alone."""
 
 MAX_PROCESSES = 4
 TIME_LIMIT_S = 180.0
@@ -49,33 +51,36 @@ ReportGroups = Callable[[int, int, str], None]
 """Groups done, groups in all, and what is compiled now. Called often; may raise to cancel."""
 
 
-def warm_up_all(report: ReportGroups | None = None) -> None:
-    """Compile what is not compiled yet, then load what a training step needs into this process.
-
-    Compiling takes about ten seconds on two cores, loading a fraction of a second. A group that fails to compile ahead
-    is logged and left to its first use.
+def load_groups_of_cpu(*, is_training: bool) -> None:
+    """Load the groups of the back end "cpu" into this process, a fraction of a second, or compile what is not yet.
 
     Args:
-        report: Told about the progress; what it raises ends the compiling processes and passes on.
+        is_training: Whether steps follow, or pictures alone.
     """
-    compile_all(report)
     for name, module, _ in GROUPS:
-        if name not in _FOR_LATER:
+        if name in OF_CPU and (is_training or name == "rasterizer"):
             import_module(module).warm_up()
 
 
-def compile_all(report: ReportGroups | None = None, *, n_processes: int | None = None) -> bool:
-    """Compile every group in other processes, unless that was done. Returns whether all of them succeeded.
+def compile_all(report: ReportGroups | None = None, *, backend: str = "cpu", n_processes: int | None = None) -> bool:
+    """Compile every group in other processes, unless that was done: about ten seconds on two cores.
+
+    A group that fails is logged and left to its first use.
 
     Args:
-        report: See `warm_up_all`.
+        report: Told about the progress; what it raises ends the compiling processes and passes on.
+        backend: What is computed with; groups of another one are left out.
         n_processes: How many at a time; as many as cores when None, MAX_PROCESSES at most.
+    Returns:
+        Whether all of them succeeded.
     """
+    groups = tuple(group for group in GROUPS if backend == "cpu" or group[0] not in OF_CPU)
+    marker = MARKER if len(groups) == len(GROUPS) else SHARED_MARKER
     folder = kernel_folder()
-    if read_marker(folder) == current_key():
+    if _is_done(folder, marker):
         return True
     report = report or (lambda done, n, what: None)
-    n = len(GROUPS)
+    n = len(groups)
     lock = _take(folder / LOCK)
     while lock is not None and not lock.is_locked:
         report(0, n, "another program compiles")
@@ -84,9 +89,9 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
     running: list[tuple[_Bundle, subprocess.Popen[bytes], float]] = []
     n_done, is_fine = 0, True
     try:
-        if read_marker(folder) == current_key():  # the program we waited for has done it
+        if _is_done(folder, marker):  # the program we waited for has done it
             return True
-        for bundle in _bundles(min(n_processes or n_cores(), MAX_PROCESSES)):
+        for bundle in _bundles(groups, min(n_processes or n_cores(), MAX_PROCESSES)):
             running.append((bundle, _start(bundle, folder), time.monotonic()))
         while running:
             report(n_done, n, " and ".join(_names(bundle) for bundle, _, _ in running))
@@ -101,7 +106,7 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
                 is_fine &= _end(_names(bundle), process, seconds)
         report(n_done, n, "")
         if is_fine:
-            write_marker(folder)
+            write_marker(folder, marker)
         return is_fine
     finally:
         for _, process, _ in running:
@@ -112,14 +117,18 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
                 lock.release()
 
 
+def _is_done(folder: Path, marker: str) -> bool:
+    return any(read_marker(folder, name) == current_key() for name in (MARKER, marker))
+
+
 _Bundle = tuple[tuple[str, str, float], ...]
 """Groups that one process compiles, one after the other."""
 
 
-def _bundles(n_processes: int) -> list[_Bundle]:
+def _bundles(groups: _Bundle, n_processes: int) -> list[_Bundle]:
     """Longest first, each to the process that has least to do."""
-    bundles: list[_Bundle] = [()] * min(n_processes, len(GROUPS))
-    for group in sorted(GROUPS, key=lambda group: -group[2]):
+    bundles: list[_Bundle] = [()] * min(n_processes, len(groups))
+    for group in sorted(groups, key=lambda group: -group[2]):
         least = min(range(len(bundles)), key=lambda i: sum(seconds for _, _, seconds in bundles[i]))
         bundles[least] = (*bundles[least], group)
     return bundles
@@ -140,7 +149,7 @@ def _start(bundle: _Bundle, folder: Path) -> subprocess.Popen[bytes]:
     calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module, _ in bundle)
     return subprocess.Popen(
         # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
-        [sys.executable, "-c", f"{_END_WITH_PARENT}; import gc; gc.disable(); {_IMPORT}; {calls}"],
+        [sys.executable, "-P", "-c", f"{_END_WITH_PARENT}; import gc; gc.disable(); {_IMPORT}; {calls}"],
         env={**os.environ, "PYTHONPATH": path, VARIABLE: str(folder)},
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,

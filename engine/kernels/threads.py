@@ -19,7 +19,7 @@ slower beside two busy processes, and sleeping at once makes it slower where not
 _log = logging.getLogger(__name__)
 
 
-def configure_threads(n_threads: int | None = None) -> int:
+def configure_threads(n_threads: int | None = None, *, with_torch: bool = True) -> int:
     """Set up the threads of this process; returns how many kernels called from this thread will use.
 
     Sets GOMP_SPINCOUNT unless it is set, chooses numba's OpenMP layer (the only common one that may be called from
@@ -28,10 +28,10 @@ def configure_threads(n_threads: int | None = None) -> int:
 
     Args:
         n_threads: Threads for kernels; None means every core this process may use. Kept within 1..cores.
+        with_torch: Whether this process computes with torch too, which takes 190 MB once it is loaded.
     """
     os.environ.setdefault("GOMP_SPINCOUNT", str(SPIN_COUNT))
     import numba
-    import torch
 
     from engine.kernels.numba_internals import choose_layer, layer, most_threads
 
@@ -42,7 +42,10 @@ def configure_threads(n_threads: int | None = None) -> int:
             _log.warning("numba finds no OpenMP runtime (libgomp); kernels run one call at a time")
     n_threads = most_threads() if n_threads is None else min(max(1, n_threads), most_threads())
     numba.set_num_threads(n_threads)
-    torch.set_num_threads(n_threads)
+    if with_torch:
+        import torch
+
+        torch.set_num_threads(n_threads)
     return n_threads
 
 

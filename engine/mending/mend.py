@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace as with_entries
 
-from engine.backends.table import backend_called
+from engine.backends.backend import Backend
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
@@ -74,6 +74,7 @@ class Mending:
         reference: What they inherit from.
         holdout: Camera indices that training never sees.
         make_training: Makes the training of a clip with some settings, not prepared.
+        backend: What clips are decoded and drawn with.
         threads: How measuring is spread.
         report: Told how far it is; what it raises ends the work.
 
@@ -91,6 +92,7 @@ class Mending:
         *,
         holdout: Sequence[int],
         make_training: MakeTraining,
+        backend: Backend,
         threads: Threads | None = None,
         report: ReportProgress = lambda progress: None,
     ) -> None:
@@ -104,7 +106,7 @@ class Mending:
                 hint="Train the reference clip again, or mend the boundary to a clip beside it.",
             )
         self._capture, self._stretch, self._clips, self._reference = capture, stretch, list(clips), reference
-        self._states, self._make, self._report = dict(states), make_training, report
+        self._states, self._make, self._backend, self._report = dict(states), make_training, backend, report
         if unknown := set(reference.header.camera_names) - set(capture.rig.names):
             raise ProjectError(f"The capture has no camera {sorted(unknown)[0]}, which clips were trained with.")
         rows = {name: row for row, name in enumerate(capture.rig.names)}
@@ -224,7 +226,7 @@ class Mending:
     # ---------------------------------------------------------------- helpers
 
     def _trained(self, index: int, state: ClipState) -> TrainedClip:
-        model = load_clip_model(state, self._reference, backend=backend_called())
+        model = load_clip_model(state, self._reference, backend=self._backend)
         trained = TrainedClip.of_state(self._clips[index], model, state, self._reference)
         if trained is None:
             raise ProjectError(f"The file of clip {index} does not hold the colours of its cameras.")
@@ -246,7 +248,7 @@ class Mending:
 
 
 def _with_psnr(clip: CompactClip, held_out_psnr: float | None) -> CompactClip:
-    return clip.with_figures(with_entries(clip.state.header.figures, held_out_psnr=held_out_psnr))
+    return clip.with_figures(with_entries(clip.state.header.figures, held_out_psnr=held_out_psnr, held_out_whole=True))
 
 
 def _named(clips: Mapping[int, object]) -> str:

@@ -19,6 +19,7 @@ from engine.clip_files.roles import STATIC
 from engine.mending.targets import FadedPictures, Looks
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig, config_of
+from engine.training.retired_settings import without_retired
 
 MakeTraining = Callable[[int, TrainConfig], ClipTraining]
 """Clip index and settings to a training that is not prepared."""
@@ -111,14 +112,14 @@ def _n_steps(wanted: int) -> int:
 def _measured_anew(clip: CompactClip, state: ClipState) -> CompactClip:
     """With the header of the clip as it was: its settings and steps are those of its training, its anchors lie in the
     same rows. Figures are gone."""
-    figures = with_entries(state.header.figures, held_out_psnr=None)
+    figures = with_entries(state.header.figures, held_out_psnr=None, held_out_whole=False)
     now = clip.state.header
     header = with_entries(state.header, fingerprint=now.fingerprint, schema=now.schema, rows_of=state.header.origin)
     return CompactClip(ClipState(clip.state.arrays, with_entries(header, metrics=figures)), clip.coded)
 
 
 def _config(state: ClipState) -> TrainConfig:
-    return config_of(state.header.config)
+    return config_of(without_retired(state.header.config))
 
 
 def _slower(config: TrainConfig, share: float) -> TrainConfig:

@@ -31,21 +31,15 @@ _BASES = (
     Column("dssim_range2", "1", False, False, "(1 - SSIM) / 2, constants of data range 2 for pictures in 0..1"),
     Column("dssim_ms", "1", False, False, "(1 - MS-SSIM) / 2, five scales; sides of 176 px and more"),
     Column("flip", "1", False, False, "mean LDR-FLIP, 67 pixels per degree"),
-    Column("lpips", "1", False, False, "LPIPS with VGG-16, version 0.1, inputs in -1..1"),
-    Column("lpips_unscaled", "1", False, False, "the same with inputs left in 0..1, as many tables have it"),
 )
 _MASKED = ("psnr", "ssim", "flip")
 """Figures that exist per pixel, so that they can be taken of a part of the picture."""
-_RAW_ONLY = ("lpips_unscaled",)
-"""There to be compared with published raw figures; a pass of the network takes seconds."""
 
 
 def _table() -> dict[str, Column]:
     found = []
     for base in _BASES:
         for fit, fit_words in (("", ""), ("_fit", ", after the colour fit")):
-            if fit and base.name in _RAW_ONLY:
-                continue
             parts = (("", ""), ("_moving", ", moving pixels"), ("_rest", ", pixels that do not move"))
             for part, part_words in parts if base.name in _MASKED else parts[:1]:
                 words = base.definition + part_words + fit_words
@@ -63,6 +57,8 @@ def _table() -> dict[str, Column]:
     return {column.name: column for column in found}
 
 
+FIGURES_VERSION = 5
+"""Raised when a figure of the same picture changes: kept figures of earlier versions are not mixed with new ones."""
 COLUMNS = _table()
 """Every column by name, in the order of a row. Raw figures have no suffix; `_fit` is after the colour fit, `_light`
 after a fit of smooth local brightness too, `_moving` and `_rest` are of a part of the pixels."""

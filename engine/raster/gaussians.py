@@ -45,6 +45,10 @@ class Gaussians:
         """The same values without history."""
         return Gaussians(*(tensor.detach() for tensor in self.tensors()), is_frozen=self.is_frozen)
 
+    def to(self, device: torch.device, dtype: torch.dtype) -> Gaussians:
+        """The same values elsewhere; frozen rows are not marked any more."""
+        return Gaussians(*(tensor.to(device, dtype) for tensor in self.tensors()))
+
     @staticmethod
     def concatenate(parts: list[Gaussians]) -> Gaussians:
         """All parts one after another; the parts keep their rows in order."""

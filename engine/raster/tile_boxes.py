@@ -33,10 +33,12 @@ class TileBoxes:
 
     def mask(self) -> Tensor:
         """Tiles under any box. [rows, columns] bool"""
-        left, right, top, bottom = self._corners(self.drawn())
+        columns = self.packed[:, 0]
+        is_drawn = ((columns >> 16) >= (columns & 0xFFFF)).long()
+        left, right, top, bottom = (edge * is_drawn for edge in self._corners(self.packed))
         edges = torch.zeros(self.shape[0] + 1, self.shape[1] + 1, dtype=torch.int64, device=self.packed.device)
         for rows, columns, sign in ((top, left, 1), (top, right, -1), (bottom, left, -1), (bottom, right, 1)):
-            edges.index_put_((rows, columns), edges.new_tensor(sign), accumulate=True)
+            edges.index_put_((rows, columns), sign * is_drawn, accumulate=True)
         return edges.cumsum(0).cumsum(1)[:-1, :-1] > 0
 
     def meeting(self, tile_mask: Tensor, rows: Tensor) -> Tensor:
@@ -62,12 +64,13 @@ class TileBoxes:
 
     def _meeting(self, tile_mask: Tensor, rows: Tensor) -> Tensor:
         drawn = self.drawn()
-        left, right, top, bottom = self._corners(drawn)
+        left, right, top, bottom = self._corners(self.packed[drawn])
         sums = torch.nn.functional.pad(tile_mask.long(), (1, 0, 1, 0)).cumsum(0).cumsum(1)
         n_wanted = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
         return rows[drawn[n_wanted > 0]]
 
-    def _corners(self, drawn: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    @staticmethod
+    def _corners(packed: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """First column, column behind the last, first row, row behind the last. [n] int64 each"""
-        columns, rows = self.packed[drawn].long().unbind(1)
+        columns, rows = packed.long().unbind(1)
         return columns & 0xFFFF, (columns >> 16) + 1, rows & 0xFFFF, (rows >> 16) + 1

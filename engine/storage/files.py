@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 import stat
 import time
@@ -16,7 +17,7 @@ from engine.errors import DiskError
 
 PARTIAL_PREFIX = ".partial-"
 """Half-written files begin with this, then with the id of the process that writes them."""
-_MAX_PID_DIGITS = 9
+_PARTIAL_NAME = re.compile(rf"{re.escape(PARTIAL_PREFIX)}([0-9]{{1,9}})-(.+)", re.DOTALL)
 STALE_AFTER_S = 24 * 3600.0
 """A half-written file this old belongs to nobody, whoever may have its process id by now."""
 
@@ -67,20 +68,35 @@ def atomic_folder(path: Path | str) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
-def is_left_over(path: Path, is_alive: Callable[[int], bool]) -> bool:
-    """Whether nobody goes on writing a file that `atomic_path` yielded once: its process is dead, or it is a day old.
+def is_left_over(path: Path, is_alive: Callable[[int], bool], *, of: str = "") -> bool:
+    """Whether `atomic_path` or `atomic_folder` yielded this once, and nobody goes on writing it.
+
+    Its process is dead then, or it is a day old.
 
     Args:
-        path: Has PARTIAL_PREFIX.
+        path: Of any name; those that are not made here are nobody's left-overs.
         is_alive: Tells of the id of a process whether there is one.
+        of: Only what would have become this name; any where empty.
     """
-    number = path.name.removeprefix(PARTIAL_PREFIX).partition("-")[0]
-    if not number.isdecimal() or len(number) > _MAX_PID_DIGITS or not is_alive(int(number)):
+    found = _PARTIAL_NAME.fullmatch(path.name)
+    if found is None or of not in ("", found[2]):
+        return False
+    if not is_alive(int(found[1])):
         return True
     try:
         return time.time() - path.stat().st_mtime > STALE_AFTER_S
     except OSError:  # it is complete by now, or gone
         return False
+
+
+def discard(path: Path) -> bool:
+    """Remove a file, a link or a folder with all that is in it. Whether it is gone; what the disk refuses stays."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
+    return not os.path.lexists(path)
 
 
 def replace_file(source: Path, target: Path, *, is_durable: bool = False) -> None:
@@ -152,6 +168,47 @@ def open_regular(path: Path | str) -> BinaryIO:
         raise
 
 
+def open_to_append(path: Path | str) -> int:
+    """Open a regular file at its end, or make it, and return its descriptor. A link is not followed, and a pipe or a
+    device is refused: neither is what the program has made under this name.
+
+    Raises:
+        OSError: It cannot be opened, or is something else. `strerror` says what, in words.
+    """
+    flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | getattr(os, "O_BINARY", 0)  # to read as well: so no pipe waits
+    try:
+        handle = os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o644)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise _is_link(path) from error
+        if error.errno == errno.ENXIO:
+            raise _is_no_file(path) from error
+        raise
+    try:
+        _check_regular(os.fstat(handle), path)
+    except OSError:
+        os.close(handle)
+        raise
+    return handle
+
+
+def check_folder(path: Path | str) -> None:
+    """See that a folder, if there is one, lies where its name is.
+
+    Raises:
+        OSError: There is something else, such as a symbolic link, or it cannot be looked at. `strerror` says which, in
+            words.
+    """
+    try:
+        mode = os.lstat(path).st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISLNK(mode):
+        raise _is_link(path)
+    if not stat.S_ISDIR(mode):
+        raise NotADirectoryError(errno.ENOTDIR, "it is not a folder", str(path))
+
+
 def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
     """The content of a regular file.
 
@@ -188,4 +245,12 @@ def _check_regular(found: os.stat_result, path: Path | str) -> None:
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
     if not stat.S_ISREG(found.st_mode):
-        raise OSError(errno.EINVAL, "it is a pipe or a device, not a file", str(path))
+        raise _is_no_file(path)
+
+
+def _is_no_file(path: Path | str) -> OSError:
+    return OSError(errno.EINVAL, "it is a pipe or a device, not a file", str(path))
+
+
+def _is_link(path: Path | str) -> OSError:
+    return OSError(errno.ELOOP, "it is a symbolic link", str(path))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from av.audio.resampler import AudioResampler
 
-from engine.capture.media import VIDEO_FAULTS, opened_video
+from engine.capture.files.media import VIDEO_FAULTS, opened_video
 from engine.synchronisation.recording import Recording
 from engine.synchronisation.solving import solve_pairs
 from engine.synchronisation.synchronisation import Estimate, PairOffset

@@ -124,7 +124,7 @@ def _visual(source: SourceName, solution: Solution, n_curves: int, own_sigma: fl
         note = "No two cameras see the same things move."
     else:
         good = np.nanmean(solution.agreements)
-        note = f"{len(solution.pairs)} of {n_curves} pairs tell something, {good:.0%} of it agrees."
+        note = f"{len(solution.pairs)} of {n_curves} pairs tell something, {100 * good:.0f} % of it agrees."
     return Estimate(
         source=source,
         offsets_frames=solution.offsets_frames,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from engine.capture.camera_optics import resize_area
+from engine.capture.cameras.camera_optics import resize_area
 from engine.capture.frames import FrameSource
 from engine.images.image_filters import blurred_difference
 from engine.synchronisation.recording import Recording

@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from engine.capture.capture import FORMATS, Capture
-from engine.capture.frame_files import VIDEO_SUFFIXES, listed
+from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed
+from engine.capture.files.media import read_frame_times, read_video_header
+from engine.capture.files.places import place_in
 from engine.capture.frames import FrameSource, IndexedFrames, VideoFrames
-from engine.capture.media import read_frame_times, read_video_header
+from engine.capture.limits import FPS_RANGE
+from engine.errors import CaptureError
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,25 +81,47 @@ def recordings_in_videos(videos: Sequence[Path], names: Sequence[str] | None = N
     """Plain videos without calibration, one per camera.
 
     Raises:
-        CaptureError: A file is missing or not a video.
+        CaptureError: A file is missing or not a video, or has a single frame or times that no camera has.
     """
     recordings = []
     for row, path in enumerate(videos):
         header = read_video_header(path)
         times_s = read_frame_times(path)
+        _check_times(times_s, path)
         name = path.stem if names is None else names[row]
         source = VideoFrames(path, header.n_frames)
         recordings.append(Recording(name, source, times_s - times_s[0], path, float(times_s[0])))
     return recordings
 
 
-def videos_without_calibration(folder: Path) -> list[Path]:
+def _check_times(times_s: np.ndarray, path: Path) -> None:
+    """Raise CaptureError where times tell no rate that a camera has."""
+    if len(times_s) < 2:
+        raise CaptureError(
+            "The video has 1 frame, so there is nothing to compare.", hint="Take it out of the folder.", path=path
+        )
+    fps, (low, high) = 1.0 / float(np.median(np.diff(times_s))), FPS_RANGE
+    if not low <= fps <= high:
+        raise CaptureError(
+            f"The times of its frames say {fps:.4g} frames per second; cameras have {low:g} to {high:,.0f}.",
+            hint="Copy or export the video again, for example as H.264 in mp4.",
+            path=path,
+        )
+
+
+def videos_without_calibration(folder: Path, *, follow_links: bool = False) -> list[Path]:
     """The videos of a folder that is not a capture of any known layout, in natural order; none where it is one.
 
+    Args:
+        folder: Where to look.
+        follow_links: Whether links in it may lead out of it.
     Raises:
         OSError: The folder cannot be read.
+        OutsideError: A video lies elsewhere.
     """
     if not folder.is_dir() or any(reader.probe(folder).is_match for reader in FORMATS):
         return []
     names = listed(folder, VIDEO_SUFFIXES)
-    return [folder / name for name in names] if len(names) > 1 else []
+    if len(names) < 2:
+        return []
+    return [place_in(folder, name, follow_links=follow_links, named_in=folder) for name in names]

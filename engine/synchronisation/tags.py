@@ -12,7 +12,7 @@ from datetime import datetime
 
 import numpy as np
 
-from engine.capture.media import VIDEO_FAULTS, opened_video
+from engine.capture.files.media import VIDEO_FAULTS, opened_video
 from engine.synchronisation.recording import Recording
 from engine.synchronisation.synchronisation import Estimate, SourceName
 

@@ -15,6 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.backends.backend import Backend
+from engine.backends.phase import PhasePlan
 from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -24,18 +25,17 @@ from engine.clip_files.array_names import CORRECTIONS, DECODER, GAINS, LOG_DRIFT
 from engine.clip_files.clip_header import SCHEMA, ClipHeader, Place
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.clip_files.compact import CompactClip, compact_clip
-from engine.cloud.background.gains import in_gauge
-from engine.errors import NonFiniteLoss, PreparationError, ProjectError
+from engine.errors import PreparationError, ProjectError
 from engine.gate.regions import GateRegion
 from engine.images.psnr import psnr
 from engine.model.camera_colors import CameraColors
 from engine.model.clip_model import ClipModel, decoder_shape, load_clip_model
-from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.model.clip_view import REACH_SPACINGS, render_model
 from engine.model.host_array import host_array
 from engine.progress import Progress, ReportProgress, StepStats
 from engine.training.checkpoint import Checkpoint, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.config import TrainConfig
-from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
+from engine.training.optimizer.optimizer import named_parameters, schedule_of
 from engine.training.phases import phase_at, phases_of
 from engine.training.preparation.clip_field import n_alive
 from engine.training.preparation.clip_preparation import ClipColors, ClipParts, ClipPreparation
@@ -43,13 +43,11 @@ from engine.training.preparation.cloud_preparation import Backgrounds
 from engine.training.preparation.drift import no_drift
 from engine.training.preparation.method import Method
 from engine.training.preparation.training_pictures import TrainingPictures
-from engine.training.step.active_tiles import ActivePicture, ActiveTiles
-from engine.training.step.losses import photometric_loss
-from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
+from engine.training.step.nonfinite import not_finite
 from engine.training.step.order import ShuffledOrder
+from engine.training.step.stepwise_phase import StepwisePhase
 from engine.training.step.training_cameras import TrainingCameras
-from engine.training.step.valid_pixels import ValidPixels
-from engine.training.step.visible_anchors import Sight, camera_views
+from engine.training.step.visible_anchors import camera_views
 
 _SEED_STEP = 1_000_003
 """Between clips that are trained independently; far more than the seeds that people try."""
@@ -134,8 +132,8 @@ class ClipTraining:
             prep_dir=self.prep_dir,
             report=report,
         )
-        self._tiles: ActiveTiles | None = None
         self._items: list[int] = []
+        self._stage = ""
         self._trained: ClipModel | None = None
         """The model before it took over the values that are stored."""
 
@@ -191,19 +189,26 @@ class ClipTraining:
         self._learn_positions()
         parameters = named_parameters(self.model, self.gains, self.config, self._cameras.pixels, extent=self.rig.extent)
         ratios = self.method.final_ratios(parameters, self.config)
-        self._optimizer = PhaseOptimizer(
-            parameters, n_steps=n_steps, config=self.config, final_ratios=ratios, backend=self.backend
+        plan = PhasePlan(
+            model=self.model,
+            gains=self.gains,
+            cameras=self._cameras,
+            pictures=self,
+            is_valid=self.pictures.is_valid,
+            parameters={name: parameter for name, (parameter, _) in parameters.items()},
+            schedule=schedule_of(parameters, self.config, n_steps=n_steps, final_ratios=ratios),
+            reach=REACH_SPACINGS * self.spacing,
+            reaches=reaches,
+            has_rest=name == "source" and self.method.has_active_tiles and not self.gains.requires_grad,
+            ssim_weight=self.config.ssim_weight,
+            volume_weight=self.config.volume_weight,
+            volume_unit=self.spacing if self.config.volume == "mean" else None,
         )
-        self._optimizer.steps_done = steps_in_phase
+        self._phase = self.backend.phase(plan) or StepwisePhase(plan, self.backend)
+        self._phase.restore({}, steps_in_phase)
         self._items = self._items_of(name)
         self._order = ShuffledOrder(len(self._items), seed=self.seed + index)
-        self._phase_index = index
-        # a set may have become dynamic
-        self._sight = Sight(self.model, self._cameras.first_views, reach=self._reach, reaches=reaches)
-        has_rest = name == "source" and self.method.has_active_tiles and not self.gains.requires_grad
-        has_rest = has_rest and ActiveTiles.applies(self.model)
-        self._valid = ValidPixels(self.pictures.is_valid, self.backend.device)
-        self._tiles = ActiveTiles(self.model, backend=self.backend, valid=self._valid) if has_rest else None
+        self._phase_index, self._stage = index, name
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
@@ -228,97 +233,68 @@ class ClipTraining:
             )
         return items
 
-    def step(self) -> StepStats:
-        """Draw a picture, render it, compare, update.
+    def step(self, n: int = 1) -> StepStats:
+        """Steps of one phase, each of which draws a picture, renders it, compares, and updates.
 
+        Args:
+            n: How many; fewer where the phase ends.
         Raises:
-            NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before this step.
+            NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before that step.
         """
-        index, _ = phase_at(self.phases, self.steps_done)
+        index, done = phase_at(self.phases, self.steps_done)
         if index != self._phase_index:
             self._add_moving()
             self._start_phase(index, 0)
-        stage, item = self.phases[index][0], self._items[self._order.draw()]
-        if stage == "static":
-            camera_row, clip_time = item, 0.0
-            truth = self.backgrounds.images[camera_row]
-            is_counted = self._tensor(self.backgrounds.is_stable[camera_row])  # unstable pixels do not count
-        else:
-            camera_row, frame = divmod(item, self.clip.n_frames)
-            clip_time = frame / self.clip.clip_length
-            truth, is_counted = self.pictures.picture(camera_row, frame), self._counted(camera_row, frame)
-        view = self._cameras.view(camera_row)
-        self.model.follow_positions()
-        active = self._active_picture(camera_row, view, clip_time)
-        self._cameras.watch(active.gaussians)
-        image = render_gaussians(active.gaussians, view, backend=self.backend, tile_mask=active.tile_mask).image[0]
-        pixels = self._tensor(truth)
-        compared = photometric_loss(
-            image,
-            pixels,
-            backend=self.backend,
-            ssim_weight=self.config.ssim_weight,
-            gain=self.gains[camera_row],
-            is_counted=is_counted,
-            tile_mask=active.tile_mask,
-            rest=active.rest,
-        )
-        loss, mean_square, volume = compared.loss, compared.mean_square, compared.loss.new_zeros(())
-        if self._tiles is not None and pixels.dtype == torch.uint8:  # sums of what was taken are kept, no others
-            mean_square += self._tiles.square_outside(active, item, pixels, self.gains[camera_row])
-        if self.config.volume_weight and active.n_all:
-            is_mean = self.config.volume == "mean"
-            unit, n_counted = (self.spacing, active.n_all) if is_mean else (1.0, 1)
-            volume = (self.config.volume_weight / n_counted) * self.backend.volume_sum(active.learning.scales, unit)
-            loss = loss + volume
-        value = float(loss.detach())
-        where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
-        if not np.isfinite(value):
-            terms = {"photometric": float(compared.loss.detach()), "volume": float(volume.detach())}
-            raise loss_not_finite(image=image.detach(), **terms, where=where, config=self.config)
-        if loss.requires_grad:
-            loss.backward()
-            self._cameras.take_gradient(camera_row)
-        try:
-            gradient_norm = self._optimizer.step()
-        except NonFiniteLoss as error:
-            raise gradient_not_finite(error, where=where, config=self.config) from error
-        if self.gains.requires_grad:  # a step moves all cameras a little together; what is unseen stays at gain 1
-            with torch.no_grad():
-                self.gains.copy_(self._tensor(in_gauge(host_array(self.gains))))
-        self._cameras.settle()
-        self.steps_done += 1
+        order = self._order.state() if n > 1 else {}
+        items = [self._items[self._order.draw()] for _ in range(min(n, self.phases[index][1] - done))]
+        stats = self._phase.run(items)
+        n_done = len(stats.losses)
+        self.steps_done += n_done
+        if stats.fault is not None:
+            if n_done + 1 < len(items):  # what was drawn for the steps behind is drawn again
+                self._order.restore(order)
+                items = [self._items[self._order.draw()] for _ in range(n_done + 1)]
+            where = f"step {self.steps_done + 1}, camera {self.rig.names[self.place(items[n_done])[0]]}"
+            raise not_finite(stats.fault, where=where, config=self.config)
+        valid, camera_row = self.pictures.is_valid, self.place(items[-1])[0]
+        share = 1.0 if valid is None else float(valid[camera_row].mean())
+        norms, limit = stats.gradient_norms, self.config.max_gradient_norm
         return StepStats(
             step=self.steps_done,
             n_steps=self.n_steps,
-            loss=value,
-            train_psnr=-10.0 * float(np.log10(max(mean_square / self._valid.share_of(camera_row), 1e-10))),
-            n_gaussians=active.n_all,
-            stage=stage,
-            gradient_norm=gradient_norm,
-            is_clipped=self._optimizer.clips(gradient_norm),
+            loss=sum(stats.losses) / n_done,
+            train_psnr=-10.0 * float(np.log10(max(stats.mean_square / share, 1e-10))),
+            n_gaussians=stats.n_gaussians,
+            stage=self._stage,
+            gradient_norms=tuple(norms),
+            n_clipped=sum(0.0 < limit < norm for norm in norms),
         )
 
-    def _counted(self, camera_row: int, frame_in_clip: int) -> Tensor | None:
-        """Pixels of a picture that count: those of its camera, without what is excluded of it. None for all."""
+    # ---------------------------------------------------------------- what a phase asks for
+
+    def place(self, item: int) -> tuple[int, float]:
+        """See PhasePictures."""
+        if self._stage == "static":
+            return item, 0.0
+        camera_row, frame = divmod(item, self.clip.n_frames)
+        return camera_row, frame / self.clip.clip_length
+
+    def truth(self, item: int) -> np.ndarray:
+        """See PhasePictures."""
+        if self._stage == "static":
+            return self.backgrounds.images[item]
+        return self.pictures.picture(*divmod(item, self.clip.n_frames))
+
+    def counted(self, item: int) -> np.ndarray | None:
+        """See PhasePictures."""
+        if self._stage == "static":
+            return self.backgrounds.is_stable[item]  # unstable pixels do not count
         if self.capture.exclusions == NOTHING_EXCLUDED:
-            return self._valid.of(camera_row)
-        valid = self.pictures.valid_in(camera_row, frame_in_clip)
-        return None if valid is None else self._tensor(valid)
+            return None
+        return self.pictures.valid_in(*divmod(item, self.clip.n_frames))
 
     def _tensor(self, array: np.ndarray) -> Tensor:
         return torch.from_numpy(array).to(self.backend.device)
-
-    def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
-        rows = self._sight.rows(camera_row, clip_time)
-        if self._tiles is not None:
-            return self._tiles.split(camera_row, view, clip_time, rows)
-        gaussians = self.model.decode(clip_time, rows)
-        return ActivePicture(gaussians, gaussians, len(gaussians), self._valid.tiles_of(camera_row))
-
-    @property
-    def _reach(self) -> float:
-        return REACH_SPACINGS * self.spacing
 
     # ---------------------------------------------------------------- what came of it
 
@@ -331,7 +307,7 @@ class ClipTraining:
             if not self.capture.is_usable(camera, frame):
                 continue
             clip_time = self.clip.clip_time(frame)
-            image = render_model(self.model, self._views[camera], clip_time, reach=self._reach)
+            image = render_model(self.model, self._views[camera], clip_time, reach=REACH_SPACINGS * self.spacing)
             shown = colors.in_camera(host_array(image), self.capture.rig, camera, clip_time)
             values.append(psnr(shown, self.capture.frame(camera, frame) / 255.0, self.capture.valid_in(camera, frame)))
         return float(np.mean(values)) if values else float("nan")
@@ -394,7 +370,6 @@ class ClipTraining:
         entries = None if self.method.keeps_unread_entries else self.model.entries_in_use()
         compact = compact_clip(state, entries, is_exact=self.config.storage == "exact")
         self.model = load_clip_model(compact.state, self.reference, backend=self.backend, is_learning=True)
-        self._sight = Sight(self.model, self._cameras.first_views, reach=self._reach)
         return compact
 
     def measured_colors(self) -> ClipColors:
@@ -466,8 +441,8 @@ class ClipTraining:
             generator=self._generator.get_state().tolist(),
         )
         state = self._state_of(self._trained or self.model)
-        state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
-        reaches = {role: host_array(reach) for role, reach in self._sight.reaches.items()}
+        state = ClipState(state.arrays | self._phase.arrays(), state.header)
+        reaches = {role: host_array(reach) for role, reach in self._phase.reaches.items()}
         gains = host_array(self.gains).copy()
         write_checkpoint(path, Checkpoint(state, gains, self.backgrounds, place, reaches, self._cameras.kept))
 
@@ -521,7 +496,7 @@ class ClipTraining:
         self.steps_done = header.step
         reaches = {role: self._tensor(reach) for role, reach in kept.reaches.items()}
         self._start_phase(place.phase_index, place.steps_in_phase, reaches)
-        self._optimizer.restore(kept.state.arrays, place.steps_in_phase)
+        self._phase.restore(kept.state.arrays, place.steps_in_phase)
         self._order.restore(place.order)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))
 

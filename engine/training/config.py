@@ -11,9 +11,8 @@ from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
-from engine.backends.table import BACKENDS, DEFAULT
 from engine.errors import ProjectError
-from engine.training.setting import Value, setting, settings_of
+from engine.setting import Value, setting, settings_of
 
 MODEL, CLOUDS, COLORS, CAMERAS, LENGTH = "Model", "Point clouds", "Camera colours", "Cameras", "Length of the training"
 RATES, LOSS, GATE, STEP, SHARING = "Learning rates", "Loss", "Gate", "Training step", "What a source clip takes over"
@@ -320,15 +319,6 @@ class TrainConfig(msgspec.Struct, frozen=True):
             {"active": "only tiles that a learning Gaussian touches", "all": "whole pictures"},
         ),
     ] = "active"
-    backend: Annotated[
-        str,
-        _choice(
-            STEP,
-            "What a training is computed with; what is learned is the same but for rounding.",
-            {name: entry.words for name, entry in BACKENDS.items()},
-        ),
-    ] = DEFAULT
-
     storage: Annotated[
         str,
         _choice(
@@ -491,6 +481,7 @@ def parse_overrides(assignments: Sequence[str]) -> dict[str, Value]:
         if not separator:
             raise ProjectError(f"Setting '{assignment}' has no '='.", hint="Write it as key=value.")
         if name not in SETTINGS:
-            raise ProjectError(f"Setting '{name}' does not exist.", hint=f"Known settings: {', '.join(SETTINGS)}.")
+            hint = "Choose it with --backend." if name == "backend" else f"Known settings: {', '.join(SETTINGS)}."
+            raise ProjectError(f"Setting '{name}' does not exist.", hint=hint)
         values[name] = SETTINGS[name].parse(text)
     return values

@@ -84,3 +84,9 @@ def preset(name: str) -> dict[str, Any]:
     if name not in PRESETS:
         raise ProjectError(f"There is no preset called '{name}'.", hint=f"Presets are {', '.join(PRESETS)}.")
     return dict(PRESETS[name])
+
+
+def closest_preset(overrides: dict[str, Any]) -> str:
+    """The preset with the most settings among those that hold all of its own."""
+    fitting = [name for name, values in PRESETS.items() if values.items() <= overrides.items()]
+    return max(fitting, key=lambda name: len(PRESETS[name]))

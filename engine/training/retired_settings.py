@@ -1,5 +1,5 @@
 """Settings that projects of earlier versions store and this one does not have: they are dropped when such a project is
-read, so that it opens and trains on as it does without them."""
+read, so that it opens and trains on as it does without them, and what was kept with them is found again."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 RETIRED_SETTINGS: dict[str, Collection[object] | None] = {
+    "backend": None,  # belongs to the machine: engine.backends.table
     "coarse_share": None,
     "decode_backend": None,
     "patience": None,

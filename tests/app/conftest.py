@@ -12,10 +12,11 @@ import pytest
 from app.cli.cli import main
 from app.plan import speed
 from app.project.opened_project import OpenedProject, opened_project
-from app.project.project import Project, create_project, default_settings
+from app.project.project import Project
+from app.project.project_access import create_project, default_settings
 from app.session.commands import OpenCapture
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from app.training.interface import MakeTraining
 from app.training.messages import TrainJob
 from engine.capture.capture import open_capture
@@ -42,7 +43,8 @@ def own_user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """No test measures how fast this machine is."""
     monkeypatch.setattr(speed, "is_cache_warm", lambda: True)
-    monkeypatch.setattr(speed, "_timed_once", lambda sizes, phase: 0.0123)
+    monkeypatch.setattr(speed, "_known", {})
+    monkeypatch.setattr(speed, "run_child", lambda *_, **__: 0.0123)
 
 
 def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from app.project.opened_project import OpenedProject
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.training.messages import TrainJob
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip
@@ -120,14 +120,15 @@ class FakeTraining:
         for share in (0.0, 0.5, 1.0):
             self.report(Progress("Building the cloud", share, f"{share:.0%} of 12 points"))
 
-    def step(self) -> StepStats:
+    def step(self, n: int = 1) -> StepStats:
         if self.fails_at is not None and self.steps_done == self.fails_at:
             raise NonFiniteLoss(f"The loss became nan at step {self.steps_done + 1}.", hint="Lower the rates.")
-        self.steps_done += 1
-        self.value = self.value * 0.5 + self.steps_done
-        return StepStats(
-            self.steps_done, self.n_steps, 1.0 / self.steps_done, 20.0, 12, "joint", float(self.steps_done)
-        )
+        norms = []
+        for _ in range(min(n, self.n_steps - self.steps_done)):
+            self.steps_done += 1
+            self.value = self.value * 0.5 + self.steps_done
+            norms.append(float(self.steps_done))
+        return StepStats(self.steps_done, self.n_steps, 1.0 / self.steps_done, 20.0, 12, "joint", tuple(norms))
 
     def state(self) -> ClipState:
         reference, previous = self.reference, self.previous

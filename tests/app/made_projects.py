@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from app.project.project import Project, ProjectSettings, create_project
+from app.document.project_settings import ProjectSettings
+from app.project.project import Project
+from app.project.project_access import create_project
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from tests.app.fakes import anchor_arrays

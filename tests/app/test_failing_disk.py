@@ -75,6 +75,21 @@ def test_live_snapshots_come_back_when_there_is_room_again(bench, monkeypatch):
     assert len(it.of(m.WarningRaised)) == 2  # full again is news
 
 
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to(path.parents[2] / "letter")])
+def test_curves_that_are_something_else_are_left_alone_and_said_once(bench, make, tmp_path):
+    (tmp_path / "letter").write_text("x")
+    it = bench(n_steps=5)
+    it.steps(1)
+    path = it.project.unfinished_metrics_path(0)
+    path.unlink(missing_ok=True)
+    path.parent.mkdir(exist_ok=True)
+    make(path)
+    it.steps(4)
+    (told,) = it.of(m.WarningRaised)
+    assert told.title == "The curves could not be written"
+    assert (tmp_path / "letter").read_text() == "x"
+
+
 def test_a_checkpoint_is_due_by_the_clock_however_slowly_it_is_written(bench, monkeypatch):
     it = bench(n_steps=1000)
     it.steps(1)
@@ -110,6 +125,32 @@ def test_a_clip_that_cannot_be_put_in_its_place_is_a_checkpoint_until_it_can(ben
     assert it.steps(20) is False
     assert isinstance(it.events[-1], m.ClipTrained)
     assert not it.checkpoint.exists()
+
+
+def test_a_disk_full_of_finished_preparation_takes_the_clip_once_that_is_gone(bench, monkeypatch):
+    it = without_window(bench(n_steps=5))
+    it.steps(2)
+    prep = it.project.prep_dir
+    prep.mkdir(exist_ok=True)
+    for name in ("clip-0000-0", "clip-0000-1", "clip-0001-0", "backgrounds"):
+        (prep / f"{name}.safetensors").write_text("x")
+    disk = Disk(monkeypatch, "clips", "checkpoints")
+    monkeypatch.setattr("os.replace", full_while(lambda: (prep / "clip-0000-1.safetensors").exists(), disk))
+    assert it.steps(20) is False
+    assert isinstance(it.events[-1], m.ClipTrained)
+    assert disk.n_refused == 1
+    assert it.of(m.WarningRaised) == []
+    assert sorted(path.name for path in prep.iterdir()) == ["backgrounds.safetensors", "clip-0001-0.safetensors"]
+
+
+def full_while(is_full, disk: Disk):
+    replace = os.replace
+
+    def act(source, target):
+        disk.is_full = is_full()
+        replace(source, target)
+
+    return act
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
@@ -283,10 +324,10 @@ def test_a_project_deleted_while_training_ends_with_1_and_is_not_made_again(run,
         training = make_fake(job, report)
         ordinary = training.step
 
-        def step():
+        def step(n=1):
             if training.steps_done == 2:
                 shutil.rmtree(job.project)
-            return ordinary()
+            return ordinary(n)
 
         training.step = step
         return training

@@ -49,7 +49,7 @@ def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
 
 def test_a_live_state_is_shown_and_given_back(live_session, caplog):
     session = live_session
-    caplog.set_level(logging.INFO, logger="app.session.live_training")
+    caplog.set_level(logging.INFO, logger="app.session.training.live_training")
     shown = []
 
     def is_another_shown() -> bool:

@@ -2,19 +2,24 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from app.applying.deletions import loaded
 from app.cli.cli import main
 from app.evaluation.evaluation import boundary_maps
 from app.evaluation.headless import open_trained
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.session import commands as c
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from engine.assets import asset_path
+from engine.backends import table
+from engine.backends.table import AUTO, Entry, backend_called
 from engine.capture.capture import open_capture
+from engine.clip_files.clip_state import read_clip_state
 from tests.app.conftest import poll_until
 from tests.built_once import BuiltOnce
 
@@ -43,6 +48,33 @@ def trained(tmp_path_factory: pytest.TempPathFactory, built_once: BuiltOnce) -> 
 
     folder = tmp_path_factory.mktemp("project")
     return built_once.copy("project", folder, train, sources=["app", "tests/app/test_real_training.py"]) / "p"
+
+
+def test_a_process_computes_everything_with_its_back_end(trained, tmp_path, monkeypatch):
+    counting = Entry("tests.engine.backends.counting.backend:CountingCpu", "counts")
+    # without "cpu", for which nobody may ask
+    monkeypatch.setattr(table, "BACKENDS", {"counting": counting, "reference": table.BACKENDS["reference"]})
+    monkeypatch.setattr(table, "_chosen", AUTO)
+    backend: Any = backend_called("counting")
+    quiet = ["--backend", "counting", "--quiet"]
+    assert (
+        main(["eval", str(trained), "--clips", "1", "--metrics", "quick", "--json", str(tmp_path / "e.json"), *quiet])
+        == 0
+    )
+    n_measured = dict(backend.n_calls)
+    assert n_measured["decode"] >= 10
+    assert n_measured["rasterize"] >= 10
+    assert (
+        main(
+            ["render", str(trained), "--camera", "0", "--frames", "10:12", "--out", str(tmp_path / "pictures"), *quiet]
+        )
+        == 0
+    )
+    assert backend.n_calls["rasterize"] >= n_measured["rasterize"] + 2
+    opened = open_trained(open_project(trained, is_writable=False))
+    model = loaded(read_clip_state(opened.project.clip_path(1)), opened.reference).model
+    assert model.backend is opened.load(1).model.backend is backend
+    assert main(["eval", str(trained), "--json", str(tmp_path / "f.json"), "--backend", "cpu"]) == 2
 
 
 def test_eval_has_one_row_per_clip_frame_and_camera(trained, tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.project.metrics_file import read_metrics
-from app.project.project import create_project, default_settings
+from app.project.project_access import create_project, default_settings
 from app.training import messages as m
 from app.training.rate import Rate
 from app.training.run import CHECKPOINT_EVERY_S, TrainingRun
@@ -131,14 +131,14 @@ def test_stopping_in_a_change_of_phase_keeps_the_state_before_it(bench):
     def add_phase(it):
         ordinary = it.training.step
 
-        def step():
+        def step(n=1):
             if it.training.steps_done == 5:
                 it.training.report(Progress("Carving", 0.0))
                 it.training.value = 1e9  # half changed: must not be kept
                 it.commands.append(m.Stop(keep=True))
                 it.training.report(Progress("Carving", 0.5))
                 raise AssertionError("not reached")
-            return ordinary()
+            return ordinary(n)
 
         it.training.step = step
 
@@ -186,7 +186,7 @@ def test_a_full_disk_costs_the_snapshot_not_the_training(bench, monkeypatch):
 
 def test_a_fault_of_the_program_is_reported_with_its_trace(bench):
     def break_it(it):
-        it.training.step = lambda: 1 // 0
+        it.training.step = lambda n: 1 // 0
 
     it = bench(change=break_it)
     assert it.steps(2) is False
@@ -201,7 +201,7 @@ def test_a_fault_of_the_program_is_reported_with_its_trace(bench):
 def test_clipped_steps_are_counted_and_told(bench, n_clipped):
     def clip_some(it):
         ordinary = it.training.step
-        it.training.step = lambda: replace(stats := ordinary(), is_clipped=stats.step <= n_clipped)
+        it.training.step = lambda n: replace(stats := ordinary(n), n_clipped=int(stats.step <= n_clipped))
 
     it = bench(n_steps=5, change=clip_some)
     assert it.steps(10) is False
@@ -293,6 +293,29 @@ def test_what_is_dear_is_done_less_often():
     assert cadence.is_due(22.0)  # counted from the start of the last one
 
 
+def test_so_many_steps_are_done_at_once_as_go_into_a_report(tmp_path, capture_folder):
+    asked = []
+
+    def take_time(it):
+        ordinary = it.training.step
+
+        def step(n=1):
+            asked.append(n)
+            it.now_s += 0.01 * n
+            return ordinary(n)
+
+        it.training.step = step
+
+    it = Bench(tmp_path / "p", capture_folder, n_steps=60, change=take_time)
+    it.run._can_wait = True
+    it.steps(60, each_s=0.0)
+    assert asked[:6] == [1, 2, 4, 8, 10, 10]
+    reported = it.of(m.StepReported)
+    assert reported[-1].step == 60
+    assert len(it.of(m.ClipTrained)) == 1
+    assert reported[-1].gradient_norm == 60.0
+
+
 def test_the_rate_follows_and_leaves_pauses_out():
     rate = Rate(time_constant_s=5.0)
     assert rate.eta_s(10) is None
@@ -321,9 +344,9 @@ def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_w
 
         ordinary = it.training.step
 
-        def step():
+        def step(n=1):
             it.now_s += 0.5
-            return ordinary()
+            return ordinary(n)
 
         it.training.prepare, it.training.step = prepare, step
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shutil
 import threading
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,13 +15,16 @@ import pytest
 
 from app.background.jobs import Jobs
 from app.project.opening import Opened, open_for_window
+from app.project.opening_answers import default_answers
 from app.session import commands as c
-from app.session.questions import ProjectQuestion, RetrainQuestion
+from app.session.projects.settings import Settings
+from app.session.questions import ProjectQuestion, RetrainQuestion, StartOverQuestion
 from app.session.session import Session
-from app.session.settings import Settings
+from engine.capture.capture import open_capture
+from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.user_folders import data_dir
 from tests.app.conftest import inline, poll_until
-from tests.app.fakes import make_fake, write_capture
+from tests.app.fakes import make_fake, make_slow, write_capture
 
 
 def train_next(session: Session) -> None:
@@ -78,17 +85,118 @@ def test_of_two_captures_the_one_asked_for_last_is_opened_however_long_the_other
     session.close()
 
 
-def test_a_capture_opens_the_project_that_it_was_last_trained_in_and_says_so(
-    open_session, make_session, capture_folder, tmp_path
+def test_what_is_said_of_frames_of_another_shape_is_kept_in_the_capture(open_session, capture_folder, tmp_path):
+    folder = Path(shutil.copytree(capture_folder, tmp_path / "capture"))
+    layout = open_capture(folder).layout
+    width, height = layout.cameras[0].image_size
+    document = capture_document(layout, folder) | {"cameras": []}
+    for row in capture_document(layout, folder)["cameras"]:
+        document["cameras"].append(row | {"width": width + 2, "height": height * (width + 2) // width - 1})
+    write_capture_json(folder, document | {"fit": "cropped_end"})
+    before = open_capture(folder)
+    answers = replace(default_answers(before), fit="cropped_start")
+    session = open_session(None)
+    session.dispatch(c.OpenCapture(folder, is_new_project=True, answers=answers))
+    poll_until(session, lambda: session.capture is not None, what="the capture")
+    assert json.loads((folder / "capture.json").read_text())["fit"] == "cropped_start"
+    after = open_capture(folder)
+    assert after.layout.cameras[0].K[0, 2] == before.layout.cameras[0].K[0, 2] - before.layout.cameras[0].misfit_px
+
+
+def test_frames_of_quite_another_shape_are_asked_about_before_anything_is_made_of_them(
+    open_session, capture_folder, tmp_path
 ):
+    folder = Path(shutil.copytree(capture_folder, tmp_path / "capture"))
+    layout = open_capture(folder).layout
+    document = capture_document(layout, folder)
+    for row in document["cameras"]:
+        row["height"] += 6
+    write_capture_json(folder, document)
+    session = open_session(None)
+    session.dispatch(c.OpenCapture(folder))  # as from the command line
+    poll_until(session, lambda: session.opening.page is not None, what="the question")
+    page = session.opening.page
+    assert page is not None
+    assert page.report.needs_fit
+    assert "scaled or cropped" in session.opening.problem(page.answers)
+    answers = replace(page.answers, fit="scaled")
+    assert session.opening.problem(answers) == ""
+    session.dispatch(c.OpenCapture(folder, is_new_project=True, answers=answers))
+    poll_until(session, lambda: session.capture is not None, what="the capture")
+    assert json.loads((folder / "capture.json").read_text())["fit"] == "scaled"
+
+
+def test_a_capture_that_has_a_project_offers_it_and_a_new_one(open_session, make_session, capture_folder, tmp_path):
     session = make_session(name="own")
+    session.dispatch(c.SetPreset("toy"))
     train_next(session)
     session.close()
     again = open_session(capture_folder)
-    assert again.project.folder == tmp_path / "own"
-    (notice,) = again.notices
-    assert (notice.kind, notice.detail) == ("info", f"1 of 1 clips trained - {tmp_path / 'own'}")
+    assert isinstance(again.question, ProjectQuestion)
+    (choice,) = again.question.choices
+    assert (choice.folder, choice.preset, choice.trained_text) == (tmp_path / "own", "toy", "1 of 1 clips trained")
+    assert choice.opened
     assert not (data_dir() / "projects").exists()
+    again.dispatch(c.OpenProject(choice.folder))
+    poll_until(again, lambda: again.capture is not None, what="the project")
+    again.dispatch(c.NewProject())
+    poll_until(again, lambda: again.opening.page is not None, what="the dialog")
+    page = again.opening.page
+    assert page.folder.parent == data_dir() / "projects"
+    again.dispatch(c.OpenCapture(page.report.path, is_new_project=True, answers=page.answers))
+    poll_until(again, lambda: again.project.folder == page.folder, what="the new project")
+    assert len(again.recent.entries) == 2
+
+
+def test_projects_go_where_the_user_wants_them(open_session, capture_folder, tmp_path):
+    session = open_session(None)
+    session.dispatch(c.SetProjectsFolder(str(tmp_path / "mine")))
+    session.dispatch(c.OpenCapture(capture_folder))
+    poll_until(session, lambda: session.capture is not None, what="the project")
+    assert session.project.folder.parent == tmp_path / "mine"
+
+
+def test_settings_change_while_no_clip_is_finished_and_say_what_goes(make_session):
+    session = make_session(make_training=make_slow)
+    session.dispatch(c.SetPreset("toy"))
+    session.dispatch(c.TrainNextClip())
+    poll_until(session, lambda: session.training.step >= 2, what="steps")
+    session.dispatch(c.SetPreset("small"))
+    assert "Stop the training first." in session.notices[-1].hint
+    session.dispatch(c.StopTraining())
+    poll_until(session, lambda: session.training.state == "idle", what="the end")
+    poll_until(session, lambda: session.plan is not None, what="the plan")
+    assert session.plan.can_edit
+    assert session.plan.discards.startswith("the progress of clip 0 (step ")
+    assert session.project.checkpoint_path(0).is_file()
+    session.dispatch(c.SetPreset("small"))
+    assert session.project.settings.overrides == {}
+    assert session.notices[-1].detail.startswith("The progress of clip 0 (step ")
+    assert not session.project.checkpoint_path(0).exists()
+    assert [state.state for state in session.clip_states] == ["untrained"]
+
+
+def test_starting_over_says_what_it_costs_and_frees_the_settings(make_session):
+    session = make_session()
+    session.dispatch(c.SetPreset("toy"))
+    session.dispatch(c.SetClipLength(3))
+    for _ in range(2):
+        train_next(session)
+    session.dispatch(c.AskStartOver())
+    poll_until(session, lambda: isinstance(session.question, StartOverQuestion), what="the question")
+    words = session.question.discards
+    assert re.fullmatch(r"2 trained clips \(\d+:\d\d of training\), \d+(\.\d)? [kM]B", words)
+    assert (session.question.preset, "paper" in session.question.presets) == ("toy", True)
+    folder = session.project.folder
+    session.dispatch(c.StartOver("medium"))
+    assert session.question.is_working
+    poll_until(session, lambda: session.question is None, what="the end")
+    assert [state.state for state in session.clip_states] == ["untrained", "untrained"]
+    assert session.project.settings.overrides["passes"] == 16
+    assert session.notices[-1].detail == f"Discarded: {words}."
+    assert not [path for path in folder.rglob("*.safetensors") if path.parent.name != "prep"]
+    train_next(session)
+    assert session.clip_states[0].state == "trained"
 
 
 def test_of_several_projects_of_a_capture_the_user_chooses(open_session, make_session, capture_folder, tmp_path):

@@ -26,7 +26,16 @@ def test_a_plan_as_json(run, capture_folder, tmp_path):
     code, out, err = run(*arguments, "--plan", "--json", "--preset", "toy")
     assert code == 0, err
     document = json.loads(out)
-    assert document.keys() == {"schema", "project", "capture", "holdout", "settings", "clips", "forecast"}
+    assert document.keys() == {
+        "schema",
+        "project",
+        "capture",
+        "holdout",
+        "settings",
+        "clips",
+        "discards",
+        "forecast",
+    }
     assert (document["schema"], document["holdout"]) == (2, ["0"])
     assert document["settings"]["passes"] == 4
     assert [(clip["clip_index"], clip["state"], clip["role"]) for clip in document["clips"]] == [
@@ -75,7 +84,13 @@ def test_a_plan_of_a_trained_project_with_other_settings_is_refused(run, capture
     assert run(*arguments)[0] == 0
     code, _, err = run(*arguments, "--plan", "--set", "passes=3")
     assert code == 2
-    assert "cannot change any more" in err
+    assert "cannot change any more: 1 trained clip" in err
+    assert "--start-over" in err
+    code, out, _ = run(*arguments, "--plan", "--set", "passes=3", "--start-over")
+    assert code == 0
+    assert out.startswith("Discards 1 trained clip (")
+    assert "Clip 0, frames 0 to 5, reference" in out
+    assert len(list((tmp_path / "p" / "clips").iterdir())) == 1  # nothing has happened yet
     code, out, _ = run(*arguments, "--plan")
     assert (code, out) == (0, "Trained already: clip 0\n")
 
@@ -83,7 +98,7 @@ def test_a_plan_of_a_trained_project_with_other_settings_is_refused(run, capture
 def test_training_says_its_plan_and_how_right_it_was(run, capture_folder, tmp_path):
     arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3)
     _, _, err = run(*arguments)
-    assert re.search(r"Clip 0: 1,500 steps, about \d+:\d\d \(\d+:\d\d preparation\), 0\.\d GB of memory", err)
+    assert re.search(r"Clip 0: 1,500 steps, about \d+:\d\d \(preparation \d+:\d\d\), 0\.\d GB of memory", err)
     assert len(re.findall(r"Times: a step of about this size takes 12\.3 ms", err)) == 2  # one of each kind
     figures = r"preparation \S+ against \S+ s, training \S+ against \S+ s, memory \S+ against \S+ MB"
     assert len(re.findall(f"Forecast against measured: {figures}", err)) == 2

@@ -42,6 +42,21 @@ def test_a_process_trains_a_clip(make_session):
     assert "trains clip 0" in session.project.log_path(0).read_text()
 
 
+def test_a_log_that_is_a_pipe_or_a_link_holds_up_no_worker(make_session, tmp_path):
+    session = make_session(launch=launch(make_fake))
+    log = session.project.log_path(0)
+    log.parent.mkdir()
+    for make in (os.mkfifo, lambda path: path.symlink_to(tmp_path / "profile")):
+        make(log)
+        session.dispatch(c.TrainNextClip())
+        poll_until(session, lambda: session.training.state in ("idle", "failed"))
+        assert session.training.state == "idle", list(session.notices)
+        assert "The log of the training could not be written" in [notice.title for notice in session.notices]
+        log.unlink()
+        log = session.project.log_path(1)
+    assert not (tmp_path / "profile").exists()
+
+
 def test_a_worker_chooses_the_folder_of_kernels_and_how_long_threads_spin(make_session, monkeypatch):
     for name in ("NUMBA_CACHE_DIR", "GOMP_SPINCOUNT"):
         monkeypatch.delenv(name, raising=False)
@@ -97,7 +112,7 @@ def test_closing_ends_the_process_and_keeps_what_it_learned(make_session, monkey
 PARENT = """
 import os, sys
 from pathlib import Path
-from app.project.project import create_project, default_settings
+from app.project.project_access import create_project, default_settings
 from app.training.messages import StepReported, TrainJob
 from app.training.process import ProcessWorker
 from engine.capture.capture import open_capture
@@ -124,7 +139,7 @@ def test_a_worker_whose_window_was_killed_keeps_what_it_learned_and_ends(tmp_pat
         [sys.executable, str(script), str(capture_folder), str(tmp_path / "p")],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
         check=False,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         cwd=tmp_path,
@@ -132,7 +147,7 @@ def test_a_worker_whose_window_was_killed_keeps_what_it_learned_and_ends(tmp_pat
     assert done.returncode == 9, done.stderr
     log = tmp_path / "p" / "logs" / "clip-0000.log"
     deadline = subprocess.run(  # waits for the end of a process that is not our child
-        [sys.executable, "-c", WAIT_FOR_TEXT, str(log), "ends"], timeout=60, check=False
+        [sys.executable, "-c", WAIT_FOR_TEXT, str(log), "ends"], timeout=600, check=False
     )
     assert deadline.returncode == 0, log.read_text()
     assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header.step > 0
@@ -141,7 +156,7 @@ def test_a_worker_whose_window_was_killed_keeps_what_it_learned_and_ends(tmp_pat
 WAIT_FOR_TEXT = """
 import sys, time
 from pathlib import Path
-until = time.monotonic() + 30
+until = time.monotonic() + 500
 while not (Path(sys.argv[1]).is_file() and sys.argv[2] in Path(sys.argv[1]).read_text()):
     if time.monotonic() > until:
         sys.exit(1)

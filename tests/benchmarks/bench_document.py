@@ -16,9 +16,9 @@ from pathlib import Path
 
 from msgspec import structs
 
-from app.document.document_store import DocumentStore
 from app.document.history import Changed, DocumentHistory, Undone
 from app.document.project_document import ProjectDocument
+from app.document.storing.document_store import DocumentStore
 from tests.app.document.documents import EMPTY, picked_edit, random_events
 
 N_STEPS, N_EDITS, N_PICKS = 500, 1000, 50_000

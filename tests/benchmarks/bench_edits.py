@@ -17,22 +17,10 @@ from typing import Any
 import numpy as np
 
 from app.evaluation.headless import open_trained
-from app.project.project import open_project
+from app.project.project_access import open_project
+from engine.editing.actions import Delete, Expose, Hold, Recolor, Smooth, Transform
 from engine.editing.clip_rows import named_sets
-from engine.editing.edit import (
-    Box,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hold,
-    Picked,
-    PickedRows,
-    Recolor,
-    Smooth,
-    Sphere,
-    Transform,
-)
+from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Sphere
 from engine.editing.edited_clip import EditedClip
 from engine.editing.effects import NO_EFFECTS, Effects
 from engine.editing.picks import pack_rows

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from app.residuals.heat_map import HEAT_KINDS
 from app.session.commands import LookThrough, OpenProject, SetFrame
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from engine.kernels.cache import use_kernel_cache
 
 POLL_S = 0.001

@@ -25,17 +25,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from app.document.project_settings import ProjectSettings
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.lab.ablation.running import Callbacks, project_folder, run_ablation
 from app.lab.ablation.variants import FULL, Variant, chosen_variants
+from app.lab.flicker import flicker_figures
 from app.lab.report.charts import Curve, CurvePanel, draw_over_time
-from app.project.project import ProjectSettings, default_settings, open_project
+from app.project.project_access import default_settings, open_project
 from app.project.project_facts import read_facts
 from app.training.process import ProcessWorker
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError
-from engine.metrics.clips.flicker import flicker_figures
 from engine.metrics.clips.summary import mean_of
 from engine.storage.json_files import json_text
 from engine.training.config import parse_overrides

@@ -35,9 +35,9 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
 from app.export.video.views import camera_view
-from app.project.project import open_project
+from app.lab.flicker import flicker_figures
+from app.project.project_access import open_project
 from engine.images.psnr import psnr
-from engine.metrics.clips.flicker import flicker_figures
 from engine.metrics.clips.summary import mean_of
 from engine.metrics.pictures.colors import to_levels
 from engine.storage.json_files import json_text

@@ -35,7 +35,8 @@ CALL_TARGET_MS = 100.0
 
 def make(folder: Path, n_clips: int, n_rows: int) -> Path:
     """A capture of one frame per clip, and a project of it in which every clip is trained. Returns the project."""
-    from app.project.project import PROJECT_FILE, default_settings
+    from app.document.storing.document_file import PROJECT_FILE
+    from app.project.project_access import default_settings
     from engine.capture.capture import open_capture
     from tests.app.fakes import write_capture
     from tests.app.made_projects import make_chain
@@ -74,8 +75,8 @@ class Calls:
 def measure(folder: Path, n_clips: int) -> tuple[float, Calls]:
     """Open the project and use it. Returns seconds until all states are there, and the calls."""
     from app.session import commands
+    from app.session.projects.settings import Settings
     from app.session.session import Session
-    from app.session.settings import Settings
     from ui.main import SWITCH_INTERVAL_S
     from ui.shell.window import StudioWindow
 

@@ -78,7 +78,7 @@ def make_source(capture: Capture, clips: list[Clip], holdout: list[int], overrid
             capture,
             config=(config := TrainConfig(**(overrides | REFERENCE_STEPS))),
             method=method_of(config, previous=None),
-            backend=backend_called(),
+            backend=backend_called("cpu"),
             holdout=holdout,
             seed=0,
             prep_dir=Path(folder),

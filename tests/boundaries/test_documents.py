@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.documents.blocks import GENERATORS, block_names, documents, filled
+from tests.documents.blocks import GENERATORS, ROOT, block_names, documents, filled
 from tests.documents.commands import command_sections
 from tests.documents.keys import key_tables
 from tests.documents.settings import presets_table, settings_tables
 from tests.documents.table import table
-from tests.documents.tree import ROOT
 
 LINK = re.compile(r"\]\(([^)#\s]+)\)")
 DOCUMENTS = [path.relative_to(ROOT).as_posix() for path in documents()]
@@ -68,3 +67,8 @@ def test_blocks_hold_what_they_are_for() -> None:
 
 def test_bars_inside_cells_do_not_end_them() -> None:
     assert table(("a", "b"), [("x|y", "z")]) == "| a | b |\n| --- | --- |\n| x\\|y | z |"
+
+
+def test_every_group_of_keys_has_one_table():
+    headings = [line for line in key_tables().splitlines() if line.startswith("**")]
+    assert len(headings) == len(set(headings))

@@ -87,6 +87,16 @@ def test_contracts_refuse_a_seeded_bad_import(
     assert broken_contract in broken[0]
 
 
+def test_the_capture_doctor_loads_no_torch() -> None:
+    loaded = loaded_modules(
+        "import app.session.examining_process, app.cli.captures.inspect_command, engine.doctor.doctor\n"
+        "from app.background.kernels import use_threads\n"
+        "use_threads(None, with_torch=False)"
+    )
+    assert "numba" in loaded
+    assert "torch" not in loaded
+
+
 def test_importing_ui_main_loads_no_torch_and_no_window_library() -> None:
     # A spawned child imports the parent's main module again: what ui.main loads, every worker would load.
     assert not loaded_modules("import ui.main") & (WINDOW_LIBRARIES | {"torch"})

@@ -12,7 +12,7 @@ import pytest
 from app.cli.cli import build_parser
 from app.cli.commands import COMMANDS
 from app.lab.ablation.variants import chosen_variants
-from tests.documents.tree import ROOT
+from tests.documents.blocks import ROOT
 
 TEXT = (ROOT / "docs/method.md").read_text("utf-8")
 PLACES = re.compile(r"\[[\w.]+\]\(\.\./(?P<path>[\w/]+\.py)\): (?P<names>`[\w.]+`(?:, `[\w.]+`)*)")

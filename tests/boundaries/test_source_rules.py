@@ -22,6 +22,7 @@ BANNED_MODULES = {
     "joblib": "pickle",
     "marshal": "pickle",
     "shelve": "pickle",
+    "multiprocessing": "pickle",  # it hands arguments and messages over as pickles: engine.children does without
     # network: the application works on local files and talks to nobody
     "aiohttp": "network",
     "ftplib": "network",
@@ -38,6 +39,15 @@ BANNED_MODULES = {
 }
 BANNED_CALLS = {"eval", "exec", "compile", "__import__"}
 BANNED_ATTRIBUTES = {("torch", "save"), ("torch", "load"), ("os", "system"), ("os", "fork")}
+
+BYTES_ONLY = (
+    "app/background/children.py",
+    "app/export/export_process.py",
+    "app/export/export_worker.py",
+    "app/training/process.py",
+    "app/training/worker.py",
+)
+"""Modules whose processes are of multiprocessing still; they send bytes that they encode themselves."""
 
 # Home folders of people, the temporary folder, drive letters: text that works on one machine only.
 MACHINE_PATH = re.compile(r"(?<![\w./~*-])(?:/(?:home|Users|root|tmp|work|mnt|media|scratch)/[\w.]|[A-Z]:\\\w)")
@@ -101,6 +111,7 @@ def test_our_code_uses_no_pickle_eval_or_network() -> None:
     files = python_files()
     assert len(files) > 20, "the packages were not found"
     found = [f"{path.relative_to(ROOT)}:{use}" for path in files for use in banned_uses(path.read_text("utf-8"))]
+    found = [use for use in found if not (use.startswith(BYTES_ONLY) and "multiprocessing" in use)]
     assert not found, "\n".join(found)
 
 
@@ -119,6 +130,8 @@ def test_our_code_uses_no_pickle_eval_or_network() -> None:
         "torch.save(state, path)",
         "np.load(path, allow_pickle=True)",
         "os.fork()",
+        "from multiprocessing.connection import Connection",
+        "import multiprocessing as mp",
     ],
 )
 def test_rule_refuses_seeded_source(seeded: str) -> None:
@@ -126,7 +139,7 @@ def test_rule_refuses_seeded_source(seeded: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "innocent", ["model.eval()", "import re\nre.compile('x')", "np.load(path)", "import multiprocessing", "import json"]
+    "innocent", ["model.eval()", "import re\nre.compile('x')", "np.load(path)", "import subprocess", "import json"]
 )
 def test_rule_accepts_innocent_source(innocent: str) -> None:
     assert not list(banned_uses(innocent))

@@ -2,8 +2,7 @@
 
 import sys
 
-from tests.documents.blocks import write
-from tests.documents.tree import ROOT
+from tests.documents.blocks import ROOT, write
 
 if __name__ == "__main__":
     if sys.argv[1:] != ["write"]:

@@ -7,18 +7,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.documents.commands import command_sections
+from tests.documents.edits import edits_table
+from tests.documents.exports import export_tables
 from tests.documents.gestures import gesture_tables
 from tests.documents.keys import key_tables
 from tests.documents.published import differences_table, published_table
 from tests.documents.settings import presets_table, settings_tables
-from tests.documents.tree import ROOT, tree_block
 
+ROOT = Path(__file__).resolve().parents[2]
 GENERATORS: dict[str, Callable[[], str]] = {
-    "tree": tree_block,
     "keys": key_tables,
     "gestures": gesture_tables,
     "commands": command_sections,
+    "edits": edits_table,
     "settings": settings_tables,
+    "exports": export_tables,
     "presets": presets_table,
     "published": published_table,
     "differences": differences_table,
@@ -29,7 +32,7 @@ _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOT
 
 def documents() -> list[Path]:
     """The documents that a reader opens."""
-    return [ROOT / "README.md", ROOT / "ARCHITECTURE.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+    return [ROOT / "README.md", ROOT / "ARCHITECTURE.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def block_names(text: str) -> list[str]:

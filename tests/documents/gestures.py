@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.documents.table import table
-from ui.panels.gestures import GESTURE_WORDS, PRESETS, gesture_rows, mouse_help
+from ui.panels.picture.gestures import GESTURE_WORDS, PRESETS, gesture_rows, mouse_help
 
 
 def gesture_tables() -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import groupby
-
 from tests.documents.table import table
 from ui.panels.actions.action import Action
 from ui.panels.actions.table import ACTIONS
@@ -17,8 +15,8 @@ def keys(row: Action) -> str:
 def key_tables() -> str:
     """Every row of the help sheet, in its order."""
     parts = []
-    for group, rows in groupby(ACTIONS, key=lambda row: row.group):
-        listed = list(rows)
+    for group in dict.fromkeys(row.group for row in ACTIONS):
+        listed = [row for row in ACTIONS if row.group == group]
         shown = [(keys(row), row.text) for row in listed if row.keys and row.is_in_help]
         parts.append(f"**{group}**\n\n{table(('key', 'does'), shown)}")
         keyless = "; ".join(row.text for row in listed if not row.keys)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from engine.setting import value_text
 from engine.training.published.point import Point
 from engine.training.published.points import POINTS
-from engine.training.setting import value_text
 from tests.documents.table import table
 
 

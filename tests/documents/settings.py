@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from itertools import groupby
 
+from engine.setting import Setting, value_text
 from engine.training.config import SETTINGS
 from engine.training.presets import PRESETS
-from engine.training.setting import Setting, value_text
 from tests.documents.table import table
 
 

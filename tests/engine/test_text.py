@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from engine.errors import CaptureError, EngineError
-from engine.text import MAX_SHOWN, duration_text, printable, shown
+from engine.text import MAX_SHOWN, duration_text, figure_text, printable, shown, size_text
 
 
 def test_ordinary_text_stays_as_it_is() -> None:
@@ -58,3 +58,16 @@ def test_a_thousand_problems_do_not_fill_the_screen() -> None:
 )
 def test_durations(seconds, expected):
     assert duration_text(seconds) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (0.01234, "0.0123"), (23.14, "23.1"), (1374.6, "1,375"), (-2.5, "-2.50"), (6.6e-7, "0.000001")],
+)
+def test_figures_have_three_digits_and_no_exponent(value: float, text: str) -> None:
+    assert figure_text(value) == text
+
+
+def test_a_size_is_never_nothing():
+    said = [size_text(megabytes) for megabytes in (0.024, 0.06, 3.21, 24.4, 1500)]
+    assert said == ["24 kB", "0.1 MB", "3.2 MB", "24 MB", "1.5 GB"]

@@ -35,6 +35,11 @@ ODD_NAMES = (
     *("http://127.0.0.1/a.mp4", "concat:cam00.mp4|cam01.mp4", "pipe:0", "file:cam01.mp4", "cam%02d.mp4", "\u202eabc"),
     *("con", "a/../cam01.mp4", "ims/../../outside", "cameras.json", "=HYPERLINK(1)", "--help", "cam00.mp4"),
 )
+CAME_ALONG = (
+    *("capture.json", "masks", "mask", "points3D.ply", "points.ply", "init_pt_cld.npz", "sparse", "transforms.json"),
+    *("calibration.toml", "intri.yml", "extri.yml", "poses_bounds.npy", "cam07.mp4", "images", "ims", "models.json"),
+)
+"""Names that readers look for, of other layouts too: nothing of a small capture, and whatever else may lie there."""
 _PLACE = "put-the-odd-number-here"
 
 
@@ -86,7 +91,21 @@ def damage(folder: Path, rng: random.Random) -> tuple[str, int]:
     """Damage one thing in a capture. Returns what, and the size of the file in bytes."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     calibration = [path for path in files if path.suffix == ".json"]
-    kind = rng.choice(("bytes", "bytes", "value", "value", "value", "odd file", "odd name", "number", "special"))
+    kind = rng.choice(
+        (
+            "bytes",
+            "bytes",
+            "value",
+            "value",
+            "value",
+            "odd file",
+            "odd name",
+            "number",
+            "special",
+            "odd folder",
+            "came along",
+        )
+    )
     path = rng.choice(files if kind in ("bytes", "odd file", "special") else calibration)
     match kind:
         case "bytes":
@@ -96,6 +115,12 @@ def damage(folder: Path, rng: random.Random) -> tuple[str, int]:
             what, data = damaged_json(path.read_bytes(), rng)
             path.write_bytes(data)
         case "odd file":
+            what = put_odd_file(path, rng)
+        case "odd folder":
+            path = rng.choice([found for found in folder.rglob("*") if found.is_dir()] or files)
+            what = put_odd_file(path, rng)
+        case "came along":
+            path = folder / rng.choice(CAME_ALONG)
             what = put_odd_file(path, rng)
         case "odd name":
             what = _put_odd_name(path, rng)

@@ -35,8 +35,8 @@ _steps: list[tuple[bytes, ...]] = []
 
 def make_document(folder: Path) -> None:
     """A project with some history, as it is after a kill."""
-    from app.document.document_store import DocumentStore
     from app.document.history import DocumentHistory, Redone, Undone
+    from app.document.storing.document_store import DocumentStore
     from tests.app.document.documents import EMPTY, as_bytes, random_events
 
     store = DocumentStore(folder)
@@ -131,7 +131,7 @@ def run_case(case: Case) -> Outcome:
 
 def _read(project: Path) -> str:
     """Read a project and go on with it. What is wrong; raises EngineError where the damage is named."""
-    from app.document.document_store import DocumentStore
+    from app.document.storing.document_store import DocumentStore
 
     store = DocumentStore(project)
     history = store.read()
@@ -145,8 +145,8 @@ def _read(project: Path) -> str:
 
 def _repair(project: Path) -> str:
     """Repair a project and go on with it. What is wrong; raises EngineError where nothing can be kept."""
-    from app.document.document_store import DocumentStore
-    from app.document.recovery import look_for_recovery, recover
+    from app.document.storing.document_store import DocumentStore
+    from app.document.storing.recovery import look_for_recovery, recover
 
     known = look_for_recovery(project)
     if known is None:
@@ -165,9 +165,9 @@ def _repair(project: Path) -> str:
 
 def _gone_on(store: Any, history: Any) -> str:
     """Take another step and read everything again. What is wrong."""
-    from app.document.document_store import DocumentStore
     from app.document.history import Changed
     from app.document.project_document import Marker
+    from app.document.storing.document_store import DocumentStore
 
     change = Changed("go on", replace(history.present, markers=(Marker(99, "on"),)))
     after = history.after(change)

@@ -49,9 +49,9 @@ def make_project(folder: Path) -> None:
     """Two trained clips, checkpoint, live snapshot, curves, regions, paths, caches; beside them files of the user."""
     from app.document.project_settings import ProjectSettings
     from app.evaluation.kept_figures import KeptFigures
-    from app.project.project import create_project
+    from app.project.project_access import create_project
     from app.project.recents import RecentProject
-    from app.session.settings import Settings
+    from app.session.projects.settings import Settings
     from engine.camera.path_presets import turntable
     from engine.clip_files.clip_state import write_clip_state
     from engine.clip_files.compact import compact_clip, write_compact_clip
@@ -174,8 +174,8 @@ def _read_checkpoint(project: Path, path: Path) -> Any:
 
 
 def _read_document(project: Path, path: Path) -> Any:
-    from app.document.document_store import DocumentStore
-    from app.document.stored_document import plain_document
+    from app.document.storing.document_store import DocumentStore
+    from app.document.storing.stored_document import plain_document
 
     return plain_document(DocumentStore(project).read().present)
 
@@ -200,7 +200,7 @@ def _read_cloud(project: Path, path: Path) -> Any:
 
 
 def _read_preferences(project: Path, path: Path) -> Any:
-    from app.session.settings import Settings
+    from app.session.projects.settings import Settings
 
     return Settings(path).recent
 
@@ -231,7 +231,7 @@ def read_project(project: Path) -> None:
     """
     from app.cli.cli import main
     from app.project.clip_catalog import ClipCatalog
-    from app.project.project import open_project
+    from app.project.project_access import open_project
     from engine.errors import EngineError
 
     for command in ("inspect", "gate"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -72,9 +73,23 @@ def damaged_json(data: bytes, rng: random.Random) -> tuple[str, bytes]:
 
 
 def put_odd_file(path: Path, rng: random.Random) -> str:
-    """Put something else than a regular file under a name, or one that cannot be read. Returns what it is."""
+    """Put something else under a name of a file or folder, or one that cannot be read. Returns what it is."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
     path.unlink(missing_ok=True)
-    kind = rng.choice(("pipe", "folder", "device", "dangling link", "link to itself", "link outside", "empty"))
+    kind = rng.choice(
+        (
+            "pipe",
+            "folder",
+            "device",
+            "dangling link",
+            "link to itself",
+            "link outside",
+            "linked folder",
+            "empty",
+            "none",
+        )
+    )
     match kind:
         case "pipe":
             os.mkfifo(path)
@@ -88,6 +103,10 @@ def put_odd_file(path: Path, rng: random.Random) -> str:
             path.symlink_to(path)
         case "link outside":
             path.symlink_to("/etc/passwd")
+        case "linked folder":
+            path.symlink_to("/etc")
+        case "gone":
+            pass
         case _:
             path.touch()
     return kind

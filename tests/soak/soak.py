@@ -24,7 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.document.edit_changes import MAX_EDITS
+from app.document.changes.edit_changes import MAX_EDITS
 from app.project.project import Project
 from app.session import commands
 from app.session.editing.edit_commands import AddEdit, MoveEdit, PutMarker, RemoveEdit, RemoveMarker, ToggleEdit
@@ -35,12 +35,13 @@ from app.session.editing.selection_commands import (
     SelectByAttribute,
     SelectVolume,
 )
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
 from app.training.service import Launch
-from engine.editing.edit import Delete, Expose, Hide, Hold, Recolor, Scope, Smooth, Sphere, Transform
+from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Scope, Sphere
 from tests.app.fakes import make_fake, write_capture
 from tests.app.lab.report.made_up import train
 from tests.soak.held import Growth, Held, growths, handle_names, held_now

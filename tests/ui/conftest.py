@@ -11,8 +11,8 @@ import pytest
 pyglet.options.headless = True  # before pyglet.window is imported anywhere in this process
 pyglet.options.shadow_window = False
 
-from app.session.preferences import PreferencesFile  # noqa: E402
-from app.session.window_memory import WindowMemory  # noqa: E402
+from app.session.projects.preferences import PreferencesFile  # noqa: E402
+from app.session.projects.window_memory import WindowMemory  # noqa: E402
 from tests.ui.fake_session import FakeSession  # noqa: E402
 from tests.ui.pilot import Pilot  # noqa: E402
 

@@ -17,24 +17,25 @@ from app.document.project_settings import ProjectSettings
 from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
 from app.export.export_status import ExportStatus
-from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
-from app.playback.bookmarks import Bookmarks
 from app.playback.markers import Markers
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
-from app.playback.view_modes import MODES, ShownAs
-from app.playback.views import Views
+from app.playback.views.bookmarks import Bookmarks
+from app.playback.views.orbit_view import OrbitView
+from app.playback.views.views import Views
 from app.project.capture_report import RefusedFolder
 from app.project.disk.use import DiskUse
 from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
-from app.session import commands, path_commands
-from app.session.calibration_page import CalibrationPage
+from app.session import commands
+from app.session.captures.calibration_page import CalibrationPage
+from app.session.captures.doctor_status import DoctorStatus
+from app.session.captures.synchronisation_page import SynchronisationPage
 from app.session.copying.command_texts import CommandTexts
-from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import changed, edits_status
@@ -44,9 +45,9 @@ from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.mending.mend_page import MendPage
 from app.session.notices import Notices
-from app.session.path_edits import edited
+from app.session.paths import path_commands
+from app.session.paths.path_edits import edited
 from app.session.questions import OpeningPage, Question, RetrainQuestion
-from app.session.synchronisation_page import SynchronisationPage
 from app.status import (
     CELL_RANGES,
     ClipStatus,
@@ -143,6 +144,8 @@ class FakeOpening:
         """As the real one has it."""
         assert self.page is not None
         n_left = len(self.page.report.cameras) - len(answers.holdout)
+        if self.page.report.needs_fit and answers.fit is None:
+            return "Say whether frames were scaled or cropped."
         return "Fewer than two cameras are left for training." if n_left < 2 else ""
 
 
@@ -304,11 +307,13 @@ class FakeSession:
             values[12, 5] = low if column == "psnr" else high
             cells[column] = values
         seams = tuple(
-            SeamStatus(clip.clip_index, clip.start, score, 1.0 + score / 2, n_cameras - 2, 5)
+            SeamStatus(clip.clip_index, clip.start, score, 1.0 + score / 2, n_cameras - 2, n_cameras - 2, 5)
             for clip, score in zip(self.clips[1:], (0.4, 2.6), strict=False)
         )
         held_out = tuple(index in self.holdout for index in range(n_cameras))
-        return ResidualStatus(seams, cells, held_out, n_frames * (n_cameras - 2), n_frames * n_cameras, revision=1)
+        n_done, n_all = n_frames * (n_cameras - 2), n_frames * n_cameras
+        measured = dict.fromkeys(cells, (n_done, n_all))
+        return ResidualStatus(seams, cells, held_out, measured=measured, n_done=n_done, n_all=n_all, revision=1)
 
     def anchor_heat(self, column: str) -> AnchorHeat | None:
         """Rises with the anchors' number; some were not seen."""
@@ -331,6 +336,11 @@ class FakeSession:
     def attribute_spread(self, attribute: str) -> Spread | None:
         """Rises evenly from 0 to 1; residuals are not known."""
         return None if attribute in ("error", "flicker") else spread_of(np.linspace(0.0, 1.0, 1000))
+
+    @property
+    def loading(self) -> tuple[int, int] | None:
+        """Nothing is waited for."""
+        return None
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Runs of frames in memory."""

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from tests.app.fakes import make_fake
 from tests.app.inline_worker import InlineWorker
 from tests.ui.pilot import Pilot

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.session import path_commands as p
 from app.session.commands import SetFrame, Undo
+from app.session.paths import path_commands as p
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.projection import to_camera, to_pixels
 from tests.ui.fake_session import FakeSession

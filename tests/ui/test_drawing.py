@@ -95,8 +95,10 @@ def test_escape_closes_the_menu_of_a_clip_and_the_show_popup(pilot: Pilot) -> No
     assert len(stack) == 1
     pilot.key(key.ESCAPE)
     assert len(stack) == 0
-    pilot.tap(*pilot.rects["viewport.overlays"].center)
+    button = pilot.rects["viewport.overlays"]
+    pilot.tap(*button.center)
     assert len(stack) == 1
+    assert pilot.rects["show.show_frusta"].y0 > button.y1, "it leaves its button free"
     pilot.key(key.ESCAPE)
     assert len(stack) == 0
 
@@ -125,7 +127,7 @@ def test_menus_work_with_the_keyboard_alone(pilot: Pilot, symbol: int) -> None:
 def test_forty_characters_typed_at_once_stand_there_after_one_frame(
     open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
     pilot = open_pilot(FakeSession(has_capture=False))
     pilot.key(key.O, modifiers=(key.LCTRL,))
     pilot.draw(3)

@@ -14,7 +14,8 @@ from pyglet.window import key, mouse
 from app.session import commands as c
 from app.session.editing.edit_commands import AddEdit
 from app.session.session import Session
-from engine.editing.edit import Box, Delete, Edit, Hide, Scope, Sphere, Transform
+from engine.editing.actions import Delete, Hide, Transform
+from engine.editing.edit import Box, Edit, Scope, Sphere
 from engine.editing.selection.volumes import in_volume
 from tests.app.fakes import write_capture
 from tests.ui.pilot import CTRL, SHIFT, Pilot

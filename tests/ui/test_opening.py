@@ -11,27 +11,29 @@ import pytest
 from pyglet.window import key
 
 from app.calibration.job import CalibrationRequest
-from app.playback.arrays import Picture
+from app.playback.modes.arrays import Picture
 from app.project.capture_report import CaptureReport, RefusedFolder, ReportedCamera
 from app.project.opening_answers import OpeningAnswers
-from app.session.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
+from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
+from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
 from app.session.commands import (
     ApplyOffsets,
     CalibrateVideos,
     CloseQuestion,
+    KeepCalibration,
     LookAtVideos,
     OpenCapture,
     StopCalibration,
 )
 from app.session.questions import OpeningPage
-from app.session.synchronisation_page import OffsetRow, SynchronisationPage
 from app.status import JobStatus, OpeningForecast
 from engine.calibration.options import CalibrationOptions, KnownDistance
 from engine.doctor.finding import Finding
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, Pilot
-from ui.shell.opening_answers_form import forecast_lines
-from ui.shell.opening_map import placed, seen_from_above
+from ui.shell.dialogs.calibration_dialog import lines_below
+from ui.shell.dialogs.opening_answers_form import forecast_lines
+from ui.shell.dialogs.opening_map import placed, seen_from_above
 
 pytestmark = pytest.mark.gl
 NAMES = ("cam00", "50%s of 100%", "a##b", "cam03", "cam04", "cam05", "cam06", "cam07")
@@ -102,6 +104,46 @@ def test_numbers_are_typed_and_held_to_what_there_is(asked: Pilot) -> None:
     asked.click("opening.accept")
     assert asked.sent(OpenCapture) == opened(OpeningAnswers((10, 30), 0.25, 7, ("cam03",)))
     assert asked.session.opening.asked[-1].frames == (10, 30)
+
+
+def test_frames_of_another_shape_are_asked_about(asked: Pilot) -> None:
+    assert "opening.fit" not in asked.rects
+    report = replace(make_report(), misfit_px=8.0)
+    asked.session.opening.page = OpeningPage(report, OFFERED, is_new_project=True, follow_links=True)
+    asked.draw(4)
+    asked.click("opening.fit")
+    asked.click("opening.fit.cropped_end")
+    assert asked.sent(OpenCapture) == []
+    asked.click("opening.accept")
+    assert asked.sent(OpenCapture) == opened(replace(OFFERED, fit="cropped_end"))
+
+
+def test_frames_of_quite_another_shape_have_no_usual_answer(asked: Pilot) -> None:
+    report = replace(make_report(), misfit_px=80.0, needs_fit=True)
+    asked.session.opening.page = OpeningPage(report, OFFERED, is_new_project=True, follow_links=True)
+    asked.draw(4)
+    asked.click("opening.accept")
+    assert asked.sent(OpenCapture) == []
+    asked.click("opening.fit")
+    asked.click("opening.fit.scaled")
+    asked.click("opening.accept")
+    assert asked.sent(OpenCapture) == opened(replace(OFFERED, fit="scaled"))
+
+
+def test_keys_in_a_list_choose_and_do_not_answer_the_dialog(asked: Pilot) -> None:
+    report = replace(make_report(), misfit_px=8.0)
+    asked.session.opening.page = OpeningPage(report, OFFERED, is_new_project=True, follow_links=True)
+    asked.draw(4)
+    asked.click("opening.fit")
+    asked.key(key.ESCAPE)
+    assert asked.sent(CloseQuestion) == []
+    asked.click("opening.fit")
+    asked.key(key.DOWN)
+    asked.key(key.RETURN)
+    asked.draw(2)
+    assert asked.sent(OpenCapture) == []
+    asked.click("opening.accept")
+    assert asked.sent(OpenCapture) == opened(replace(OFFERED, fit="cropped_end"))
 
 
 def test_cameras_are_held_out_on_the_map_and_in_the_list(asked: Pilot) -> None:
@@ -242,11 +284,32 @@ def test_a_calibration_from_options_to_the_capture(open_pilot: Callable[..., Pil
     show(pilot, CalibrationPage(folder, "running", VIDEOS), JobStatus("Calibrating", 0.4, "Matching 50%s"))
     pilot.key(key.ESCAPE)
     assert pilot.sent(StopCalibration) == [StopCalibration()]
-    result = CalibrationResult(folder, True, 3, ("d",), ("3 of 4 cameras were found.", "  d: not found: dark"))
+    result = CalibrationResult(
+        folder, True, 3, ("d",), False, "", ("3 of 4 cameras were found.", "  d: not found: dark")
+    )
     show(pilot, CalibrationPage(folder, "done", VIDEOS, result=result))
     pilot.key(key.RETURN)
     assert pilot.sent(OpenCapture) == [OpenCapture(folder, follow_links=True, is_asking=True)]
     assert len(pilot.session.notices) == 0
+
+
+def test_a_calibration_that_has_failed_is_kept_only_when_chosen(open_pilot: Callable[..., Pilot]) -> None:
+    pilot = open_pilot(FakeSession(has_capture=False))
+    folder = Path("/videos/garden")
+    lines = (
+        "10 of 10 cameras were found.",
+        "Matches contradict 10 of 10 cameras.",
+        "  a  b  154 matches,  18% explained",
+    )
+    result = CalibrationResult(folder, False, 10, (), True, "Matches contradict 10 of 10 cameras.", lines)
+    show(pilot, CalibrationPage(folder, "done", VIDEOS, result=result))
+    assert lines_below(result) == [lines[0], lines[2]]
+    assert "calibration.open" not in pilot.rects
+    pilot.click("calibration.keep")
+    assert pilot.sent(KeepCalibration) == [KeepCalibration()]
+    pilot.key(key.RETURN)
+    assert pilot.sent(OpenCapture) == []
+    assert pilot.sent(CloseQuestion) == [CloseQuestion()]
 
 
 def test_a_calibration_that_is_there_is_replaced_only_where_that_is_said(open_pilot: Callable[..., Pilot]) -> None:
@@ -267,7 +330,7 @@ def test_a_calibration_that_is_there_is_replaced_only_where_that_is_said(open_pi
 def test_the_first_screen_leads_to_calibration(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
     pilot = open_pilot(FakeSession(has_capture=False))
     pilot.click("welcome.calibrate")
     pilot.draw(3)

@@ -20,7 +20,7 @@ from engine.clip_files.clip_state import ClipState
 from tests.app.fakes import N_ANCHORS, write_capture
 from tests.ui.pilot import Pilot
 from tests.ui.real_session import WAIT_S, draw_until, hud, make_session, poll
-from ui.panels.hud import legend_rows
+from ui.panels.picture.hud import legend_rows
 from ui.shell.screenshot import read_window
 from ui.viewport.hud_text import CLOUD, RENDERED
 
@@ -128,7 +128,7 @@ def test_a_cloud_stands_in_for_a_clip_that_loads_and_says_what_is_missing(window
     window.draw(3)
     assert scene.shows == CLOUD
     assert hud(window).pending == "loading clip 0"
-    assert "moving objects are missing until then" in hud(window).note
+    assert hud(window).note == "point cloud of what stands still, not the trained result"
     reader.may_go_on.set()
     draw_until(window, lambda: scene.shows == RENDERED, "the trained picture")
     assert hud(window).note == ""
@@ -144,7 +144,7 @@ def test_compared_pictures_of_different_frames_say_so(
         labels.append(text)
         return x
 
-    monkeypatch.setattr("ui.panels.picture_pane.chip", note)
+    monkeypatch.setattr("ui.panels.picture.picture_pane.chip", note)
     show_frame(window, 0)
     window.session.dispatch(c.LookThrough(1))
     window.session.dispatch(c.SetCompare(mode))

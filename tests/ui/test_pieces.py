@@ -13,11 +13,11 @@ from app.status import ClipStatus
 from ui.main import main
 from ui.panels.actions.key import parse_key
 from ui.panels.actions.table import ACTIONS
-from ui.panels.clip_quality import clip_quality
-from ui.panels.curves import MAX_PLOT_POINTS, plot_arrays, seen_part
-from ui.panels.panes import arrange, fit
+from ui.panels.picture.panes import arrange, fit
 from ui.panels.state import Rect
-from ui.panels.training import anchors_text
+from ui.panels.training.clip_quality import clip_quality
+from ui.panels.training.curves import MAX_PLOT_POINTS, plot_arrays, seen_part
+from ui.panels.training.training import anchors_text
 
 
 def test_plot_arrays_are_contiguous_finite_and_short() -> None:
@@ -42,7 +42,9 @@ def test_quality_over_the_clips_is_of_those_that_were_measured() -> None:
     quality = clip_quality(states)
     assert quality.clips.tolist() == [0, 2, 3]
     assert quality.psnr.tolist() == [31.0, 29.5, 25.0]
-    assert quality.title == "Quality over clips: 31.0 to 25.0 dB"
+    assert quality.title == "Quality over clips: ~25.0 to ~31.0 dB"
+    whole = [ClipStatus("trained", 1.0, psnr, held_out_whole=True) for psnr in (29.0, 29.7, 29.2)]
+    assert clip_quality(whole).title == "Quality over clips: 29.0 to 29.7 dB", "the range, not the first and the last"
     assert "up to 3.1 %" in quality.exposure_text
     assert "(clip 2)" in quality.exposure_text
     assert all(values.flags.c_contiguous for values in (quality.clips, quality.psnr, quality.exposure))
@@ -147,6 +149,20 @@ def test_without_a_display_the_demo_runs_instead(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("ui.main.has_display", lambda: False)
     assert main(["some_capture"]) == 0
     assert [str(path) for path, _, _ in seen] == ["some_capture"]
+
+
+def test_the_headless_job_prints_no_log_records() -> None:
+    script = """
+import logging, sys, types
+demo = types.ModuleType("ui.shell.demo")
+demo.run_demo = lambda *_, **__: logging.getLogger("engine.capture").info("opened a capture") or 0
+sys.modules["ui.shell.demo"] = demo
+from ui import main
+main.has_display = lambda: False
+sys.exit(main.main(["some_capture"]))
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
 
 
 def test_help_says_what_each_command_does(capsys: pytest.CaptureFixture[str]) -> None:

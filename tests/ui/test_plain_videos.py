@@ -44,9 +44,11 @@ def calibrated(request: CalibrationRequest) -> Callable[[Any], Any]:
         )
         known = replace(layout, cameras=cameras, default_holdout=())
         write_capture_json(request.videos, capture_document(known, request.videos))
-        found = SimpleNamespace(found=SimpleNamespace(rig=range(N_CAMERAS)), missing=())
+        found = SimpleNamespace(found=SimpleNamespace(rig=range(N_CAMERAS), doubts=("",) * N_CAMERAS), missing=())
         lines = (f"{N_CAMERAS} of {N_CAMERAS} cameras were found.",)
-        return SimpleNamespace(capture=request.videos, needs_links=False, calibration=found, lines=lines)
+        return SimpleNamespace(
+            capture=request.videos, needs_links=False, calibration=found, lines=lines, is_written=True
+        )
 
     return work
 
@@ -68,8 +70,8 @@ def keep(pilot: Pilot, folder: Path, name: str) -> None:
 def test_from_plain_videos_to_a_trained_clip(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
-    monkeypatch.setattr("app.session.calibrating.calibration_work", calibrated)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("app.session.captures.calibrating.calibration_work", calibrated)
     videos = tmp_path / "plain videos"
     videos.mkdir()
     for row in range(N_CAMERAS):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -11,18 +12,30 @@ from pyglet.window import key, mouse
 
 from app.playback.timeline import Timeline
 from app.project.recents import RecentProject
-from app.session.commands import CloseQuestion, ForgetRecent, OpenCapture, OpenProject, TogglePlay, TrainClip
-from app.session.questions import ProjectQuestion, RetrainQuestion
-from app.status import ClipStatus
+from app.session.commands import (
+    CancelJob,
+    CloseQuestion,
+    ForgetRecent,
+    LeaveTraining,
+    NewProject,
+    OpenCapture,
+    OpenProject,
+    StartOver,
+    TogglePlay,
+    TrainClip,
+)
+from app.session.questions import LeaveQuestion, ProjectQuestion, RetrainQuestion, StartOverQuestion
+from app.status import ClipStatus, JobStatus
 from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
-from ui.shell.questions import outdated_text, retrain_texts
+from ui.shell.dialogs.questions import leaving_texts, outdated_text, project_words, retrain_texts
 from ui.shell.window import window_title
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
 RETRAIN = RetrainQuestion(0, False, "", 29.7, (1, 2), 104.0, False, 190.0, 810)
+PRESETS = ("toy", "small", "medium")
 PROJECTS = ProjectQuestion(
     "/captures/kitchen",
     (
@@ -93,7 +106,7 @@ def test_the_question_is_answered_by_its_buttons(pilot: Pilot) -> None:
 
 def test_what_is_asked_says_what_depends_on_the_clip_and_what_it_costs() -> None:
     text = "\n".join([*retrain_texts(RETRAIN), outdated_text(RETRAIN)])
-    for part in ("29.7 dB", "stays as it is", "goes on at step 810", "about 1:44", "2 clips", "1, 2", "about 3:10"):
+    for part in ("~29.70 dB", "stays as it is", "goes on at step 810", "about 1:44", "2 clips", "1, 2", "about 3:10"):
         assert part in text
     damaged = RetrainQuestion(3, True, "Its header cannot be read.", None, (), None, True, None, None)
     text = "\n".join(retrain_texts(damaged))
@@ -125,7 +138,7 @@ def test_a_stopped_clip_says_where_it_goes_on_and_a_damaged_one_is_not_offered(p
     pilot.draw(3)
     pilot.move(*pilot.rects["timeline.clip1"].center)
     pilot.draw(3)
-    from ui.panels.training import next_label
+    from ui.panels.training.training import next_label
 
     assert next_label(session).endswith("Resume clip 2 at step 810")
     session.training = dataclasses.replace(session.training, next_clip_index=None, resume_step=None)
@@ -159,3 +172,50 @@ def test_a_thousand_clips_are_drawn_in_runs_of_one_state(pilot: Pilot) -> None:
     # clips hardly wider than a pixel count in threes, and of each three the one that is worst off
     assert sorted(bands) == ["timeline.clip0", "timeline.clip399", "timeline.clip402", "timeline.clip501"]
     assert pilot.rects["timeline.clip399"].width >= 3
+
+
+def test_starting_over_says_the_cost_and_takes_a_preset(pilot: Pilot) -> None:
+    pilot.session.question = StartOverQuestion(Path("/p"), "2 trained clips (4:10 of training), 3.1 MB", PRESETS, "toy")
+    pilot.draw(4)
+    pilot.click("question.preset")
+    pilot.click("question.preset.medium")
+    pilot.click("question.yes")
+    assert pilot.session.commands[-1] == StartOver("medium")
+    pilot.session.question = dataclasses.replace(pilot.session.question, is_working=True)
+    pilot.draw(4)
+    n_sent = len(pilot.session.commands)
+    pilot.key(key.ENTER)
+    assert len(pilot.session.commands) == n_sent  # it is answered already
+    pilot.session.question = StartOverQuestion(Path("/p"), "", PRESETS, "small")
+    pilot.draw(4)
+    pilot.click("question.other")
+    assert pilot.session.commands[-1] == NewProject()
+
+
+def test_opening_another_project_asks_before_a_training_is_stopped(pilot: Pilot) -> None:
+    question = LeaveQuestion("kitchen 2", 1, 913, 7000, 3)
+    (text,) = leaving_texts(question)
+    for part in ("Clip 1", "step 913 of 7,000", "kitchen 2", "progress is kept", "3 clips that wait"):
+        assert part in text
+    pilot.session.question = question
+    pilot.draw(4)
+    pilot.key(key.ESCAPE)
+    assert pilot.session.commands[-1] == CloseQuestion()
+    pilot.session.question = dataclasses.replace(question)
+    pilot.draw(4)
+    pilot.click("question.yes")
+    assert pilot.session.commands[-1] == LeaveTraining()
+
+
+def test_a_row_of_the_list_says_preset_state_and_when() -> None:
+    project = RecentProject("/p", "/c", "kitchen", 2, 3, "2026-03-01T10:00:00+00:00", "toy")
+    now = datetime(2026, 3, 4, 10, tzinfo=UTC)
+    assert project_words(project, now, is_open=False) == "preset toy, 2 of 3 clips trained, 3 days ago"
+    assert project_words(project, now, is_open=True).endswith(", open now")
+
+
+def test_a_first_cloud_can_be_cancelled(pilot: Pilot) -> None:
+    pilot.session.jobs = [JobStatus("Building a first cloud", 0.0, "sweeping planes", 1.0, can_cancel=True)]
+    pilot.draw(3)
+    pilot.click("status.cancel")
+    assert pilot.session.commands[-1] == CancelJob("Building a first cloud")

@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 if __name__ == "__main__":  # run as a program: the repository root is not on the path then
     sys.path.insert(0, str(ROOT))
 
+from app.project.projects_folder import projects_dir  # noqa: E402
 from tests.ui.desk import Desk, missing_programs  # noqa: E402
 
 ORBIT_RADIANS_PER_PX = 0.006
@@ -157,7 +158,8 @@ def test_taps_open_menus_and_the_window_comes_back_as_it_was_left(
     assert desk.close() == 0
     folder = tmp_path / "again"
     folder.mkdir()
-    again = Desk(folder, [str(tiny_capture)])
+    (project,) = projects_dir().iterdir()  # the capture would ask whether that or a new one
+    again = Desk(folder, [str(project)])
     try:
         state = again.wait_for(
             "the capture again", lambda s: "timeline.track" in s["rects"] and s["frame_index"] > 0, 60

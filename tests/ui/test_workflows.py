@@ -38,7 +38,7 @@ def keep(pilot: Pilot, folder: Path, name: str) -> np.ndarray:
 def test_from_a_folder_to_the_cause_of_flicker(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
     capture, session = write_capture(tmp_path / "ring"), make_session(tmp_path)
     pilot = open_pilot(session)
     keep(pilot, tmp_path, "first")

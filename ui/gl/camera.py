@@ -2,7 +2,7 @@
 
 Every picture of ui.gl is stored with its top row first: framebuffer row 0 is the picture's row 0. So y points down on
 both sides, nothing is mirrored anywhere, and textures show upright in ImGui with its default uv (0, 0)-(1, 1).
-Not here: orbiting and other user input (app.playback.orbit_view).
+Not here: orbiting and other user input (app.playback.views.orbit_view).
 """
 
 from __future__ import annotations

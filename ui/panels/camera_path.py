@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.document.camera_paths import MAX_NAME_CHARACTERS
 from app.session.edit_status import HistoryStatus, PathsStatus
-from app.session.path_commands import (
+from app.session.paths.path_commands import (
     AimCameraKey,
     ChooseCameraPath,
     CloseCameraPath,
@@ -27,8 +27,9 @@ from app.session.path_commands import (
 from engine.camera.camera_path import CameraPath
 from engine.text import one_line
 from ui.panels.history_buttons import draw_history
-from ui.panels.key_grip import choose_key
 from ui.panels.key_words import frame_words
+from ui.panels.picture.key_grip import choose_key
+from ui.panels.slider import slider
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, segment, text_right, text_warning, text_wrapped_dim
 from ui.style.theme import Icon
@@ -230,9 +231,10 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     imgui.align_text_to_frame_padding()
     imgui.text("Lens")
     imgui.same_line(LABEL_WIDTH)
-    imgui.set_next_item_width(-1)
+    words = "%.1f° high"
+    imgui.set_next_item_width(-imgui.calc_text_size(words % 100.0).x - 8)
     flags = imgui.SliderFlags_.always_clamp | imgui.SliderFlags_.logarithmic
-    is_edited, fov_deg = imgui.slider_float("##fov", math.degrees(key.fov_y_rad), *FOV_DEG, "%.1f° high", flags)
+    is_edited, fov_deg = slider("##fov", math.degrees(key.fov_y_rad), *FOV_DEG, words, flags)
     ui.mark("paths.fov")
     _follow_gesture(ui)
     if is_edited:

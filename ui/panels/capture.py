@@ -8,7 +8,7 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.orbit_view import OrbitView
+from app.playback.views.orbit_view import OrbitView
 from app.session.commands import LookThrough
 from app.session.edit_status import EditsStatus
 from engine.camera.rig import CameraRig
@@ -19,8 +19,8 @@ from ui.panels.editing.labels import draw_label_field, with_label
 from ui.panels.excluding.excluded_drawing import ExcludedNeeds
 from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
 from ui.panels.timeline.stage import hatch
+from ui.panels.welcome.thumbnails import ThumbnailNeeds, Thumbnails
 from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count

@@ -30,7 +30,7 @@ BAR_WIDTH = 220.0
 WIDE = 620.0
 """In a panel at least so wide the buttons stand at the end of the first line."""
 BUTTONS_WIDTH = 215.0
-EMPTY = "What leaves the project for other programs is listed here: Gaussians, videos, a player, figures, cameras."
+EMPTY = "Exports are listed here: Gaussians, videos, players, figures, cameras."
 
 
 class ExportingFacts(Protocol):

@@ -4,6 +4,8 @@ to a panel they move inside of it, until Escape, a click, or F6 comes round to t
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from imgui_bundle import imgui
 
 from ui.panels.actions.key import Key
@@ -21,14 +23,18 @@ def belongs_to_panel(key: Key, ui: UiState) -> bool:
     return ui.keyed_panel is not None and key.name in _MOVES and not key.is_ctrl and not key.is_alt
 
 
-def step_panel(ui: UiState) -> None:
-    """Go where the user asked to go, and leave where the user left. Once per frame, before the panels are drawn."""
+def step_panel(ui: UiState, in_front: Collection[str]) -> None:
+    """Go where the user asked to go, and leave where the user left. Once per frame, before the panels are drawn.
+
+    Args:
+        in_front: Titles of the panels that are seen; no other one is brought to the front.
+    """
     if ui.keyed_panel is not None and _is_left():
         ui.keyed_panel = None
     step, ui.wishes.panel_step = ui.wishes.panel_step, 0
     if not step or ui.is_picture_only:
         return
-    order = (None, *PANELS)
+    order = (None, *(title for title in PANELS if title in in_front or title == ui.keyed_panel))
     ui.keyed_panel = order[(order.index(ui.keyed_panel) + step) % len(order)]
     ui.wanted_panel = ui.keyed_panel
     ui.redraw_within(0.0)

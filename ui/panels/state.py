@@ -12,12 +12,12 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
-from app.session.preferences import Preferences
+from app.session.projects.preferences import Preferences
 from ui.gl.image import Rect as PixelRect
 from ui.panels.actions.key_map import KeyMap
-from ui.panels.curve_view import CurveView
-from ui.panels.gestures import Navigation
+from ui.panels.picture.gestures import Navigation
 from ui.panels.timeline.view_state import TimelineView
+from ui.panels.training.curve_view import CurveView
 from ui.panels.wishes import Wishes
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale

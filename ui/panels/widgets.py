@@ -6,10 +6,13 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.status import JobStatus
 from ui.panels.state import Rect, UiState
 from ui.style import theme
 from ui.style.colors import Color
 
+JOB_REFRESH_S = 0.25
+"""While a job runs, the window is drawn so often."""
 LEAST_WITH_ARROW = 92.0
 """Boxes narrower than this do without an arrow, units."""
 
@@ -34,6 +37,13 @@ def text_wrapped(text: str) -> None:
     imgui.push_text_wrap_pos(0.0)
     imgui.text(text)
     imgui.pop_text_wrap_pos()
+
+
+def draw_job_bar(job: JobStatus | None, ui: UiState, width: float, height: float) -> None:
+    """How far a job is; a bar that moves to and fro while that is unknown. The window is drawn again soon."""
+    share = 0.0 if job is None else min(max(job.done, 0.0), 1.0)
+    imgui.progress_bar(share if share > 0.0 else -imgui.get_time(), ImVec2(width, height), "")
+    ui.redraw_within(JOB_REFRESH_S)
 
 
 def text_warning(text: str) -> None:
@@ -105,6 +115,24 @@ def _longest_fit(text: str, width: float, cut: Callable[[int], str]) -> str:
         else:
             too_long = middle
     return cut(fits)
+
+
+MOST_BOX = 230.0
+"""Words that need a wider box end in dots, units."""
+
+
+def box_width(words: str, *, has_arrow: bool) -> float:
+    """How wide a box of choices has to be for its words, units. has_arrow: Also where the words are short."""
+    bare = imgui.calc_text_size(words).x + 2 * imgui.get_style().frame_padding.x + 2
+    if not has_arrow and bare < LEAST_WITH_ARROW:
+        return bare
+    return min(max(bare + imgui.get_frame_height(), LEAST_WITH_ARROW), MOST_BOX)
+
+
+def box_words(words: str, width: float) -> str:
+    """The words of a box of choices as far as they fit into it."""
+    arrow = imgui.get_frame_height() if width >= LEAST_WITH_ARROW else 0.0
+    return elided(words, width - arrow - 2 * imgui.get_style().frame_padding.x)
 
 
 def box_flags(width: float) -> int:

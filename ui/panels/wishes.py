@@ -23,6 +23,7 @@ class Wishes:
         is_layout_name: Ask for the name that the present layout is kept under.
         layout_removed: Name of a kept layout to forget; None for no wish.
         panel_step: Go to the next panel by keyboard, or with -1 to the one before; 0 for no wish.
+        is_about: Say what the program is, and where its files are.
     """
 
     is_palette: bool = False
@@ -35,3 +36,4 @@ class Wishes:
     is_layout_name: bool = False
     layout_removed: str | None = None
     panel_step: int = 0
+    is_about: bool = False

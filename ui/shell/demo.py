@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from app.cli.arguments import EXIT_BAD_INPUT
 from app.cli.terminal.progress import ProgressLine
-from app.project.project import PROJECT_FILE
+from app.document.storing.document_file import PROJECT_FILE
 from app.session.commands import OpenCapture, SetFrame, ToggleOverlay
 from app.session.session import Session
 
@@ -55,7 +55,7 @@ def run_demo(capture_path: Path, out_dir: Path, quick: bool = False) -> int:
     line = ProgressLine()
     is_project = (capture_path / PROJECT_FILE).is_file()
     project_dir = capture_path if is_project else out_dir / ("project_quick" if quick else "project")
-    session = Session(project_dir=project_dir)
+    session = Session(project_dir=project_dir, is_preloading=False)  # neither cloud nor forecast is in the picture
     try:
         if not _open(session, capture_path, line):
             return EXIT_BAD_INPUT
@@ -100,7 +100,7 @@ def picture_of_window(capture_path: Path, project_dir: Path, path: Path, line: P
 
     pyglet.options.headless = True  # before pyglet.window is imported: that would look for a display
     pyglet.options.shadow_window = False
-    session = Session(project_dir=project_dir)
+    session = Session(project_dir=project_dir, is_preloading=False)  # neither cloud nor forecast is in the picture
     try:
         try:
             from ui.shell.window import StudioWindow

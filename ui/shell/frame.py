@@ -1,11 +1,10 @@
-"""One UI frame in fixed order, and the rule that a broken panel costs a notice, not the window.
+"""One UI frame in fixed order; a part that fails costs a notice, not the window (ui.panels.guard).
 
 Order: drain the session, tick time, decide whether anything changed, draw menus, panels, popups, toasts, then ImGui.
 """
 
 from __future__ import annotations
 
-import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,9 +14,9 @@ import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
 from pyglet.window import BaseWindow
 
-from app.session.commands import Command, SetFrameMemory
-from app.session.preferences import Preferences, PreferencesFile
-from app.session.window_memory import WindowMemory
+from app.session.commands import Command, SetFrameMemory, SetProjectsFolder
+from app.session.projects.preferences import Preferences, PreferencesFile
+from app.session.projects.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
@@ -29,12 +28,13 @@ from ui.panels.editing.history_panel import HistoryPanel
 from ui.panels.editing.mend_panel import HasMending, draw_mending
 from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
 from ui.panels.exports import draw_exports
-from ui.panels.heat_overlay import HeatOverlay
+from ui.panels.guard import Guard, draw_failed
 from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.panel_keys import step_panel
-from ui.panels.picture_pane import PicturePane
-from ui.panels.recent_rows import RecentRows
+from ui.panels.picture.heat_overlay import HeatOverlay
+from ui.panels.picture.picture_pane import PicturePane
+from ui.panels.picture.viewport import ViewportNeeds, ViewportPanel
 from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
 from ui.panels.state import (
@@ -58,32 +58,31 @@ from ui.panels.state import (
 )
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.panel import draw_timeline
-from ui.panels.training import draw_training
-from ui.panels.viewport import ViewportNeeds, ViewportPanel
-from ui.shell.calibration_dialog import CalibrationDialog, HasCalibrating
-from ui.shell.dialogs import OpenFolderDialog, draw_help
-from ui.shell.export_dialog import ExportDialog, HasExporting
+from ui.panels.training.training import draw_training
+from ui.panels.welcome.recent_rows import RecentRows
+from ui.shell.dialogs.about import AboutDialog
+from ui.shell.dialogs.calibration_dialog import CalibrationDialog, HasCalibrating
+from ui.shell.dialogs.dialogs import OpenFolderDialog, draw_help
+from ui.shell.dialogs.export_dialog import ExportDialog, HasExporting
+from ui.shell.dialogs.opening_dialog import HasOpening, OpeningDialog
+from ui.shell.dialogs.questions import QuestionDialogs, QuestionNeeds
+from ui.shell.dialogs.synchronisation_dialog import HasSynchronising, SynchronisationDialog
+from ui.shell.finding.palette import Palette
+from ui.shell.finding.palette_entries import PaletteNeeds
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
 from ui.shell.layouts import Layouts
 from ui.shell.menu_bar import MenuNeeds, draw_menu_bar
-from ui.shell.opening_dialog import HasOpening, OpeningDialog
-from ui.shell.palette import Palette
-from ui.shell.palette_entries import PaletteNeeds
 from ui.shell.preferences import PreferencesDialog
-from ui.shell.questions import QuestionDialogs, QuestionNeeds
 from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
 from ui.shell.remembering import Remembering, RememberNeeds
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
 from ui.shell.status_bar import StatusNeeds, draw_status_bar
-from ui.shell.synchronisation_dialog import HasSynchronising, SynchronisationDialog
 from ui.style import theme
 from ui.style.fonts import load_fonts
 from ui.style.theme_in_use import ThemeInUse
 from ui.style.ui_scale import UiScale
 from ui.viewport.scene import Scene
-
-logger = logging.getLogger(__name__)
 
 FIRST_FRAMES = 6
 """A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
@@ -97,8 +96,6 @@ ATTENDED_S = 0.5
 """For this long after an input, every picture that arrives is shown at once."""
 MAX_TICK_S = 0.25
 NOTHING = ImVec4(0, 0, 0, 0)
-SESSION = "Session"
-"""Stands for the session among the panels that failed."""
 
 
 class FrameNeeds(
@@ -131,17 +128,6 @@ class FrameNeeds(
     def poll(self) -> bool: ...
 
     def lead_view(self) -> bool: ...
-
-
-def _recover(stack: imgui.internal.ErrorRecoveryState) -> None:
-    """End windows, tables and groups that the failed part left open."""
-    io = imgui.get_io()
-    is_assert_on = io.config_error_recovery_enable_assert
-    io.config_error_recovery_enable_assert = False  # it would raise at the first thing left open
-    try:
-        imgui.internal.error_recovery_try_to_recover_state(stack)
-    finally:
-        io.config_error_recovery_enable_assert = is_assert_on
 
 
 class Frame:
@@ -181,10 +167,13 @@ class Frame:
         keys.drop_unknown(ACTIONS)
         self.ui = UiState(fonts=load_fonts(), scale=self.scale, preferences=values, keys=keys)
         self._cache_mb: int | None = None
+        self._projects_dir = ""
+        self._follow_preferences()  # before a capture is opened
         self._theme = ThemeInUse()
         self._theme.follow(values.theme)
         rows = RecentRows(lambda: ImageTexture(ctx))
-        self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)), rows)
+        self.guard = Guard(lambda: session.notices, self.request_redraw)
+        self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)), rows, self.guard)
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
         self.doctor = DoctorPanel(lambda: ImageTexture(ctx))
@@ -199,6 +188,7 @@ class Frame:
         self.palette = Palette()
         self.preferences = PreferencesDialog()
         self.layouts = Layouts()
+        self.about = AboutDialog()
         self._redraw = RedrawPlan()
         self._redraw.request(FIRST_FRAMES)
         self._shown: tuple[int, int] | None = None
@@ -208,7 +198,6 @@ class Frame:
         self.remembering = Remembering(memory, self.ui, preferences)
         self.remembering.restore_layout()
         self.remembering.restore_marks(session)
-        self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
         self._in_front = [TIMELINE]  # a log in front of it would be a surprise
         self._dock_ids: dict[str, int] = {}
@@ -247,40 +236,41 @@ class Frame:
         self.request_redraw()
         self._on_input()
 
+    def _follow_preferences(self) -> None:
+        preferences = self.ui.preferences
+        if self._cache_mb != preferences.cache_mb:
+            self._cache_mb = preferences.cache_mb
+            self.session.dispatch(SetFrameMemory(self._cache_mb))
+        if self._projects_dir != preferences.projects_dir:
+            self._projects_dir = preferences.projects_dir
+            self.session.dispatch(SetProjectsFolder(self._projects_dir))
+
     def update(self, dt_s: float) -> bool:
         """Drain the session and move time on. True when a frame has to be drawn."""
-        session = self.session
-        has_news = self._drain()
-        if self._theme.follow(self.ui.preferences.theme):
-            self.forget_shown()
-        if self._cache_mb != self.ui.preferences.cache_mb:
-            self._cache_mb = self.ui.preferences.cache_mb
-            session.dispatch(SetFrameMemory(self._cache_mb))
-        self.remembering.follow(session)
-        has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
-        has_news |= session.lead_view()
-        self._has_news |= has_news or self.viewport.has_news(session)
+        self._has_news |= self._drain() | self._move_on(dt_s)
         if not self._redraw.is_due and (self.backend.needs_follow_up or self._is_news_due()):
             self._redraw.request(1)
         return self._redraw.is_due
 
     def _drain(self) -> bool:
         """Let the session take in what was finished; a fault there becomes a notice and never ends the loop."""
-        try:
-            has_news = self.session.poll()
-        except Exception as error:  # the loop's edge: the window has to survive it, and what trains goes on
-            if SESSION not in self._failed_panels:
-                self._failed_panels.add(SESSION)
-                logger.exception("The session could not take in what was finished")
-                self.session.notices.add(
-                    "error",
-                    "Something that was finished could not be taken in",
-                    f"{type(error).__name__}: {error}",
-                    "The window goes on. This is a fault of the program; the log has more.",
-                )
-            return True
-        self._failed_panels.discard(SESSION)
-        return has_news
+        with self.guard.telling("the session", "Something that was finished could not be taken in"):
+            return self.session.poll()
+        return True
+
+    def _move_on(self, dt_s: float) -> bool:
+        """Follow what was chosen, move time on, and ask for pictures; a fault there is told as well."""
+        session = self.session
+        with self.guard.telling("the loop", "Something between two frames went wrong"):
+            if self._theme.follow(self.ui.preferences.theme):
+                self.forget_shown()
+            self._follow_preferences()
+            self.remembering.follow(session)
+            is_shown = session.loading is None and self.viewport.shows_playhead(session)
+            has_news = session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=is_shown)
+            has_news |= session.lead_view()
+            return has_news | self.viewport.has_news(session)
+        return True
 
     def _is_news_due(self) -> bool:
         """Is it time to show what came without input?"""
@@ -308,7 +298,7 @@ class Frame:
         self.backend.new_frame()
         self.ui.is_popup_open = self.backend.is_popup_open
         self.ui.is_menu_wanted |= self.backend.take_alt_tap() and not self.ui.is_popup_open
-        self._guard("Window", self._compose)
+        self.guard.draw("the window", self._compose)
         drawn = (self.backend.end_frame(), n_changes())
         is_new, self._shown = drawn != self._shown, drawn
         self._redraw.note_drawn(drawn[0], has_more_input=self.backend.needs_follow_up)
@@ -323,10 +313,10 @@ class Frame:
 
     def _compose(self) -> None:
         session, ui, dispatch = self.session, self.ui, self.dispatch
-        self._guard("Keys", lambda: handle_keys(session, dispatch, ui))
-        self._guard("Menu", lambda: draw_menu_bar(session, dispatch, ui))
+        self.guard.draw("the keys", lambda: handle_keys(session, dispatch, ui))
+        self.guard.draw("the menus", lambda: draw_menu_bar(session, dispatch, ui))
         is_software = self.viewport.scene.is_software
-        self._guard("Status bar", lambda: draw_status_bar(session, ui, is_software=is_software))
+        self.guard.draw("the status bar", lambda: draw_status_bar(session, self.dispatch, ui, is_software=is_software))
         imgui.push_style_color(imgui.Col_.window_bg, NOTHING)  # the frame is cleared to the panels' colour
         imgui.push_style_var_x(imgui.StyleVar_.frame_padding, imgui.get_style().frame_padding.x * TAB_PADDING_SHARE)
         dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
@@ -349,28 +339,30 @@ class Frame:
         elif (is_welcome := session.capture is None) != self._is_welcome and not self._in_front:
             self._is_welcome = is_welcome
             ui.wanted_panel = VIEWPORT if is_welcome else ui.wanted_panel  # its list is moved in by arrow keys
-        step_panel(ui)
+        step_panel(ui, self._visible_panels)
         self._dock_ids.clear()
         for title, draw_panel, has_padding in self._panels:
             if title == VIEWPORT or not ui.is_picture_only:
                 self._draw_panel(title, draw_panel, has_padding)
         hold_sizes(self._dock_ids)
         self.dialog.open_wished(ui)
-        self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
-        self._guard("Help", lambda: draw_help(ui))
-        self._guard("Layouts", lambda: self.layouts.draw(ui))
-        self._guard("Preferences", lambda: self.preferences.draw(ui))
-        self._guard("Palette", lambda: self.palette.draw(session, dispatch, ui))
-        self._guard("Opening", lambda: self.opening.draw(session, dispatch, ui))
-        self._guard("Synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
-        self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
-        self._guard("Export", lambda: self.export.draw(session, dispatch, ui))
-        self._guard("Mend", lambda: draw_mending(session, dispatch, ui))
-        self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
+        self.guard.draw("the dialog for folders", lambda: self.dialog.draw(dispatch, ui))
+        self.guard.draw("the help sheet", lambda: draw_help(ui))
+        self.guard.draw("the dialog about the program", lambda: self.about.draw(ui))
+        self.guard.draw("the layouts", lambda: self.layouts.draw(ui))
+        self.guard.draw("the preferences", lambda: self.preferences.draw(ui))
+        self.guard.draw("the palette", lambda: self.palette.draw(session, dispatch, ui))
+        self.guard.draw("the dialog that opens captures", lambda: self.opening.draw(session, dispatch, ui))
+        self.guard.draw("the synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
+        self.guard.draw("the calibration", lambda: self.calibration.draw(session, dispatch, ui))
+        self.guard.draw("the export dialog", lambda: self.export.draw(session, dispatch, ui))
+        self.guard.draw("the dialog that mends", lambda: draw_mending(session, dispatch, ui))
+        if not self.guard.draw("the question", lambda: self.questions.draw(session, dispatch, ui)):
+            self.questions.leave(session, dispatch)
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
         toast_area = ui.rects.get("viewport.free", whole)
-        self._guard("Notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
+        self.guard.draw("the notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
 
     def _is_panel_keyed(self) -> bool:
         """Do arrow keys move from one item to the next? In the panel that F6 went to, and on the first screen."""
@@ -417,29 +409,10 @@ class Frame:
         if not has_padding:
             imgui.pop_style_var()
         if is_visible:
-            self._guard(title, lambda: draw_panel(self.session, self.dispatch, self.ui))
+            part = f"the panel {title}"
+            if not self.guard.draw(part, lambda: draw_panel(self.session, self.dispatch, self.ui)):
+                draw_failed(part)
         imgui.end()
-
-    def _guard(self, title: str, draw_part: Callable[[], None]) -> None:
-        """Run one part of the frame; a failure becomes a notice, told once until the part works again."""
-        stack = imgui.internal.ErrorRecoveryState()
-        imgui.internal.error_recovery_store_state(stack)
-        try:
-            draw_part()
-        except Exception as error:  # the frame loop's edge: the window has to survive a broken panel
-            _recover(stack)
-            if title not in self._failed_panels:
-                self._failed_panels.add(title)
-                logger.exception("The panel %s could not be drawn", title)
-                self.session.notices.add(
-                    "error",
-                    f"The {title.lower()} could not be drawn",
-                    f"{type(error).__name__}: {error}",
-                    "The rest of the window goes on. Copy this and report it.",
-                )
-                self.request_redraw()
-        else:
-            self._failed_panels.discard(title)
 
     def close(self) -> None:
         """Release GL objects and ImGui. The GL context must still be current."""

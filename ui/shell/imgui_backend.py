@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import pyglet
@@ -16,6 +17,7 @@ from imgui_bundle import ImVec2, imgui, implot
 from pyglet.event import EVENT_HANDLED
 from pyglet.window import BaseWindow, key, mouse
 
+from ui.shell.input_queue import InputQueue
 from ui.shell.redraw import fingerprint
 from ui.style.ui_scale import UiScale
 
@@ -137,6 +139,19 @@ class _ClipboardText(str):
         return len(self.encode("utf-8"))
 
 
+@dataclass(eq=False)
+class KeyPress:
+    """A key that went down, and the text that the same press types.
+
+    Attributes:
+        key: None for one that means nothing here but its text.
+    """
+
+    key: imgui.Key | None
+    text: str = ""
+    is_passed_on: bool = False
+
+
 class ImGuiBackend:
     """Owns the ImGui and ImPlot contexts of one window.
 
@@ -171,8 +186,9 @@ class ImGuiBackend:
         self._on_input = on_input
         self._fixed_delta_s = fixed_delta_s
         self._last_frame_s = time.perf_counter()
-        self._keys_pressed_since_frame = False
-        self._held_releases: list[imgui.Key] = []
+        self._queue = InputQueue()
+        self._newest_press: KeyPress | None = None
+        self._pressed: dict[int, KeyPress] = {}
         self._shown_cursor = -2
         # On X11 and headless, rows count 0..height-1 upwards; Win32 and Cocoa report height - y.
         self._row_offset = 1.0 if (pyglet.options.headless or sys.platform.startswith("linux")) else 0.0
@@ -208,7 +224,7 @@ class ImGuiBackend:
     @property
     def needs_follow_up(self) -> bool:
         """True while input waits for the next frame: ImGui takes in what came at once one after the other."""
-        return bool(self._held_releases) or len(self.context.input_events_queue) > 0
+        return len(self._queue) > 0 or len(self.context.input_events_queue) > 0
 
     def take_alt_tap(self) -> bool:
         """Was Alt pressed and released with nothing between since this was last asked?"""
@@ -235,9 +251,7 @@ class ImGuiBackend:
     def _offer_menu_keys(self) -> None:
         """Arrow keys, Enter and Escape belong to a menu or popup while one is open, and to the shortcuts otherwise."""
         io = imgui.get_io()
-        context = self.context
-        is_in_bar = context.nav_layer == imgui.internal.NavLayer.menu and context.nav_cursor_visible
-        is_open = is_in_bar or len(context.open_popup_stack) > 0
+        is_open = self._is_menu_open()
         # From one menu to the next by arrow key there are frames without any.
         self._menu_frames = FRAMES_BETWEEN_MENUS if is_open else max(self._menu_frames - 1, 0)
         self.is_popup_open = self._menu_frames > 0
@@ -246,6 +260,10 @@ class ImGuiBackend:
         elif io.config_flags & imgui.ConfigFlags_.nav_enable_keyboard:
             io.config_flags &= ~imgui.ConfigFlags_.nav_enable_keyboard
             imgui.set_nav_cursor_visible(False)
+
+    def _is_menu_open(self) -> bool:
+        is_in_bar = self.context.nav_layer == imgui.internal.NavLayer.menu and self.context.nav_cursor_visible
+        return is_in_bar or len(self.context.open_popup_stack) > 0
 
     def end_frame(self) -> int:
         """Finish the frame; returns the fingerprint of what it draws (ui.shell.redraw)."""
@@ -258,10 +276,10 @@ class ImGuiBackend:
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
     def _after_frame(self) -> None:
-        self._keys_pressed_since_frame = False
-        releases, self._held_releases = self._held_releases, []
-        for imgui_key in releases:
-            self._add_key(imgui_key, False)
+        is_closing = self._menu_frames > 0 and not self._is_menu_open()
+        is_late = len(self.context.input_events_queue) > 0  # ImGui has not taken in all that it was told
+        # Else the next frame may give a field the keyboard, or the shortcuts their keys back.
+        self._queue.after_frame(is_held=is_late or is_closing or self.context.nav_move_submitted)
         self._show_cursor()
 
     def close(self) -> None:
@@ -273,83 +291,112 @@ class ImGuiBackend:
 
     # ---- events ----------------------------------------------------------------------------------------------
 
+    def _pass_on(self, event: Callable[[], object]) -> None:
+        """Tell ImGui about an event, after those before it. True of an event asks for a frame before the next one."""
+        self._newest_press = None
+        self._queue.add(lambda: event() is True)
+        self._on_input()
+
     def _move_to(self, x: float, y: float) -> None:
         width, height = self._window.get_size()
         units = self._window.get_framebuffer_size()[0] / max(width, 1) / self.pixels_per_unit
         imgui.get_io().add_mouse_pos_event(float(x) * units, float(height - self._row_offset - y) * units)
 
     def _mouse_motion(self, x: float, y: float, dx: float, dy: float) -> None:
-        self._move_to(x, y)
-        self._on_input()
+        self._pass_on(lambda: self._move_to(x, y))
 
     def _mouse_drag(self, x: float, y: float, dx: float, dy: float, buttons: int, modifiers: int) -> None:
-        self._move_to(x, y)
-        self._on_input()
+        self._pass_on(lambda: self._move_to(x, y))
 
     def _mouse_press(self, x: float, y: float, button: int, modifiers: int) -> None:
-        self._click(x, y, button, True)
+        self._pass_on(lambda: self._click(x, y, button, True))
 
     def _mouse_release(self, x: float, y: float, button: int, modifiers: int) -> None:
-        self._click(x, y, button, False)
+        self._pass_on(lambda: self._click(x, y, button, False))
 
     def _click(self, x: float, y: float, button: int, is_down: bool) -> None:
         self._is_alt_alone = False
         self._move_to(x, y)
         if button in _BUTTONS:
             imgui.get_io().add_mouse_button_event(_BUTTONS[button], is_down)
-        self._on_input()
 
     def _mouse_scroll(self, x: float, y: float, scroll_x: float, scroll_y: float) -> None:
-        self._move_to(x, y)
-        imgui.get_io().add_mouse_wheel_event(float(scroll_x), float(scroll_y))
-        self._on_input()
+        def scroll() -> None:
+            self._move_to(x, y)
+            imgui.get_io().add_mouse_wheel_event(float(scroll_x), float(scroll_y))
+
+        self._pass_on(scroll)
 
     def _mouse_enter(self, x: float, y: float) -> None:
-        self._move_to(x, y)
-        self._on_input()
+        self._pass_on(lambda: self._move_to(x, y))
 
     def _mouse_leave(self, x: float, y: float) -> None:
-        imgui.get_io().add_mouse_pos_event(_FAR, _FAR)
-        self._on_input()
+        self._pass_on(lambda: imgui.get_io().add_mouse_pos_event(_FAR, _FAR))
 
     def _activate(self) -> None:
-        imgui.get_io().add_focus_event(True)
-        self._on_input()
+        self._pass_on(lambda: imgui.get_io().add_focus_event(True))
 
     def _deactivate(self) -> None:
-        self._held_modifiers.clear()
-        self._is_alt_alone = False
-        imgui.get_io().add_focus_event(False)
-        self._on_input()
+        def lose_focus() -> None:
+            self._held_modifiers.clear()
+            self._is_alt_alone = False
+            imgui.get_io().add_focus_event(False)
+
+        self._forget_pressed(list(self._pressed))  # their releases go to another window
+        self._pass_on(lose_focus)
 
     def _key_press(self, symbol: int, modifiers: int) -> bool | None:
         imgui_key = _KEY_MAP.get(symbol)
-        self._is_alt_alone = symbol in _ALT and not self._held_modifiers
-        if imgui_key is not None and not self._is_only_text(imgui_key):
-            if int(imgui_key) not in _MODIFIER_OF:
-                self._keys_pressed_since_frame = True
-            self._add_key(imgui_key, True)
-            self._on_input()
+        press = KeyPress(imgui_key)
+        if imgui_key is not None and int(imgui_key) not in _MODIFIER_OF:
+            self._pressed[symbol] = press
+        self._pass_on(lambda: self._press(symbol, press))
+        self._newest_press = press
         # pyglet's own handler closes the window on Escape; this one comes first and keeps it open.
         return EVENT_HANDLED if symbol == key.ESCAPE else None
 
+    def _press(self, symbol: int, press: KeyPress) -> bool:
+        self._is_alt_alone = symbol in _ALT and not self._held_modifiers
+        is_key = press.key is not None and not self._is_only_text(press.key)
+        if press.key is not None and is_key:
+            self._add_key(press.key, True)
+        press.is_passed_on = True
+        self._add_text(press.text)
+        return is_key and int(press.key or 0) not in _MODIFIER_OF
+
     def _key_release(self, symbol: int, modifiers: int) -> None:
+        released = self._released(symbol)
+        if released or symbol in _ALT:
+            self._pass_on(lambda: self._release(symbol, released))
+
+    def _release(self, symbol: int, released: list[imgui.Key]) -> None:
         self._was_alt_tapped |= symbol in _ALT and self._is_alt_alone
-        imgui_key = _KEY_MAP.get(symbol)
-        if imgui_key is None:
-            return
-        if int(imgui_key) in _MODIFIER_OF and self._keys_pressed_since_frame:
-            # Ctrl+A pressed and released between two slow frames must still read as Ctrl+A.
-            self._held_releases.append(imgui_key)
-        else:
+        for imgui_key in released:
             self._add_key(imgui_key, False)
-        self._on_input()
+
+    def _released(self, symbol: int) -> list[imgui.Key]:
+        """Keys that go up. What a key is called depends on Shift, which may have been released since it was pressed:
+        under a name that was not pressed, the key of the same place goes up, else all of them."""
+        imgui_key = _KEY_MAP.get(symbol)
+        if imgui_key is not None and int(imgui_key) in _MODIFIER_OF:
+            return [imgui_key]
+        names = [symbol] if symbol in self._pressed else self._names_of(imgui_key) or list(self._pressed)
+        return self._forget_pressed(names)
+
+    def _names_of(self, imgui_key: imgui.Key | None) -> list[int]:
+        return [name for name, press in self._pressed.items() if press.key == imgui_key]
+
+    def _forget_pressed(self, symbols: list[int]) -> list[imgui.Key]:
+        """Take keys as up; returns them. pyglet tells a press from a repetition by a list of its own."""
+        getattr(self._window, "pressed_keys", set()).difference_update(symbols)
+        return [pressed.key for pressed in map(self._pressed.pop, symbols) if pressed.key is not None]
 
     def _is_only_text(self, imgui_key: imgui.Key) -> bool:
         """Is this key of interest only for the character it types? ImGui takes in one key per frame but any number of
         characters: without this what is typed fast would appear slowly."""
         is_chord = bool(self._held_modifiers - _SHIFT)
-        return imgui.get_io().want_text_input and not is_chord and int(imgui_key) in _TYPING
+        is_typing = imgui.get_io().want_text_input or self.context.want_text_input_next_frame == 1
+        return is_typing and not is_chord and int(imgui_key) in _TYPING
 
     def _add_key(self, imgui_key: imgui.Key, is_down: bool) -> None:
         io = imgui.get_io()
@@ -361,9 +408,18 @@ class ImGuiBackend:
 
     def _text(self, text: str) -> None:
         printable = "".join(character for character in text if character.isprintable())
-        if printable:
-            imgui.get_io().add_input_characters_utf8(printable)
-            self._on_input()
+        press, self._newest_press = self._newest_press, None
+        if press is None:
+            self._pass_on(lambda: self._add_text(printable))
+        elif press.is_passed_on:  # the same frame takes it in: what the key opens does not begin with its letter
+            self._add_text(printable)
+        else:
+            press.text = printable
+        self._on_input()
+
+    def _add_text(self, text: str) -> None:
+        if text:
+            imgui.get_io().add_input_characters_utf8(text)
 
     # ---- platform services -----------------------------------------------------------------------------------
 

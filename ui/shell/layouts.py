@@ -6,7 +6,7 @@ import logging
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.preferences import MAX_LAYOUTS
+from app.session.projects.preferences import MAX_LAYOUTS
 from ui.panels.state import LAYOUTS, UiState
 from ui.panels.widgets import text_wrapped_dim
 from ui.shell.remembering import present_layout, take_layout
@@ -15,7 +15,7 @@ from ui.style.theme import Icon
 
 logger = logging.getLogger(__name__)
 
-TITLE = "Save the layout###layout name"
+TITLE = "Keep the layout###layout name"
 MAX_NAME = 60
 
 
@@ -83,7 +83,7 @@ class Layouts:
         else:
             text_wrapped_dim("It replaces the layout of this name." if name in kept else "It is kept for all projects.")
         imgui.begin_disabled(not name or bool(why_not))
-        is_agreed |= imgui.button("Save", ImVec2(120, 0))
+        is_agreed |= imgui.button("Keep", ImVec2(120, 0))
         ui.mark("layout.save")
         imgui.end_disabled()
         imgui.same_line()

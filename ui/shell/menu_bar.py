@@ -15,10 +15,10 @@ from engine.text import one_line
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.actions.menus import Menu, menus
 from ui.panels.actions.window import choose_scale
-from ui.panels.recent_rows import open_recent
 from ui.panels.state import Dispatch, UiState
-from ui.panels.training import TrainingNeeds, next_label
-from ui.panels.welcome import SAMPLE_PATH, WelcomeNeeds
+from ui.panels.training.training import TrainingNeeds, next_label
+from ui.panels.welcome.recent_rows import open_recent
+from ui.panels.welcome.welcome import SAMPLE_PATH, WelcomeNeeds
 from ui.panels.widgets import elided_path
 from ui.style.theme import Icon
 from ui.style.ui_scale import CHOICES, scale_text

@@ -53,7 +53,7 @@ def _show_dialog(text: str) -> None:
     try:
         from imgui_bundle import portable_file_dialogs as native
 
-        from ui.shell.dialogs import has_native_dialog
+        from ui.shell.dialogs.dialogs import has_native_dialog
 
         if has_native_dialog():
             native.message("ClipGStream Studio", text, native.choice.ok, native.icon.error).result()

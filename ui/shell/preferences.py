@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.preferences import CACHE_MB
+from app.project.projects_folder import VARIABLE, projects_dir
+from app.session.projects.preferences import CACHE_MB
+from engine.backends.table import AUTO, BACKENDS
 from ui.panels.actions.window import choose_scale
-from ui.panels.gestures import PRESETS, mouse_help
+from ui.panels.picture.gestures import PRESETS, mouse_help
 from ui.panels.state import UiState
 from ui.panels.widgets import text_wrapped_dim
 from ui.shell.preferences_keys import KeysPage
@@ -116,7 +119,7 @@ def label(words: str) -> None:
 
 
 def draw_general(ui: UiState) -> None:
-    """Colours and sizes."""
+    """Colours, sizes, and where projects are kept."""
     preferences = ui.preferences
     label("Theme")
     for name, words in THEMES.items():
@@ -138,6 +141,37 @@ def draw_general(ui: UiState) -> None:
             ui.mark(f"preferences.scale.{scale_text(choice)}")
         imgui.end_combo()
     ui.mark("preferences.scale")
+    imgui.spacing()
+    label("Folder of projects")
+    flags = imgui.InputTextFlags_.elide_left
+    usual = str(projects_dir())
+    is_edited, typed = imgui.input_text_with_hint("##projects", usual, preferences.projects_dir, flags)
+    if is_edited:
+        preferences.projects_dir = typed
+    ui.mark("preferences.projects")
+    imgui.set_cursor_pos_x(LABEL_WIDTH)
+    text_wrapped_dim(projects_words(preferences.projects_dir))
+    imgui.spacing()
+    label("Compute with")
+    choices = {AUTO: "the best that works here"} | {name: entry.words for name, entry in BACKENDS.items()}
+    if imgui.begin_combo("##backend", preferences.backend):
+        for name, words in choices.items():
+            if imgui.selectable(f"{name}: {words}", preferences.backend == name)[0]:
+                preferences.backend = name
+            ui.mark(f"preferences.backend.{name}")
+        imgui.end_combo()
+    ui.mark("preferences.backend")
+    imgui.set_cursor_pos_x(LABEL_WIDTH)
+    text_wrapped_dim("From the next start on.")
+
+
+def projects_words(chosen: str) -> str:
+    """Where projects go that are made from now on."""
+    named = os.environ.get(VARIABLE, "").strip()
+    above = f" {VARIABLE} names it." if named else ""
+    folder = str(projects_dir(chosen))
+    where = "here" if folder == (chosen or str(projects_dir())) else f"to {folder}"
+    return f"New projects go {where}.{above} Projects that exist stay where they are."
 
 
 def draw_navigation(ui: UiState) -> None:

@@ -11,7 +11,7 @@ from ui.panels.actions.key import pressed_label
 from ui.panels.actions.table import ACTIONS
 from ui.panels.state import UiState
 from ui.panels.widgets import primary_button, text_wrapped_dim
-from ui.shell.fuzzy import match
+from ui.shell.finding.fuzzy import match
 from ui.style import theme
 from ui.style.theme import Icon
 

@@ -11,12 +11,12 @@ from typing import Any, Protocol
 from imgui_bundle import imgui
 
 from app.project.project import Project
-from app.session.commands import Command
+from app.session.commands import ActivateView, Command
 from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import PutMarker
 from app.session.notices import Notices
-from app.session.preferences import PreferencesFile
-from app.session.window_memory import Viewed, WindowMemory, markers_of, show_again, view_of
+from app.session.projects.preferences import PreferencesFile
+from app.session.projects.window_memory import Viewed, WindowMemory, markers_of, show_again, view_of
 from ui.panels.capture import CaptureFacts
 from ui.panels.state import UiState
 
@@ -104,6 +104,7 @@ class Remembering:
             self._folder = folder
             if folder in memory.views:
                 show_again(session, memory.views[folder])
+                session.dispatch(ActivateView(session.views.active_index))  # and what draws pictures knows it
                 self._take_over_markers(session, memory.views[folder])
         if is_due:
             self._keep(session)

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.session.commands import CancelJob
 from app.session.editing.selection_status import SelectionStatus
 from app.session.notices import Notices
 from app.status import JobStatus, ProjectStatus, QueueStatus, TrainingStatus, UsageStatus
 from engine.text import duration_text
 from ui.panels.exports import ExportingFacts
-from ui.panels.queue import clips_text, usage_text
-from ui.panels.state import UiState
-from ui.panels.widgets import elided
+from ui.panels.state import Dispatch, UiState
+from ui.panels.training.queue import clips_text, usage_text
+from ui.panels.widgets import draw_job_bar, elided
 from ui.style import theme
 from ui.style.numbers import format_count
-from ui.style.progress_words import stage_words
+from ui.style.progress_words import job_words, stage_words
 from ui.style.theme import Icon
 
 HEIGHT = 28.0
+BAR_WIDTH = 90.0
 
 
 class StatusNeeds(Protocol):
@@ -54,7 +57,7 @@ class StatusNeeds(Protocol):
     def selection(self) -> SelectionStatus: ...
 
 
-def draw_status_bar(session: StatusNeeds, ui: UiState, *, is_software: bool) -> None:
+def draw_status_bar(session: StatusNeeds, dispatch: Dispatch, ui: UiState, *, is_software: bool) -> None:
     """Work and its progress on the left; notices and the kind of drawing on the right."""
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_docking
     imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.BACKDROP))
@@ -64,10 +67,23 @@ def draw_status_bar(session: StatusNeeds, ui: UiState, *, is_software: bool) -> 
     if imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, HEIGHT, flags):
         right = _right_text(session, is_software=is_software)
         right_x = imgui.get_window_width() - imgui.calc_text_size(right).x - 14
-        imgui.text(elided(status_text(session), right_x - 28))
+        start, left = imgui.get_cursor_pos(), 0.0
+        if session.jobs:
+            left = BAR_WIDTH + imgui.get_style().item_spacing.x
+            imgui.set_cursor_pos_x(start.x + left)
+            if session.jobs[0].can_cancel:
+                if imgui.small_button("Cancel##job"):
+                    dispatch(CancelJob(session.jobs[0].name))
+                ui.mark("status.cancel")
+                imgui.same_line()
+                left = imgui.get_cursor_pos_x() - 14
+        imgui.text(elided(status_text(session), right_x - left - 28))
         ui.mark("status.text")
         imgui.same_line(max(right_x, 0))
         imgui.text(right)
+        if session.jobs:  # last, since what follows a bar in its line stands lower
+            imgui.set_cursor_pos(start)
+            draw_job_bar(session.jobs[0], ui, BAR_WIDTH, imgui.get_text_line_height())
     imgui.end()
     imgui.pop_style_var()
     imgui.pop_style_color(2)
@@ -77,8 +93,7 @@ def status_text(session: StatusNeeds) -> str:
     """What goes on, in one line."""
     if session.jobs:
         job = session.jobs[0]
-        share = f"{job.done * 100:.0f} %" if job.done > 0 else ""
-        return "  ".join(part for part in (job.name, share, job.message) if part)
+        return f"{job.name}: {job_words(job, time.monotonic())}"
     status = session.training
     if status.state == "running":
         steps = f"step {format_count(status.step)} of {format_count(status.n_steps)}"

@@ -17,8 +17,8 @@ import moderngl
 import pyglet
 from pyglet.event import EVENT_HANDLED
 
-from app.session.preferences import PreferencesFile
-from app.session.window_memory import WindowMemory
+from app.session.projects.preferences import PreferencesFile
+from app.session.projects.window_memory import WindowMemory
 from engine.text import one_line
 from ui.gl import free_dropped
 from ui.shell.frame import Frame, FrameNeeds

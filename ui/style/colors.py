@@ -1,12 +1,12 @@
 """Hues that carry meaning, once for the widgets and the GL drawing alike. Plain numbers; imports no library.
 
-They are those of app.playback.hues; every one of them is also told apart by a shape, an icon or a word where it is
-used.
+They are those of app.playback.modes.hues; every one of them also has a shape, an icon or a word of its own where it
+is used.
 """
 
 from __future__ import annotations
 
-from app.playback import hues
+from app.playback.modes import hues
 
 Color = tuple[float, float, float, float]
 """Red, green, blue and opacity in 0..1."""

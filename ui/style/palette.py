@@ -14,7 +14,7 @@ from ui.style import colors
 from ui.style.colors import Color, rgb
 
 VOID = rgb(18, 20, 24)
-"""Behind pictures, in both themes; app.playback.arrays.BACKGROUND is the same."""
+"""Behind pictures, in both themes; app.playback.modes.arrays.BACKGROUND is the same."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,27 @@ a preparation, which has none yet, is counted in stages.
 
 from __future__ import annotations
 
-from app.status import ClipStatus, TrainingStatus
+from app.status import ClipStatus, JobStatus, TrainingStatus
+from engine.text import duration_text
 
 COUNTED_IN_STEPS = ("training", "paused", "stopped")
+
+
+def job_words(job: JobStatus | None, now_s: float) -> str:
+    """What a job does, how far it is, since when, and how long it will take, as far as that is known:
+    "Key points, 40 %, 0:32, about 0:48 left".
+
+    Args:
+        job: None for one that has not said anything yet.
+        now_s: By time.monotonic.
+    """
+    if job is None:
+        return "Starting"
+    spent_s, left_s = job.elapsed_s(now_s), job.eta_s(now_s)
+    parts = [job.message or "Starting", f"{100 * job.done:.0f} %" if job.done > 0 else ""]
+    parts += ["" if spent_s is None else duration_text(spent_s)]
+    parts += ["" if left_s is None else f"about {duration_text(left_s)} left"]
+    return ", ".join(filter(None, parts))
 
 
 def stage_words(training: TrainingStatus) -> str:

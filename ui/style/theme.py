@@ -123,6 +123,7 @@ class Icon:
     DOWN = "\uf063"
     LOG = "\uf15c"
     MEND = "\uf0ad"
+    MORE = "\uf141"
 
 
 CLIP_ICONS: dict[str, str] = {

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
-from app.playback.color_maps import mapped
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import GaussianArrays
+from app.playback.modes.color_maps import mapped
+from app.playback.views.orbit_view import OrbitView
 from app.residuals.anchor_heat import AnchorHeat
 from app.status import Overlays
 from ui.gl import PointRenderer, Target

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.color_maps import SIGNED, mapped
-from app.playback.coverage import Coverage
-from app.playback.trails import Trails
+from app.playback.modes.color_maps import SIGNED, mapped
+from app.playback.modes.coverage import Coverage
+from app.playback.modes.trails import Trails
 from app.status import Overlays
 from ui.gl import LineRenderer, PointRenderer, Target
 from ui.style.colors import ROLE_COLORS

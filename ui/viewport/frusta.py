@@ -4,18 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.playback.scene_axes import rig_radius
+from app.playback.views.scene_axes import rig_radius
 from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rig import CameraRig
 from ui.gl.lines import LINES_PER_FRUSTUM, frusta_lines
 
 FRUSTUM_SHARE = 0.09
 """Length of a camera's pyramid as a share of the rig's radius."""
+NEAR_SHARE = 1.5
+"""A view that is nearer to a camera than this share of its pyramid's length is as good as inside."""
 
 
 def frustum_size(rig: CameraRig) -> float:
     """Length of a pyramid, scene units."""
     return FRUSTUM_SHARE * rig_radius(rig)
+
+
+def cameras_around(rig: CameraRig, world_to_camera: np.ndarray, size: float) -> np.ndarray:
+    """Cameras in or right before whose pyramids a view stands, such as the one that was just looked through: their
+    lines would go right across its picture. [C] bool
+
+    Args:
+        world_to_camera: Of the view. [4, 4]
+        size: Of the pyramids, scene units.
+    """
+    eye = -world_to_camera[:3, :3].T @ world_to_camera[:3, 3]
+    return np.linalg.norm(rig.centers - eye, axis=1) < NEAR_SHARE * size
 
 
 def camera_under(

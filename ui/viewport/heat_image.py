@@ -8,8 +8,8 @@ from collections.abc import Hashable
 import moderngl
 import numpy as np
 
-from app.playback.color_maps import mapped
-from app.playback.hatching import hatched
+from app.playback.modes.color_maps import mapped
+from app.playback.modes.hatching import hatched
 from ui.gl import ImageTexture
 
 
@@ -29,7 +29,7 @@ class HeatImage:
 
         Args:
             values: [H, W]; hatched where they are not numbers.
-            map_name, low, high: See app.playback.color_maps.mapped.
+            map_name, low, high: See app.playback.modes.color_maps.mapped.
             key: Differs whenever the values do.
         """
         whole = (key, map_name, low, high)

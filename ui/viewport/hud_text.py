@@ -29,6 +29,8 @@ _STANDS_IN = {
     MARKS: "cameras only",
 }
 """What is seen where there is no rendered picture."""
+PARTS = "   "
+"""Between parts of a label; each stays whole where lines break."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,7 @@ def hud_text(
     state_words: str,
     camera_name: Callable[[int | None], str],
     rate: ShownRate | None = None,
+    loading: tuple[int, int] | None = None,
 ) -> HudText:
     """Everything that the HUD says about the picture.
 
@@ -95,6 +98,7 @@ def hud_text(
         state, state_words: Of the clip under the playhead, see ClipStatus; and as users read it.
         camera_name: Of an index; None is the free view.
         rate: While playing.
+        loading: Frames that are ready, of how many, before playing begins.
     """
     pending = "" if wanted.has_failed else _pending_text(shown, wanted, camera_name, is_playing=rate is not None)
     failure = (
@@ -105,8 +109,13 @@ def hud_text(
         pending=pending,
         failure=failure,
         note=_note(shown, wanted, state, state_words),
-        rate="" if rate is None else rate_text(rate),
+        rate=loading_text(*loading) if loading is not None else "" if rate is None else rate_text(rate),
     )
+
+
+def loading_text(n_ready: int, n_frames: int) -> str:
+    """What playing waits for."""
+    return f"loading {n_ready} of {n_frames} frames"
 
 
 def rate_text(rate: ShownRate) -> str:
@@ -171,7 +180,7 @@ def _label(
         size += f" of {shown.full_size[0]} x {shown.full_size[1]}"
     camera = camera_name(source.camera_index)
     words = [f"clip {clip_index}", frame, f"{frame_index / max(fps, 1e-6):.2f} s", camera, size]
-    return "   ".join(words + ([source.shown_as.label] if source.shown_as.label else []))
+    return PARTS.join(words + ([source.shown_as.label] if source.shown_as.label else []))
 
 
 def _pending_text(
@@ -225,11 +234,8 @@ def _note(shown: ShownPicture, wanted: WantedFrame, state: str, state_words: str
         still = ", moving objects are missing until they are learned" if source.is_still else ""
         return f"clip {wanted.clip_index} {state_words}{step}{still}"
     what = _STANDS_IN[shown.kind]
-    if wanted.has_failed:
+    if wanted.has_failed or wanted.revision:
         return f"{what}, not the trained result"
-    if wanted.revision:
-        missing = ": moving objects are missing until then" if shown.kind == CLOUD else ""
-        return f"{what}, not the trained result{missing}"
     if shown.kind == CLOUD:
         what += ", moving objects are missing"
     verb = "is " if state in ("untrained", "stale", "queued") else ""

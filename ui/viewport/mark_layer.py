@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.arrays import AnchorArrays, GaussianArrays
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays
 from app.playback.picture_source import UNKNOWN, PictureSource
+from app.playback.views.orbit_view import OrbitView
 from app.status import Overlays
 from engine.camera.rig import CameraRig
 from ui.gl import (
@@ -26,8 +26,9 @@ from ui.gl import (
     Target,
     frusta_lines,
 )
+from ui.gl.lines import LINES_PER_FRUSTUM
 from ui.viewport.anchor_marks import AnchorMarks, anchor_marks
-from ui.viewport.frusta import camera_under, frustum_size
+from ui.viewport.frusta import camera_under, cameras_around, frustum_size
 from ui.viewport.occlusion import OcclusionMap
 
 if TYPE_CHECKING:
@@ -130,10 +131,12 @@ class MarkLayer:
         """
         overlays, frusta_key = session.overlays, None
         if overlays.show_frusta:
-            held_out = tuple(session.holdout)
-            frusta_key = (id(session.rig), held_out, self.pointed_camera)
-            lines = frusta_lines(session.rig, frustum_size(session.rig), held_out, chosen=self.pointed_camera)
-            self._frusta.set(*lines, key=frusta_key)
+            held_out, size = tuple(session.holdout), frustum_size(session.rig)
+            around = cameras_around(session.rig, view.world_to_camera, size)
+            frusta_key = (id(session.rig), held_out, self.pointed_camera, around.tobytes())
+            vertices, colors = frusta_lines(session.rig, size, held_out, chosen=self.pointed_camera)
+            is_drawn = np.repeat(~around, 2 * LINES_PER_FRUSTUM)
+            self._frusta.set(vertices[is_drawn], colors[is_drawn], key=frusta_key)
         anchors = session.shown_anchors()
         common = (frusta_key, session.view.look_through, self.pixels_per_unit)
         if anchors is None:

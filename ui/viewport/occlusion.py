@@ -10,7 +10,7 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
 from engine.camera.projection import to_camera, to_pixels
 
 MAX_LOOKED_AT = 40_000

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from app.playback.timeline import Timeline
-from app.playback.views import Views
+from app.playback.views.views import Views
 from app.session.edit_status import PathsStatus
 from app.status import Overlays
 from engine.camera.camera_path import CameraKey, CameraPath

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.session.path_commands import PlaceCameraKey
+from app.session.paths.path_commands import PlaceCameraKey
 from engine.camera.camera_path import CameraKey
 from engine.camera.projection import to_camera
 
@@ -24,7 +24,7 @@ class PathTool:
     """The drag or the presses in progress.
 
     Attributes:
-        gesture: Number of the present one; see app.session.path_commands.
+        gesture: Number of the present one; see app.session.paths.path_commands.
         dragged: Number of the key that is dragged in a picture; None while none is.
         timed: Number of the key that is pressed on the timeline; None while none is.
         timed_from: Where it was pressed, units of the screen; None once that has become a drag.

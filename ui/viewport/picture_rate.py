@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, replace
 
-from app.playback.course import Course
+from app.playback.prefetch_order import Course
 
 WINDOW_S = 2.0
 """The rate is that of the last seconds."""

@@ -56,13 +56,14 @@ class MovingSize:
         if not QUICK * MOVING_MS <= at_this_size_ms <= SLOW * MOVING_MS:
             self.share = moving_share(drawn_share, took_ms)
 
-    def is_hurried(self, frame_index: int, now_s: float, *, is_playing: bool) -> bool:
-        """Is another frame looked at than a moment ago? Asked for every picture.
+    def is_hurried(self, frame_index: int, now_s: float, *, is_playing: bool, is_loaded_first: bool = False) -> bool:
+        """Is another frame looked at than a moment ago, and not loaded before it is shown? Asked for every picture.
 
         Args:
             now_s: Seconds of a clock that never goes back.
+            is_loaded_first: See Course.
         """
         if frame_index != self._frame_index:
             is_first, self._frame_index = self._frame_index is None, frame_index
             self._changed_s = -1e9 if is_first else now_s
-        return is_playing or now_s - self._changed_s < HURRY_S
+        return not is_loaded_first and (is_playing or now_s - self._changed_s < HURRY_S)

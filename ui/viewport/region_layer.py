@@ -11,7 +11,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from app.playback.arrays import AnchorArrays
+from app.playback.modes.arrays import AnchorArrays
 from engine.clip_files.roles import ROLES
 from engine.gate.regions import GateRegion
 from ui.gl import LineRenderer, PointRenderer, Target

@@ -15,11 +15,12 @@ from typing import Literal, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
+from app.playback.modes.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
+from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.picture_source import PictureSource
-from app.playback.pointing import pixel_ray, seen_point
+from app.playback.prefetch_order import Course
 from app.playback.timeline import Timeline
-from app.playback.view_modes import MODES, ShownAs
+from app.playback.views.pointing import pixel_ray, seen_point
 from app.status import CAPTURED as CAPTURED_PICTURE
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
@@ -347,7 +348,10 @@ class Scene:
         full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
         full_size = picture_size(view.width, view.height, full)
         timeline, now_s = session.timeline, time.perf_counter()
-        is_hurried = self._moving_size.is_hurried(timeline.frame_index, now_s, is_playing=timeline.is_playing)
+        is_loaded_first = Course.of(timeline).is_loaded_first
+        is_hurried = self._moving_size.is_hurried(
+            timeline.frame_index, now_s, is_playing=timeline.is_playing, is_loaded_first=is_loaded_first
+        )
         is_quick = is_hurried or view.is_moving
         share = full * (self._moving_size.share if is_quick else 1.0)
         self._asked_sizes = picture_size(view.width, view.height, share), full_size

@@ -13,7 +13,8 @@ from engine.text import duration_text, printable
 
 BAR_WIDTH = 24
 REDRAW_EVERY_S = 0.1
-PLAIN_EVERY_S = 10.0
+PLAIN_FIRST_S, PLAIN_EVERY_S = 2.0, 10.0
+"""Plain lines come rarely, but at the beginning of a job somebody may be waiting for a sign of life."""
 
 
 class ProgressLine:
@@ -31,7 +32,7 @@ class ProgressLine:
         self._stream = sys.stderr if stream is None else stream
         self._is_quiet, self._clock = is_quiet, clock
         self._is_terminal = self._stream.isatty()
-        self._written_s = -1e9
+        self._written_s = self._began_s = -1e9
         self._stage = ""
         self._is_line_open = False
 
@@ -39,7 +40,10 @@ class ProgressLine:
         """Show a stage, its share 0..1, and what else is known (rate, time left, figures)."""
         now_s = self._clock()
         is_new = stage != self._stage
-        every_s = REDRAW_EVERY_S if self._is_terminal else PLAIN_EVERY_S
+        if is_new:
+            self._began_s = now_s
+        plain_every_s = min(max(self._written_s - self._began_s, PLAIN_FIRST_S), PLAIN_EVERY_S)
+        every_s = REDRAW_EVERY_S if self._is_terminal else plain_every_s
         if self._is_quiet or (not is_new and now_s - self._written_s < every_s):
             return
         if is_new:
@@ -82,8 +86,8 @@ def row_progress(line: ProgressLine, stage: str) -> Callable[[int, int, Any], No
 
     def show(done: int, n: int, _row: Any) -> None:
         rate.update(done, time.monotonic())
-        speed = f"{rate.per_s:.1f}/s, " if rate.per_s > 0 else ""
-        line.update(stage, done / max(n, 1), f"{done}/{n}, {speed}{duration_text(rate.eta_s(n - done))} left")
+        forecast = f", {rate.per_s:.1f}/s, {duration_text(rate.eta_s(n - done))} left" if rate.per_s > 0 else ""
+        line.update(stage, done / max(n, 1), f"{done}/{n}{forecast}")
 
     return show
 

@@ -7,6 +7,7 @@ from app.evaluation.headless import ClipOutcome
 from app.plan.planning import begin_text, compared_text, plan_clip
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
+from app.psnr_words import psnr_words
 from app.status import TrainingStatus
 from app.training.messages import Event, StageReported, WarningRaised
 from engine.capture.capture import Capture
@@ -27,7 +28,7 @@ def show_status(line: ProgressLine, status: TrainingStatus) -> None:
         if status.gradient_norm is not None:
             parts.append(f"gradient {status.gradient_norm:.2g}")
         if status.psnr_history:
-            parts.append(f"held-out PSNR {status.psnr_history[-1][1]:.2f} dB")
+            parts.append(psnr_words(status.psnr_history[-1][1], is_whole=False))
         line.update(f"Clip {status.clip_index}: training", status.progress, ", ".join(parts))
     elif status.state in ("starting", "preparing"):
         stage = status.stage.lower() if status.stage else "starting"
@@ -47,12 +48,13 @@ def show_event(line: ProgressLine, event: Event) -> None:
 
 def show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
     """Say how a clip ended."""
-    figure = "" if outcome.held_out_psnr is None else f", held-out PSNR {outcome.held_out_psnr:.2f} dB"
+    psnr = outcome.held_out_psnr
+    figure = "" if psnr is None else f", {psnr_words(psnr, is_whole=outcome.held_out_whole)}"
     if outcome.state == "skipped":
-        line.say(f"Clip {outcome.clip_index} is trained already: {outcome.step} steps{figure}")
+        line.say(f"Clip {outcome.clip_index} is trained already: {outcome.step:,} steps{figure}")
     elif outcome.state == "trained":
         took = duration_text(outcome.seconds)
-        line.say(f"Clip {outcome.clip_index} is trained: {outcome.step} steps in {took}{figure}")
+        line.say(f"Clip {outcome.clip_index} is trained: {outcome.step:,} steps in {took}{figure}")
 
 
 class PlanLines:

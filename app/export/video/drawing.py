@@ -9,8 +9,7 @@ import numpy as np
 
 from app.export.scene_frames import SceneFrames
 from app.export.video.views import ViewPoint
-from app.playback.mode_pictures import MIN_OPACITY
-from engine.backends.table import backend_called
+from app.playback.modes.mode_pictures import MIN_OPACITY
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +50,7 @@ def _drawn_shares(
     """Colours [H, W, 3], opacity [H, W, 1] and depth multiplied with it [H, W, 1] of every share, times its weight."""
     import torch
 
+    from engine.model.host_array import host_array
     from engine.raster import rasterize
 
     K = view.K.copy()
@@ -63,13 +63,14 @@ def _drawn_shares(
                 torch.from_numpy(K.astype(np.float32))[None],
                 view.width * supersampling,
                 view.height * supersampling,
-                backend=backend_called(),
+                backend=scene.opened.backend,
                 near_plane=share.trained.base.header.near_plane,
                 want_depth=True,
             )
         assert rendering.depth is not None
         color, alpha, weighted_depth = (
-            _reduced(values[0].numpy(), supersampling) for values in (rendering.image, rendering.alpha, rendering.depth)
+            _reduced(host_array(values[0]), supersampling)
+            for values in (rendering.image, rendering.alpha, rendering.depth)
         )
         if view.camera_index is not None:
             rig = scene.opened.capture.rig

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from av.codec import Codec
-from av.codec.codec import UnknownCodecError
-
 from engine.errors import ProjectError
 
 
@@ -96,6 +93,9 @@ def missing_codecs(name: str, *, needs_sound: bool = False) -> list[str]:
 
 
 def _has_encoder(codec: str) -> bool:
+    from av.codec import Codec  # the window lists formats long before it needs one
+    from av.codec.codec import UnknownCodecError
+
     try:
         Codec(codec, "w")
     except UnknownCodecError:

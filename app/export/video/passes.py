@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.export.jobs.video import PassName, VideoJob
 from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import Drawn, draw
-from app.export.video.job import PassName, VideoJob
 from app.export.video.moments import Moment
 from app.export.video.views import ViewOf, ViewPoint
-from app.playback.color_maps import mapped
-from app.playback.view_modes import MODES, range_of
+from app.playback.modes.color_maps import mapped
+from app.playback.modes.view_modes import MODES, range_of
 from app.residuals.clip_pictures import captured
 from app.residuals.heat_map import HEAT_KINDS, LEVELS
 

@@ -8,18 +8,18 @@ from pathlib import Path
 
 from app.document.camera_paths import camera_path_named
 from app.evaluation.headless import TrainedProject
+from app.export.jobs.video import MAX_PICTURES, MAX_PIXELS, MAX_SIDE_PX, VideoJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target
 from app.export.video.formats import FORMATS, check_codecs
-from app.export.video.job import MAX_PICTURES, MAX_PIXELS, MAX_SIDE_PX, VideoJob
 from app.export.video.moments import Moment, moments_of
 from app.export.video.views import ViewOf, camera_view, path_view, turntable_view
 from app.export.video.writers.sequence import depth_unit
-from app.playback.view_modes import rig_distance
+from app.playback.modes.view_modes import rig_distance
 from engine.camera.camera_path import CameraPath
 from engine.capture.capture import Capture
-from engine.capture.frame_runs import runs_of
-from engine.capture.sound import sound_source
+from engine.capture.files.frame_runs import runs_of
+from engine.capture.files.sound import sound_source
 from engine.errors import ProjectError
 from engine.text import shown
 
@@ -129,13 +129,13 @@ def _runs(job: VideoJob, scene: SceneFrames, path: CameraPath | None) -> list[ra
         if path is not None and len(path.keys) > 1:
             return [_frames_of(path, None if job.hold is not None else n_frames)]
         return runs_of(range(n_frames) if job.hold is not None else scene.trained_frames)
-    first, stop = job.frames
+    first, stop = job.frames.start, job.frames.stop
     if not 0 <= first < stop <= n_frames:
         raise ProjectError(
             f"Frames {first}:{stop} were asked for, of which the capture does not have all.",
             hint=f"It has frames 0 to {n_frames - 1}.",
         )
-    return [range(first, stop)]
+    return [job.frames]
 
 
 def _frames_of(path: CameraPath, n_frames: int | None) -> range:

@@ -12,16 +12,16 @@ import av.error
 
 from app.background.jobs import JobCancelled
 from app.evaluation.headless import TrainedProject
+from app.export.jobs.video import VideoJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import staged_file, staged_folder
 from app.export.video.formats import FORMATS
-from app.export.video.job import VideoJob
 from app.export.video.passes import Painter, PassPicture
 from app.export.video.plan import VideoPlan, plan_video
 from app.export.video.writers.film import SOUND_RATE, FilmWriter
 from app.export.video.writers.sequence import write_depth_png, write_exr_picture, write_png
 from app.training.rate import Rate
-from engine.capture.sound import SoundReader
+from engine.capture.files.sound import SoundReader
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
 from engine.text import duration_text

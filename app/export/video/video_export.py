@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
+from app.export.jobs.video import VideoJob
 from app.export.scene_frames import SceneFrames
 from app.export.video.formats import FORMATS
-from app.export.video.job import VideoJob
 from app.export.video.plan import VideoPlan, plan_video
 from app.export.video.render import render_video
 from engine.progress import Progress

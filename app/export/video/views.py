@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.video.job import Turntable
-from app.playback.rig_views import camera_fov, fitted_K, home_camera
-from app.playback.scene_axes import rig_radius
+from app.export.jobs.video import Turntable
+from app.playback.views.rig_views import camera_fov, fitted_K, home_camera
+from app.playback.views.scene_axes import rig_radius
 from engine.camera import path_presets
 from engine.camera.camera_path import CameraPath
 from engine.camera.projection import pinhole_K

@@ -8,15 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.cli.terminal.results import named_failure
+from app.document.project_settings import ProjectSettings
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.source_clip_means import later_figures
 from app.evaluation.speed.frame_rates import FrameRates, RatesOf, kept_rates
-from app.project.project import Project, ProjectSettings, open_project
+from app.lab.added.figures import missing, with_added_figures
+from app.lab.flicker import flicker_figures
+from app.lab.pictures import ProjectPictures
+from app.project.project import Project
+from app.project.project_access import open_project
 from app.project.project_facts import read_facts
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import CaptureError, ProjectError
-from engine.metrics.clips.flicker import flicker_figures
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
 
 if TYPE_CHECKING:
@@ -82,6 +86,8 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None], 
         cameras=holdout or None,
         on_progress=on_row,
     )
+    if scope.metrics == "all":
+        document = with_added_figures(document, opened, ProjectPictures(opened))
     group = "held_out" if document["means"]["held_out"] else "trained_on"
     means = document["means"][group]
     figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
@@ -118,9 +124,7 @@ def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measur
 
 def _key(project: Project, scope: Scope) -> dict[str, Any]:
     """Everything that the figures depend on."""
-    from engine.metrics.pictures import lpips
-
-    has_lpips = scope.metrics == "all" and lpips.why_missing() is None
+    lacking = missing() if scope.metrics == "all" else {"lpips": ""}
     headers = [read_clip_header(project.clip_path(i)) for i in scope.clips]
     return {
         "clips": [None if header is None else header.fingerprint for header in headers],
@@ -128,7 +132,8 @@ def _key(project: Project, scope: Scope) -> dict[str, Any]:
         "metrics": scope.metrics,
         "precision": scope.precision,
         "schema": MEASURED_SCHEMA,
-        **({"lpips": True} if has_lpips else {}),
+        **({} if "lpips" in lacking else {"lpips": True}),
+        **({"tof": False} if "tof" in lacking else {}),
     }
 
 

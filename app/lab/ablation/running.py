@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.cli.terminal.results import write_text
+from app.document.project_settings import ProjectSettings
+from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import ClipOutcome, train_clips
 from app.evaluation.speed.frame_rates import DEFINITION as DEFINITION_OF_RATES
 from app.evaluation.speed.frame_rates import FrameRates, RatesOf
@@ -20,7 +22,8 @@ from app.lab.ablation.curves import curves_of
 from app.lab.ablation.measuring import Measured, Scope, kept_figures, measure
 from app.lab.ablation.table import DEFINITION, VariantResult, as_csv, summarize
 from app.lab.ablation.variants import Variant, rank, settings_of, variant_called
-from app.project.project import PROJECT_FILE, Project, ProjectSettings, check_settings, create_project, open_project
+from app.project.project import Project
+from app.project.project_access import check_settings, create_project, open_project
 from app.status import TrainingStatus
 from app.training.messages import Event
 from app.training.service import Launch, TrainingService

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.csv_text import csv_text
-from engine.metrics.clips.flicker import definition_of
+from app.lab.flicker import definition_of
 
 COLUMNS: dict[str, tuple[str, int]] = {
     "psnr": ("PSNR", 2),

@@ -19,7 +19,7 @@ from engine.backends.backend import Backend
 from engine.model.clip_view import View, render_gaussians
 from engine.raster.gaussians import Gaussians
 from engine.training.config import TrainConfig
-from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
+from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters, schedule_of
 from engine.training.plan.synthetic_clip import N_FRAMES, ClipRecipe, make_clip, make_truth, make_view
 from engine.training.step.losses import photometric_loss
 
@@ -74,9 +74,8 @@ class StepRun:
         self._truth = torch.from_numpy(make_truth(recipe)[rows, columns].copy())
         parameters = named_parameters(self._model, self._gain, self._config)
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
-        self._optimizer = PhaseOptimizer(
-            parameters, n_steps=10_000, config=self._config, final_ratios={}, backend=backend
-        )
+        schedule = schedule_of(parameters, self._config, n_steps=10_000)
+        self._optimizer = PhaseOptimizer(self._parameters, schedule=schedule, backend=backend)
         self._frame = 0
         self.n_gaussians = 0
 

@@ -5,12 +5,18 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
-from app.background.children import in_fresh_process
+import msgspec
+
 from app.background.memory import peak_bytes
+from engine.children.child import Parent
+from engine.children.kind import ChildFailed, ChildKind, find
+from engine.children.messages import decoded, encoded
+from engine.children.process import run_child
+from engine.progress import Progress
 
-MEMORY_TIMEOUT_S = 120.0
+Argument = TypeVar("Argument")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,18 +53,40 @@ def interleaved(
     return {name: [Timing.of(stage_ms) for stage_ms in zip(*rows, strict=True)] for name, rows in runs.items()}
 
 
-def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float | None:
+class PeakJob(msgspec.Struct, frozen=True):
+    """Function and type of its argument as "module:name", and the argument encoded."""
+
+    prepare: str
+    kind: str
+    argument: bytes
+
+
+PEAK: ChildKind[PeakJob, Progress, float] = ChildKind(
+    place="app.lab.bench.timing:PEAK",
+    work="app.lab.bench.timing:extra_mb",
+    what="The process that measures memory",
+    job=PeakJob,
+    result=float,
+)
+
+
+def peak_extra_mb(prepare: Callable[[Argument], Callable[[], object]], argument: Argument) -> float | None:
     """How far a call pushes the memory of a fresh process beyond what it held before, MB. None if that fails.
 
     Args:
         prepare: Importable function that makes everything ready, warms kernels up and returns the call to measure.
-        arguments: Its arguments.
+        argument: For it.
     """
-    return in_fresh_process(_extra_mb, prepare, *arguments, timeout_s=MEMORY_TIMEOUT_S)
+    name, kind = (f"{item.__module__}:{item.__qualname__}" for item in (prepare, type(argument)))
+    try:
+        return run_child(PEAK, PeakJob(name, kind, encoded(argument)))
+    except ChildFailed:
+        return None
 
 
-def _extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float:
-    call = prepare(*arguments)
+def extra_mb(job: PeakJob, parent: Parent[Progress]) -> float:
+    """Runs in the child."""
+    call = find(job.prepare)(decoded(job.argument, job.kind))
     before = peak_bytes(is_reset=True)
     kept = call()  # alive until the peak is read
     extra = peak_bytes() - before

@@ -9,11 +9,11 @@ from typing import Any
 
 from msgspec import structs
 
+from app.document.project_settings import ProjectSettings
 from app.lab.machine import Machine
 from app.lab.report.page.parts import Section
 from app.lab.report.page.spans import MAX_SPANS, spans_text
 from app.lab.report.page.tables import Table, TableColumn
-from app.project.project import ProjectSettings
 from app.project.project_facts import ClipFacts, ProjectFacts
 from engine.training.config import SETTINGS
 

@@ -9,13 +9,13 @@ from typing import Any
 from app.evaluation.source_clip_means import LATER_MOVING, LATER_PSNR, LATER_S, later_figures
 from app.evaluation.speed.frame_rates import FIGURES as FIGURES_OF_RATES
 from app.evaluation.speed.frame_rates import FrameRates
+from app.lab.flicker import FIGURES, definition_of, flicker_figures
 from app.lab.report.about import all_settings
 from app.lab.report.charts import SpeedPanel, draw_speed_error
 from app.lab.report.page.parts import Figure, Section
 from app.lab.report.page.tables import Table, TableColumn
 from app.lab.report.pareto import pareto_front
 from app.project.project_facts import ProjectFacts
-from engine.metrics.clips.flicker import FIGURES, definition_of, flicker_figures
 
 _PAPER = (
     ("psnr", "PSNR", "dB", 2),

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
+from app.lab.pictures import Pictures
 from app.lab.report.charts import Curve, CurvePanel, draw_over_time, draw_pictures
 from app.lab.report.comparison import main_group
 from app.lab.report.page.labels import FIGURE_LABELS, figure_label
 from app.lab.report.page.parts import Figure, Folded, Section
 from app.lab.report.page.tables import Table, TableColumn
-from app.lab.report.pictures import Pictures
 from engine.metrics.columns import COLUMNS
 
 GROUP_WORDS = {"held_out": "held out", "trained_on": "trained on"}

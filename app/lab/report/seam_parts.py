@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from app.lab.pictures import Pictures
 from app.lab.report.charts import Curve, CurvePanel, MapPanel, draw_maps, draw_over_time
 from app.lab.report.measured import GROUP_WORDS, Tick, clip_borders
 from app.lab.report.page.parts import Figure, Folded, Part, Section
 from app.lab.report.page.tables import Table, TableColumn
-from app.lab.report.pictures import Pictures
 from engine.metrics.clips.seams import MAP_RANGE
 from engine.metrics.clips.summary import mean_of
 
@@ -148,7 +148,7 @@ def _normal(seams: dict[str, Any]) -> Table:
                         "n_pairs": found["n_pairs"],
                         **{key: None if value is None else 255.0 * value for key, value in levels.items()},
                         "static_share": found["static_share"],
-                        "tof": found["tof"],
+                        "tof": found.get("tof"),
                     }
                 )
     return Table("seam_means", "Static and moving pixels apart, at boundaries and inside clips", columns, rows)

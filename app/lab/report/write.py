@@ -8,12 +8,16 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.evaluation.evaluation import Measuring
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed.frame_rates import RatesOf
+from app.lab.added.figures import with_added_figures
+from app.lab.flicker import flicker_figures
+from app.lab.pictures import Pictures, ProjectPictures
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
 from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
@@ -26,13 +30,11 @@ from app.lab.report.page.page import page_html
 from app.lab.report.page.parts import Section
 from app.lab.report.paper_figures.by_hand import Places, Wishes, checked_places
 from app.lab.report.paper_figures.sections import STEPS, paper_sections
-from app.lab.report.pictures import Pictures, ProjectPictures
 from app.lab.report.rendering import rendering_section
 from app.lab.report.seam_parts import seams_section, shown_boundaries
 from app.project.project_facts import ProjectFacts, find_projects, read_facts, short_names
 from engine.capture.capture_summary import describe
 from engine.errors import CaptureError, ProjectError
-from engine.metrics.clips.flicker import flicker_figures
 from engine.storage.files import atomic_path
 from engine.storage.json_files import JsonError, json_text, read_json_object
 
@@ -113,6 +115,9 @@ def write_report(
                 on_progress=_measuring(on_stage, name),
                 say=say,
                 measuring=measuring,
+            )
+            document = with_added_figures(
+                document, trained, make_pictures(trained), on_progress=partial(on_stage, f"tOF of {name}"), say=say
             )
             rates = rates_of(trained)
         except (ProjectError, CaptureError) as error:

@@ -64,7 +64,7 @@ def room_of(project: Project, n_clips: int, what: str, clip_index: int | None = 
             numbers = [version.number for version in list_versions(project, index)]
             for number in numbers[-1:] if what == "oldest" else numbers:
                 path = version_path(project, index, number)
-                paths += [path, path.with_suffix(".jsonl")]
+                paths += [path.with_suffix(".jsonl"), path]
     sizes: list[int] = []
     there: list[Path] = []
     for path in paths:

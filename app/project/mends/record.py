@@ -10,7 +10,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta, to_builtins
 
-from app.document.kept_json import kept_text, read_kept, write_kept
+from app.document.storing.kept_json import kept_text, read_kept, write_kept
 from app.project.project import Project
 from engine.errors import ProjectError
 from engine.mending.figures import Attempt, StretchFigures

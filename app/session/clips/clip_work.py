@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from datetime import datetime
 
 from app.background.jobs import JobContext, Jobs
-from app.document.clip_changes import with_merge, with_reference, with_split
+from app.document.changes.clip_changes import with_merge, with_reference, with_split
 from app.document.project_document import ProjectDocument
 from app.project.clip_catalog import ClipCatalog
 from app.project.clip_versions import best_version, list_versions, why_not
@@ -14,6 +14,7 @@ from app.project.disk.room import WHAT, make_room, room_of
 from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject
 from app.project.project import Project
+from app.psnr_words import psnr_words
 from app.session.clips.clip_commands import (
     ApplyDeletions,
     AskAboutDamage,
@@ -31,8 +32,8 @@ from app.session.clips.costs import expected_seconds
 from app.session.clips.disk_reader import DiskReader
 from app.session.clips.permanence import Permanence
 from app.session.editing.kept_document import KeptDocument
-from app.session.live_training import LiveTraining
 from app.session.notices import Notices
+from app.session.training.live_training import LiveTraining
 from app.status import DependencyStatus
 from app.training.train_queue import needed_clips
 from engine.capture.clip import Clip
@@ -330,7 +331,8 @@ def recoverable(project: Project, clip_index: int) -> tuple[int | None, str, str
             return None, "", "The clip was trained only once, so that there is nothing before it."
         header = found[0].header
         return None, "", found[0].damage if header is None else why_not(project, clip_index, header)
-    psnr = version.header.figures.held_out_psnr
-    figure = "" if psnr is None else f", {psnr:.1f} dB"
+    figures = version.header.figures
+    psnr = figures.held_out_psnr
+    figure = "" if psnr is None else f", {psnr_words(psnr, is_whole=figures.held_out_whole)}"
     trained = datetime.fromtimestamp(version.trained_s).strftime("%Y-%m-%d %H:%M")
     return version.number, f"trained {trained}{figure}", ""

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from app.command_text.command_text import CommandText
 from app.command_text.job_command import export_command, mend_command, training_command, version_command
 from app.command_text.step_command import edit_command, step_command
-from app.document.edit_changes import edit_with
+from app.document.changes.edit_changes import edit_with
 from app.export.export_choices import ExportChoices, ExportContext
-from app.export.forms.table import answers_to
+from app.export.jobs.answers import Answers
 from app.mending.request import MendRequest
 from app.project.project import Project
 from engine.errors import ProjectError
@@ -65,8 +65,7 @@ class CommandTexts:
 
     def export(self, context: ExportContext, choices: ExportChoices) -> CommandText:
         """What exports what was chosen in the dialog. Raises ProjectError where nothing is open."""
-        answers = answers_to(context, choices)
-        return export_command(self._project().folder, choices.kind, answers.form.make_job(answers))
+        return export_command(self._project().folder, Answers(context, choices).make_job())
 
     def _project(self) -> Project:
         project = self._find()

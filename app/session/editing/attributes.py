@@ -7,8 +7,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
-from app.playback.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE
+from app.playback.modes.arrays import GaussianArrays
+from app.playback.modes.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE
 from engine.clip_files.roles import STATIC
 
 

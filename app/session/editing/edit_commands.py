@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from engine.editing.edit import EVERYWHERE, Action, Edit, Scope, Target, Vector
+from engine.editing.actions import Action, Vector
+from engine.editing.edit import EVERYWHERE, Edit, Scope, Target
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,15 +6,18 @@ from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from app.document import edit_changes, note_changes, world_changes
-from app.document.edit_words import edit_title, what_text
+from app.document.changes import edit_changes, note_changes, world_changes
+from app.document.changes.edit_words import edit_title, what_text
+from app.document.changes.reach_words import check_acts
 from app.document.project_document import ProjectDocument
 from app.session.edit_status import EditsStatus
 from app.session.editing import edit_commands as c
+from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.selection import NOTHING_SELECTED, Selection
-from engine.editing.edit import Delete, Hide
+from engine.editing.actions import Delete, Hide
+from engine.editing.reach import reach_of_edit
 from engine.errors import ProjectError
 
 
@@ -45,17 +48,24 @@ class Edits:
         document: Holds and keeps them.
         selecting: What is selected becomes the target of edits.
         lost: Knows which edits have lost what was picked.
+        reaches: Knows where edits act.
     """
 
-    def __init__(self, document: KeptDocument, selecting: Selects, lost: LostEdits) -> None:
-        self._document, self._selecting, self._lost = document, selecting, lost
+    def __init__(self, document: KeptDocument, selecting: Selects, lost: LostEdits, reaches: EditReaches) -> None:
+        self._document, self._selecting = document, selecting
+        self._lost, self._reaches = lost, reaches
 
     def status(self) -> EditsStatus:
         """Everything as one value."""
         content, why_not = self._document.content, self._document.why_not()
         if content is None:
             return EditsStatus(why_not=why_not)
-        return replace(edits_status(content, why_not), lost=self._lost.of(content.edits))
+        return replace(
+            edits_status(content, why_not),
+            lost=self._lost.of(content.edits),
+            clips=self._reaches.clips(),
+            reaches=self._reaches.of(content.edits),
+        )
 
     def apply(self, command: c.EditCommand) -> None:
         """Carry out a command; one that changes nothing does not become a step of the history.
@@ -68,6 +78,7 @@ class Edits:
             self._add_to_selected(document, command)
             return
         change = changed(document, command)
+        self._check_acts(command, change)
         if not _is_same(document, change.document):
             self._document.change(change.document, change.name, change.merge)
 
@@ -76,9 +87,15 @@ class Edits:
         if not len(selection):
             raise ProjectError("Nothing is selected.", hint="Select Gaussians first, or place a box or a sphere.")
         change = changed(document, replace(command, target=selection.target()))
+        self._check_acts(command, change)
         self._document.change(change.document, change.name, change.merge)
         if isinstance(command.action, Hide | Delete) and not command.is_inverted:
             self._selecting.select(NOTHING_SELECTED)
+
+    def _check_acts(self, command: c.EditCommand, change: Change) -> None:
+        if isinstance(command, c.AddEdit):
+            edit = change.document.edits[-1]
+            check_acts(reach_of_edit(edit, self._reaches.clips()), edit.scope)
 
     def go(self, n_steps: int) -> None:
         """Take back so many steps, or do so many again where the number is positive; as many as there are.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
 from app.session.editing.attributes import AnchorValues, values_of
 from app.session.editing.selection import Selection, whole_anchors
 from app.session.editing.selection_commands import (

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 
 from app.background.latest import LatestWorker
-from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
+from app.document.history import Changed, DocumentHistory, Event, Redone, Undone, coalesced
 from app.document.project_document import ProjectDocument
 from app.project.project import Project
 from app.session.edit_status import HistoryStatus
@@ -21,6 +21,8 @@ logger = logging.getLogger(__name__)
 
 RETRY_S = 5.0
 """How long after the disk has refused something it is asked again."""
+KEPT_WITHIN_S = 0.08
+"""So long the next step waits until the last one is on disk, which normally takes some milliseconds."""
 SETTLE_S = 2.0
 """A disk that takes longer than this to write a few lines is not waited for."""
 Guard = Callable[[ProjectDocument, ProjectDocument], None]
@@ -42,7 +44,8 @@ class DocumentRequest:
 
 
 class KeptDocument:
-    """For one thread, which never waits for the disk.
+    """For one thread, which waits for the disk a moment at most: a kill costs the step that is being made, and none
+    before it.
 
     Args:
         guard: Asked before every change, undo and redo.
@@ -60,6 +63,7 @@ class KeptDocument:
         self._retry_at_s: float | None = None
         self._lock = threading.Lock()
         self._pending: list[Event] = []
+        self._last_event: Event | None = None
         self._told: tuple[DocumentHistory | None, HistoryStatus] = (None, HistoryStatus())
 
     @property
@@ -128,6 +132,9 @@ class KeptDocument:
         project = self.checked()
         before, history = project.document, project.history.after(event)
         self._guard(before, history.present)
+        if self._last_event is not None and len(coalesced([self._last_event, event])) > 1:  # another step
+            self._files.wait_idle(KEPT_WITHIN_S)
+        self._last_event = event
         with self._lock:
             project.history = history
             self._pending.append(event)

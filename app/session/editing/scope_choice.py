@@ -45,18 +45,17 @@ def choice_of(scope: Scope, timeline: Timeline) -> ScopeChoice | None:
     return next((choice for choice in SCOPE_CHOICES if chosen_scope(choice, timeline) == scope), None)
 
 
-def reach_of(scope: Scope, timeline: Timeline) -> tuple[int, int]:
+def extent_of(scope: Scope, timeline: Timeline) -> tuple[int, int]:
     """How many clips and frames of the capture a scope holds."""
     stop = timeline.n_frames if scope.stop is None else min(scope.stop, timeline.n_frames)
     n_clips = sum(scope.touches(clip.start, clip.stop) for clip in timeline.clips)
     return n_clips, max(stop - scope.first, 0)
 
 
-def reach_text(scope: Scope, timeline: Timeline) -> str:
-    """What a new edit of this scope touches, and what it does not."""
-    n_clips, n_frames = reach_of(scope, timeline)
-    clips, frames = _counted(n_clips, "clip"), _counted(n_frames, "frame")
-    return f"Affects {clips}, {frames}; marks 0 clips stale, because edits only lie over what was trained."
+def extent_text(scope: Scope, timeline: Timeline) -> str:
+    """What a new edit of this scope touches."""
+    n_clips, n_frames = extent_of(scope, timeline)
+    return f"{_counted(n_frames, 'frame')} in {_counted(n_clips, 'clip')}"
 
 
 def _counted(n: int, word: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from app.background.latest import LatestWorker, nothing
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
 from app.session.editing.attributes import ATTRIBUTES, AnchorValues, values_of
 from app.session.editing.finding import Ground, found_by, selection_after
 from app.session.editing.selection import NOTHING_SELECTED, Selection, selection_words

@@ -45,6 +45,11 @@ class Selection:
         """Clips that have trained what is selected."""
         return tuple(sorted({row_set.clip_index for row_set, _ in self.parts}))
 
+    @property
+    def counts(self) -> tuple[tuple[RowSet, int], ...]:
+        """Anchor sets, and how many Gaussians of each are selected."""
+        return tuple((row_set, len(numbers)) for row_set, numbers in self.parts)
+
     def mask(self, rows: GaussianRows) -> np.ndarray:
         """Which of the Gaussians of a frame are selected. [N] bool"""
         mask, known = np.zeros(len(rows), np.bool_), dict(self.parts)

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from engine.editing.edit import Box, Sphere, Vector
+from engine.editing.actions import Vector
+from engine.editing.edit import Box, Sphere
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
+from app.playback.modes.view_modes import ShownAs, decoded_as
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.playback.view_modes import ShownAs, decoded_as
 from app.residuals.residuals import Residuals
 from app.session.editing.attributes import AnchorValues
 

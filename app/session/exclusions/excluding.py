@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.document.exclusion_changes import (
+from app.document.changes.exclusion_changes import (
     with_cameras_excluded,
     with_frames_excluded,
     with_stroke,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.document.recovery import Recovery
+from app.document.storing.recovery import Recovery
 
 
 @dataclass(frozen=True, slots=True)

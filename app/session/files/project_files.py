@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from app.background.jobs import Job, JobContext, Jobs
-from app.document.recovery import DamagedProject
+from app.document.storing.recovery import DamagedProject
 from app.export.show_in_folder import show_in_folder
 from app.project.opening import LostCapture, OtherCapture
 from app.project.project import Project

@@ -14,7 +14,6 @@ from app.project.mends.in_place import as_cut_now, take_back, version_before
 from app.project.opened_project import OpenedProject
 from app.session.clips.clip_commands import CompareVersion
 from app.session.clips.comparing import show_version
-from app.session.live_training import LiveTraining
 from app.session.mending.mend_commands import (
     AskMend,
     CloseMend,
@@ -25,6 +24,7 @@ from app.session.mending.mend_commands import (
     StopMend,
 )
 from app.session.mending.mend_page import MendPage
+from app.session.training.live_training import LiveTraining
 from app.status import CAPTURED, JobStatus, Overlays
 from engine.errors import EngineError, ProjectError
 

@@ -18,6 +18,8 @@ from engine.backends.cpu.step.adam import CpuAdam
 from engine.backends.cpu.step.photometric import photometric_loss_cpu
 from engine.backends.cpu.step.tile_squares import tile_squares_cpu
 from engine.backends.cpu.step.volume import volume_sum_cpu
+from engine.backends.phase import PhasePlan
+from engine.kernels.compile_ahead import load_groups_of_cpu
 from engine.model.decoder import Decoder
 from engine.model.field import SpatioTemporalField
 from engine.raster.gaussians import Gaussians
@@ -34,6 +36,14 @@ class CpuBackend:
     name = "cpu"
     device = torch.device("cpu")
     dtype = torch.float32
+
+    def is_available(self) -> bool:
+        """See Backend. Wherever the program runs: point clouds need the same compiler."""
+        return True
+
+    def warm_up(self, *, is_training: bool) -> None:
+        """See Backend."""
+        load_groups_of_cpu(is_training=is_training)
 
     def rasterize(
         self,
@@ -112,6 +122,9 @@ class CpuBackend:
             TypeError: A parameter is not contiguous float32 on the cpu.
         """
         return CpuAdam(parameters)
+
+    def phase(self, plan: PhasePlan) -> None:
+        """See Backend. The host is where it computes, so nothing is gained by another way."""
 
 
 def _with_positions(means: Tensor, chosen: Sequence[ChosenAnchors], k: int) -> Tensor:

@@ -1,4 +1,4 @@
-"""torch.optim.Adam behind the interface of a back end: any device and floating dtype."""
+"""Adam in plain torch, the operations of torch.optim.Adam: any device and floating dtype, and nothing read from it."""
 
 from __future__ import annotations
 
@@ -9,42 +9,56 @@ from torch import Tensor
 
 from engine.backends.backend import ADAM_BETAS, ADAM_EPSILON
 
+BETA1, BETA2 = ADAM_BETAS
+
 
 class ReferenceAdam:
     """See engine.backends.backend.Adam."""
 
     def __init__(self, parameters: Mapping[str, Tensor]) -> None:
-        self._parameters = dict(parameters)
-        groups = [{"params": [p], "name": name} for name, p in self._parameters.items()]
-        nothing = {"params": [], "name": ""}  # torch wants a group even where nothing learns
-        self._adam = torch.optim.Adam(groups or [nothing], betas=ADAM_BETAS, eps=ADAM_EPSILON)
+        self._parameters = {name: parameter.detach() for name, parameter in parameters.items()}
+        self.steps = dict.fromkeys(parameters, 0)
+        self._means = {name: torch.zeros_like(value) for name, value in self._parameters.items()}
+        self._squares = {name: torch.zeros_like(value) for name, value in self._parameters.items()}
 
-    def norm(self, gradients: Mapping[str, Tensor]) -> float:
+    def step(
+        self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], *, max_norm: float, is_sound: Tensor
+    ) -> Tensor:
         """See Adam."""
-        return float(torch.nn.utils.get_total_norm(list(gradients.values())))
+        norm = torch.nn.utils.get_total_norm(list(gradients.values()))
+        is_sound = is_sound & norm.isfinite()
+        scale = torch.where(norm > max_norm, max_norm / norm, 1.0) if max_norm > 0.0 else 1.0
+        for name, gradient in gradients.items():
+            self._update(name, gradient * scale, rates[name], is_sound)
+        return norm
 
-    def update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
-        """See Adam."""
-        for group in self._adam.param_groups:
-            name = group["name"]
-            if not name:
-                continue
-            group["lr"] = rates[name]
-            gradient = gradients.get(name)
-            group["params"][0].grad = None if gradient is None else gradient * scale
-        self._adam.step()
+    def _update(self, name: str, gradient: Tensor, rate: float, is_sound: Tensor) -> None:
+        self.steps[name] += 1
+        value, mean, square = self._parameters[name], self._means[name], self._squares[name]
+        new_mean = mean.lerp(gradient, 1 - BETA1)
+        new_square = (square * BETA2).addcmul_(gradient, gradient, value=1 - BETA2)
+        root_scale = (1 - BETA2 ** self.steps[name]) ** 0.5
+        size = (new_square.sqrt() / root_scale).add_(ADAM_EPSILON)
+        new_value = value.addcdiv(new_mean, size, value=-rate / (1 - BETA1 ** self.steps[name]))
+        for kept, new in ((value, new_value), (mean, new_mean), (square, new_square)):
+            torch.where(is_sound, new, kept, out=kept)
 
     def state(self) -> dict[str, dict[str, Tensor]]:
         """See Adam."""
-        states = {name: self._adam.state[parameter] for name, parameter in self._parameters.items()}
-        return {name: {k: v.clone() for k, v in state.items()} for name, state in states.items() if state}
+        return {
+            name: {
+                "step": torch.tensor(n_steps, dtype=torch.float32),
+                "exp_avg": self._means[name].clone(),
+                "exp_avg_sq": self._squares[name].clone(),
+            }
+            for name, n_steps in self.steps.items()
+            if n_steps
+        }
 
     def restore(self, name: str, state: Mapping[str, Tensor]) -> None:
         """See Adam."""
-        parameter = self._parameters[name]
-        restored = {"step": state["step"].detach().float().cpu().reshape(())}  # a file gives a number back as [1]
-        for moment in ("exp_avg", "exp_avg_sq"):
-            if state[moment].shape != parameter.shape:
-                raise ValueError(f"{moment} of {name} is {list(state[moment].shape)}, not {list(parameter.shape)}")
-            restored[moment] = state[moment].to(parameter, copy=True)
-        self._adam.state[parameter] = restored
+        for moment, kept in (("exp_avg", self._means[name]), ("exp_avg_sq", self._squares[name])):
+            if state[moment].shape != kept.shape:
+                raise ValueError(f"{moment} of {name} is {list(state[moment].shape)}, not {list(kept.shape)}")
+            kept.copy_(state[moment].detach())
+        self.steps[name] = round(state["step"].item())  # a file gives a single number back as [1]

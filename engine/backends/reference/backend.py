@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from engine.backends.backend import PhotometricLoss
+from engine.backends.phase import PhasePlan
 from engine.backends.reference.adam import ReferenceAdam
 from engine.backends.reference.decode import decode_reference, join_reference
 from engine.backends.reference.loss import photometric_loss_reference, tile_squares_reference, volume_sum_reference
@@ -39,6 +40,16 @@ class ReferenceBackend:
     name: str = "reference"
     device: torch.device = _MAIN_MEMORY
     dtype: torch.dtype = torch.float32
+
+    def is_available(self) -> bool:
+        """See Backend."""
+        try:
+            return torch.ones(2, device=self.device, dtype=self.dtype).sum().item() == 2.0
+        except (AssertionError, ImportError, NotImplementedError, RuntimeError):  # torch does not find it
+            return False
+
+    def warm_up(self, *, is_training: bool) -> None:
+        """See Backend. Nothing is compiled."""
 
     def rasterize(
         self,
@@ -106,3 +117,6 @@ class ReferenceBackend:
     def adam(self, parameters: Mapping[str, Tensor]) -> ReferenceAdam:
         """See Backend."""
         return ReferenceAdam(parameters)
+
+    def phase(self, plan: PhasePlan) -> None:
+        """See Backend. Its operations are what another way is compared with."""

@@ -33,7 +33,7 @@ def photometric_loss_reference(
     shown = torch.where(counts, torch.where(active, shown, frozen), truth)
     l1 = torch.where(active, (shown - truth).abs(), 0).mean()
     loss = (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim_map(shown, truth).mean())
-    return PhotometricLoss(loss, float((torch.where(active, shown.detach() - truth, 0) ** 2).mean()))
+    return PhotometricLoss(loss, (torch.where(active, shown.detach() - truth, 0) ** 2).mean())
 
 
 def ssim_map(image: Tensor, truth: Tensor) -> Tensor:

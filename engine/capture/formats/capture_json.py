@@ -16,12 +16,13 @@ from msgspec import Meta
 
 from engine.camera.lens import PARAMETER_NAMES, Lens, LensModel
 from engine.capture.assembling import assemble
-from engine.capture.described_camera import DescribedCamera
+from engine.capture.cameras.described_camera import DescribedCamera
+from engine.capture.files.frame_files import image_files
+from engine.capture.files.places import place_in
 from engine.capture.format_checks import check_fps, is_name, parse_matrix, read_json_object
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import image_files
 from engine.capture.limits import MAX_SIDE
-from engine.capture.places import place_in
+from engine.capture.pixels.frame_fit import FrameFit
 from engine.errors import CaptureError
 from engine.storage.typed_json import EntryError, to_type
 from engine.text import shown
@@ -98,6 +99,7 @@ class CaptureDocument:
         points: A .ply, or a file of another layout's points, in the world that `world_to_camera` is written in.
         points_to_world: Brings the points into that world, where they are in another one. 4x4
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to.
+        fit: What became of frames of another shape than `width` and `height` of their camera.
         world_scale: All distances are multiplied by it.
         up: Direction in the world that is up; the world is turned so that it becomes +z.
     """
@@ -110,6 +112,7 @@ class CaptureDocument:
     points: str | None = None
     points_to_world: Matrix | None = None
     fisheye_fov_deg: Annotated[float, Meta(ge=10, le=150)] | None = None
+    fit: FrameFit | None = None
     world_scale: Annotated[float, Meta(gt=0, le=1e9)] = 1.0
     up: tuple[float, float, float] | None = None
     notes: str = ""
@@ -169,6 +172,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         points=points,
         points_to_world=_points_to_world(document, path, problems),
         fisheye_fov_deg=document.fisheye_fov_deg,
+        fit=document.fit,
         problems=problems,
         said_in=path,
     )

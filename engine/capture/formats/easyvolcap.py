@@ -15,14 +15,14 @@ import numpy as np
 
 from engine.camera.lens import Lens
 from engine.capture.assembling import assemble
-from engine.capture.described_camera import DescribedCamera
+from engine.capture.cameras.described_camera import DescribedCamera
+from engine.capture.cameras.opencv_numbers import lens_of, pose_of, shifted
+from engine.capture.cameras.opencv_yaml import Value, number, read_opencv_yaml
+from engine.capture.files.frame_files import natural_key
+from engine.capture.files.frame_search import FrameSearch
 from engine.capture.findings import Findings
-from engine.capture.format_checks import is_name, parse_size, size_problem
+from engine.capture.format_checks import is_name, parse_size, shortened, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import natural_key
-from engine.capture.frame_search import FrameSearch
-from engine.capture.opencv_numbers import lens_of, pose_of, shifted
-from engine.capture.opencv_yaml import Value, number, read_opencv_yaml
 from engine.errors import CaptureError
 from engine.text import shown
 
@@ -62,7 +62,11 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     if intri is not None and extri is not None and names is not None:
         search = FrameSearch(folder, FRAME_FOLDERS, follow_links=follow_links, named_in=intri.path)
         mask_search = FrameSearch(folder, MASK_FOLDERS, follow_links=follow_links, named_in=intri.path)
-        for name in sorted(names, key=natural_key):
+        placed = [name for name in names if any(f"{key}_{name}" in extri.entries for key in ("R", "Rot", "T"))]
+        if placed and len(placed) < len(names):  # intrinsics of a whole stage, of which some cameras were used
+            others = shortened([shown(name) for name in names if name not in placed])
+            warnings.append(f"Cameras of which {EXTRI} has no pose are left out: {others}.")
+        for name in sorted(placed or names, key=natural_key):
             camera = _described(name, intri, extri, search, findings)
             if camera is not None:
                 masks, fault = mask_search.masks([name], camera.files)

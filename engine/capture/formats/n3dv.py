@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from engine.capture.assembling import assemble
-from engine.capture.described_camera import DescribedCamera
-from engine.capture.format_checks import check_equal_counts, parse_size, size_problem
-from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import (
+from engine.capture.cameras.described_camera import DescribedCamera
+from engine.capture.files.frame_files import (
     IMAGE_SUFFIXES,
     INNER_FOLDERS,
     VIDEO_SUFFIXES,
@@ -26,7 +24,9 @@ from engine.capture.frame_files import (
     listed,
     natural_key,
 )
-from engine.capture.places import place_in
+from engine.capture.files.places import place_in
+from engine.capture.format_checks import check_equal_counts, parse_size, size_problem
+from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.points import points_that_came
 from engine.errors import CaptureError
 from engine.storage.npy_files import NpyError, read_npy

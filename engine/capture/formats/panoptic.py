@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from engine.capture.duplicates import CameraFiles, check_duplicates
+from engine.capture.files.duplicates import CameraFiles, check_duplicates
+from engine.capture.files.media import ImageHeader, read_image_header
+from engine.capture.files.places import place_in
 from engine.capture.format_checks import (
     check_equal_counts,
     check_image_header,
@@ -31,8 +33,6 @@ from engine.capture.format_checks import (
 from engine.capture.format_result import MATCH, CameraEntry, Layout, Probe
 from engine.capture.frames import ImageFrames
 from engine.capture.limits import MAX_CAMERA_ID
-from engine.capture.media import ImageHeader, read_image_header
-from engine.capture.places import place_in
 from engine.capture.points import points_that_came
 from engine.errors import CaptureError
 

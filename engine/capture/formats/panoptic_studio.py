@@ -13,7 +13,10 @@ from typing import Any
 import numpy as np
 
 from engine.capture.assembling import assemble
-from engine.capture.described_camera import DescribedCamera
+from engine.capture.cameras.described_camera import DescribedCamera
+from engine.capture.cameras.opencv_numbers import lens_of, pose_of, shifted
+from engine.capture.files.frame_files import Files, listed, natural_key
+from engine.capture.files.frame_search import FrameSearch
 from engine.capture.findings import Findings
 from engine.capture.format_checks import (
     is_name,
@@ -24,9 +27,6 @@ from engine.capture.format_checks import (
     size_problem,
 )
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import Files, listed, natural_key
-from engine.capture.frame_search import FrameSearch
-from engine.capture.opencv_numbers import lens_of, pose_of, shifted
 from engine.errors import CaptureError
 from engine.text import shown
 

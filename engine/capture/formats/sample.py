@@ -11,7 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from engine.capture.duplicates import CameraFiles, check_duplicates
+from engine.capture.files.duplicates import CameraFiles, check_duplicates
+from engine.capture.files.media import VideoHeader, read_video_header
+from engine.capture.files.places import place_in
 from engine.capture.format_checks import (
     check_equal_counts,
     check_fps,
@@ -30,8 +32,6 @@ from engine.capture.format_checks import (
 )
 from engine.capture.format_result import MATCH, CameraEntry, Layout, Probe
 from engine.capture.frames import VideoFrames, is_turned_as_calibrated
-from engine.capture.media import VideoHeader, read_video_header
-from engine.capture.places import place_in
 from engine.errors import CaptureError
 from engine.text import shown
 
@@ -97,7 +97,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     problems = reading.problems
     with ThreadPoolExecutor(THREADS) as pool:
         for row in rows:
-            if isinstance(row, dict) and isinstance(row.get("file"), str):
+            if isinstance(row, dict) and isinstance(row.get("file"), str) and row["file"] not in reading.looks:
                 reading.looks[row["file"]] = pool.submit(_look_at_video, reading, row["file"])
         cameras = [camera for i, row in enumerate(rows) if (camera := _read_camera(i, row, reading)) is not None]
     if cameras or not problems:

@@ -7,8 +7,9 @@ says when each frame was taken. Units are those of the calibration: metres, or s
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,16 @@ import numpy as np
 
 from engine.camera.lens import Lens
 from engine.capture.assembling import assemble
-from engine.capture.described_camera import DescribedCamera
+from engine.capture.cameras.described_camera import DescribedCamera
+from engine.capture.cameras.motion_capture import calibrations
+from engine.capture.cameras.opencv_numbers import lens_of, pose_of, shifted
+from engine.capture.files.frame_files import Files, listed, natural_key
+from engine.capture.files.frame_search import FrameSearch
+from engine.capture.files.recording_names import folder_names
 from engine.capture.findings import Findings
 from engine.capture.format_checks import is_name, parse_matrix, parse_size, shortened, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import listed, natural_key
-from engine.capture.frame_search import FrameSearch
-from engine.capture.frame_times import TIMES_FILE, read_frame_times_table
-from engine.capture.opencv_numbers import lens_of, pose_of, shifted
+from engine.capture.times.frame_times import TIMES_FILE, read_frame_times_table
 from engine.errors import CaptureError
 from engine.storage.files import read_bytes
 from engine.text import shown
@@ -36,9 +39,14 @@ USUAL = ("camera_array.toml", "camera_array_aniposelib.toml", "calibration.toml"
 PLACES = ("", "calibration")
 """Folders below the capture's where the file may lie."""
 FRAME_FOLDERS = ("", "videos", "images")
-MAX_BYTES = 4 << 20
+QUALISYS = ".qca.txt"
+"""The calibration that Pose2Sim projects keep beside the TOML made of it."""
+MAX_BYTES = 1 << 20
 MAX_DEPTH = 20
 """Of brackets; Python's parser follows them one call deep each."""
+MAX_STEPS = 1_000_000
+"""Python's parser takes as many for a name as the square of its parts. Dots of numbers are not counted."""
+_FLOAT = re.compile(rb"(?<![\w.\-])[+-]?+\d++\.\d++(?:[eE][+-]?\d++)?(?![\w.])")
 _NEEDED = ("matrix", "rotation", "translation")
 
 
@@ -73,6 +81,11 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         CaptureError: Listing every problem found.
     """
     path, tables, warnings = _calibration(folder)
+    for other in calibrations(folder, QUALISYS):
+        warnings.append(
+            f"{other.name} is not read, but {path.name}. If Pose2Sim made that of it, its distortions are 64 times too "
+            f"small: take {path.name} away to read the original."
+        )
     findings = Findings()
     search = FrameSearch(folder, FRAME_FOLDERS, follow_links=follow_links, named_in=path)
     times: dict[str, np.ndarray] | None = None
@@ -81,10 +94,12 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         times = findings.tried(lambda: read_frame_times_table(times_path))
     cameras: list[DescribedCamera] = []
     left_out = [key for key, table in tables.items() if table.get("ignore") is True]
-    for key, table in sorted(tables.items(), key=lambda item: natural_key(_name(*item))):
-        if key in left_out:
-            continue
-        camera = _described(key, table, path, search, times, findings)
+    used = {key: table for key, table in tables.items() if key not in left_out}
+    likely = {_name(key, table): _likely(key, table) for key, table in used.items()}
+    assigned, note = findings.tried(lambda: search.assigned(likely)) or ({}, "")
+    warnings += [note] if note else []
+    for key, table in sorted(used.items(), key=lambda item: natural_key(_name(*item))):
+        camera = _described(key, table, path, search, assigned, times, findings)
         if camera is not None:
             cameras.append(camera)
     if left_out:
@@ -134,10 +149,10 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         text = f"The file cannot be read ({error.strerror})."
         raise CaptureError(text, hint="Check that you may read it.", path=path) from error
-    if max(data.count(b"["), data.count(b"{"), data.count(b".")) > 200_000 or b"[" * MAX_DEPTH in data.replace(
-        b" ", b""
-    ):
+    if max(data.count(b"["), data.count(b"{")) > 200_000 or b"[" * MAX_DEPTH in data.replace(b" ", b""):
         raise CaptureError("The file nests lists too deep.", hint=hint, path=path)
+    if sum(row.count(b".") ** 2 for row in _FLOAT.sub(b"", data).split(b"\n")) > MAX_STEPS:
+        raise CaptureError("The file has names of too many parts.", hint=hint, path=path)
     try:
         return tomllib.loads(data.decode("utf-8"))
     except UnicodeDecodeError as error:
@@ -167,18 +182,31 @@ def _name(key: str, table: dict[str, Any]) -> str:
     return f"cam_{key}" if key.isdigit() else key
 
 
+def _likely(key: str, table: dict[str, Any]) -> list[str]:
+    """Names that the frames of a camera may go by, the likeliest first."""
+    name, number = _name(key, table), _number(key, table)
+    if "name" in table:
+        return [name, *folder_names(name)]
+    return [name, key, f"cam_{number}", f"port_{number}"]
+
+
+def _number(key: str, table: dict[str, Any]) -> str:
+    return str(table.get("cam_id", table.get("port", key)))
+
+
 def _described(
     key: str,
     table: dict[str, Any],
     path: Path,
     search: FrameSearch,
+    assigned: Mapping[str, Path],
     times: dict[str, np.ndarray] | None,
     findings: Findings,
 ) -> DescribedCamera | None:
     """One camera; None where something is wrong with it, which is kept."""
     name = _name(key, table)
     called = name if is_name(name) else shown(name)
-    number = str(table.get("cam_id", table.get("port", key)))
+    number = _number(key, table)
     own_times = None
     if times is not None:
         own_times = next((times[text] for text in (number, name, number.rpartition("_")[2]) if text in times), None)
@@ -189,8 +217,9 @@ def _described(
     sizes = findings.tried(lambda: [_size(table, path)], camera=called)
     lens = findings.tried(lambda: _lens(table, path), camera=called)
     pose = findings.tried(lambda: _pose(table, path), camera=called)
-    likely = [name] if "name" in table else [name, key, f"cam_{number}", f"port_{number}"]
-    files = findings.tried(lambda: search.files(likely), camera=called)
+    files: Files | None = assigned.get(name)
+    if files is None:
+        files = findings.tried(lambda: search.files(_likely(key, table)), camera=called)
     if K is None or sizes is None or lens is None or pose is None or files is None:
         return None
     return DescribedCamera(

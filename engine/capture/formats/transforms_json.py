@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 
 from engine.capture.assembling import assemble
-from engine.capture.described_camera import DescribedCamera
+from engine.capture.cameras.described_camera import DescribedCamera
+from engine.capture.cameras.transforms_numbers import K_of, lens_of, world_to_camera_of
+from engine.capture.files.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Files, images_in, listed
+from engine.capture.files.frame_search import FrameSearch
+from engine.capture.files.media import read_image_header
+from engine.capture.files.places import place_in
 from engine.capture.findings import Findings
 from engine.capture.format_checks import check_fps, parse_matrix, parse_size, read_json_object, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import IMAGE_SUFFIXES, Files, images_in, listed
-from engine.capture.frame_search import FrameSearch
 from engine.capture.grouped_frames import FrameGroup, ListedFrame, grouped, time_faults
-from engine.capture.media import read_image_header
-from engine.capture.places import place_in
-from engine.capture.transforms_numbers import K_of, lens_of, world_to_camera_of
 from engine.errors import CaptureError
 from engine.text import shown
 
@@ -209,6 +209,8 @@ def _files(group: FrameGroup, groups: Sequence[FrameGroup], place: _Place, *, ha
     if has_times or any(len(other.frames) > 1 for other in groups):
         return paths
     path = paths[0]
+    if path.suffix.lower() in VIDEO_SUFFIXES:
+        return path
     parents = [place.file(other.frames[0].file).parent for other in groups]
     if parents.count(path.parent) == 1 and path.parent != place.folder and path.parent.is_dir():
         names = listed(path.parent, IMAGE_SUFFIXES)

@@ -13,6 +13,7 @@ from engine.capture.format_checks import read_json_object
 from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.formats.capture_json import FILE, SCHEMA
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
+from engine.capture.pixels.frame_fit import FrameFit
 from engine.capture.writers.frame_files import name_in
 from engine.errors import CaptureError
 from engine.storage.files import checked_path
@@ -31,6 +32,7 @@ class Corrections:
         world_scale, up: See `CaptureDocument`; None leaves them.
         fps: None leaves it.
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to, 10 to 150; None leaves it.
+        fit: What became of frames of another shape than their calibration; None leaves it.
     """
 
     is_excluded: Mapping[str, bool] = field(default_factory=dict)
@@ -41,6 +43,7 @@ class Corrections:
     up: tuple[float, float, float] | None = None
     fps: float | None = None
     fisheye_fov_deg: float | None = None
+    fit: FrameFit | None = None
 
 
 def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
@@ -58,6 +61,8 @@ def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
         document["points_to_world"] = layout.points_to_world.tolist()
     if layout.fisheye_fov_deg is not None:
         document["fisheye_fov_deg"] = layout.fisheye_fov_deg
+    if layout.fit is not None:
+        document["fit"] = layout.fit
     is_resampled = any(not _is_one_by_one(entry.source) for entry in layout.cameras)
     document["cameras"] = [_camera(entry, folder, is_resampled=is_resampled) for entry in layout.cameras]
     return document
@@ -106,19 +111,20 @@ def write_corrections(layout: Layout, folder: Path, corrections: Corrections, *,
     ):
         for name, value in values.items():
             rows[name][key] = value
-    for key in ("holdout", "world_scale", "up", "fps", "fisheye_fov_deg"):
+    for key in ("holdout", "world_scale", "up", "fps", "fisheye_fov_deg", "fit"):
         value = getattr(corrections, key)
         if value is not None:
-            document[key] = list(value) if isinstance(value, Sequence) else value
+            document[key] = list(value) if isinstance(value, tuple | list) else value
     return write_capture_json(place, document)
 
 
 def _camera(entry: CameraEntry, folder: Path, *, is_resampled: bool) -> dict[str, Any]:
+    size, K = (entry.image_size, entry.K) if entry.calibrated is None else (entry.calibrated.size, entry.calibrated.K)
     row: dict[str, Any] = {
         "name": entry.name,
-        "width": entry.image_size[0],
-        "height": entry.image_size[1],
-        "K": entry.K.tolist(),
+        "width": size[0],
+        "height": size[1],
+        "K": K.tolist(),
         "world_to_camera": entry.world_to_camera.tolist(),
     }
     if not entry.lens.is_pinhole:

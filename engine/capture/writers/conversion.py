@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from engine.capture.format_result import Layout
+from engine.capture.format_result import CameraEntry, Layout
+from engine.capture.frames import VideoFrames
 from engine.capture.points import points_of, said_of
 from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.capture.writers.colmap import write_colmap
-from engine.capture.writers.frame_files import Frames, Report, with_frames_in
+from engine.capture.writers.frame_files import Frames, Report, plain_source, with_frames_in
 from engine.capture.writers.point_files import write_ply
 from engine.capture.writers.transforms_json import POINTS_FILE, write_transforms
 from engine.errors import CaptureError
@@ -65,6 +66,15 @@ def convert(
 def _write(
     layout: Layout, folder: Path, target: Target, *, frames: Frames, is_binary: bool, report: Callable[[int, int], None]
 ) -> list[str]:
+    if (
+        target == "transforms"
+        and frames == "none"
+        and any(_is_part_of_a_video(entry, layout) for entry in layout.cameras)
+    ):
+        text = "transforms.json cannot say which frames of its videos the capture shows."
+        raise CaptureError(
+            text, hint="Write them as pictures with --frames png, or convert to capture.json.", path=folder
+        )
     lines = list(_unsaid(layout, target, frames))
     cloud = points_of(layout)
     if cloud is not None and layout.points is not None:
@@ -82,6 +92,11 @@ def _write(
     return lines
 
 
+def _is_part_of_a_video(entry: CameraEntry, layout: Layout) -> bool:
+    source, indices = plain_source(entry.source, layout.n_frames)
+    return isinstance(source, VideoFrames) and indices is not None
+
+
 def _unsaid(layout: Layout, target: Target, frames: Frames) -> list[str]:
     """What the new layout cannot say."""
     lines = []
@@ -93,7 +108,10 @@ def _unsaid(layout: Layout, target: Target, frames: Frames) -> list[str]:
         if target == "colmap" and layout.default_holdout:
             lines.append("The list of held-out cameras is not written.")
     if frames == "none" and target == "colmap":
-        lines.append("The image names in the model are placeholders: frames stay where they are.")
+        lines.append(
+            "The image names in the model are placeholders, so that the folder holds cameras and does not open as a "
+            "capture: --frames link makes one that does."
+        )
     elif frames in ("none", "link"):
         lines.append("Frames stay where they are: open the folder with --follow-links.")
     return lines

@@ -6,6 +6,7 @@ Letters: M frames of the clip, C cameras.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from engine.camera.rig import CameraRig
 from engine.cloud.fusion import keep_inliers
 from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility, surface_rows
+
+logger = logging.getLogger(__name__)
 
 Report = Callable[[str], None]
 
@@ -133,11 +136,12 @@ def build_moving_cloud(
             break
         size *= float(np.clip(np.sqrt(n_union / max_points), 1.03, 4.0))
     voxels, presence = _fuse(surfaces)
-    report(
-        f"Visual hulls: {np.mean([len(s) for s in surfaces]):.0f} surface points a frame, {len(voxels)} over "
-        f"{n_frames} frames at {size:.4g} scene units (asked {wanted:.4g} = {VOXEL_PX} px, limit {max_points}); "
-        f"{min_hits} of {n_cameras} cameras must agree, {n_misses} may not; {n_hidden / n_frames:.0f} a frame dropped "
-        f"that no camera can see ({time.perf_counter() - started:.1f} s)"
+    report(f"Moving surfaces: {np.mean([len(s) for s in surfaces]):,.0f} points a frame, {len(voxels):,} places in all")
+    logger.info(
+        "hulls: voxels of %.4g scene units (wanted %.4g = %s px, limit %d); %d of %d cameras must agree, %d may not; "
+        "%.0f a frame dropped that no camera can see; %.1f s",
+        *(size, wanted, VOXEL_PX, max_points, min_hits, n_cameras, n_misses, n_hidden / n_frames),
+        time.perf_counter() - started,
     )
     if len(voxels) == 0:
         return _empty(n_frames, size)
@@ -149,10 +153,8 @@ def build_moving_cloud(
         "colours of what moves",
         lambda: {"colors": _colors(points, presence, frames, masks, projections, gains, size=size, near=near)},
     )["colors"]
-    report(
-        f"Moving cloud: {len(points)} points, {(~is_kept).sum()} statistical outliers removed; coloured by the median "
-        f"of the cameras that see them ({time.perf_counter() - started:.1f} s)"
-    )
+    report(f"Moving cloud: {len(points):,} points, {(~is_kept).sum():,} outliers removed")
+    logger.info("moving cloud coloured in %.1f s", time.perf_counter() - started)
     return MovingCloud(points.astype(np.float32), colors, presence, float(size))
 
 

@@ -43,7 +43,8 @@ def balance(
     """Gains [C, 3], median scene colours [P, 3] 0..255 and a line that says what was decided and why."""
     measured = gain_spread(points, log_colors)
     numbers = (
-        f"gains of the cameras spread by {measured.spread:.2%}, uncertain by {measured.uncertainty:.2%} "
+        f"gains of the cameras spread by {100 * measured.spread:.2f} %, "
+        f"uncertain by {100 * measured.uncertainty:.2f} % "
         f"({measured.n_cameras} of {len(first_gains)} cameras measured)"
     )
     if color == "gain" or (color == "auto" and measured.is_real):

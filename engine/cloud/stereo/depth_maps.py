@@ -5,6 +5,7 @@ Letters: C cameras, H W full pictures, h w working pictures (about 160 x 90).
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 
@@ -24,6 +25,8 @@ from engine.cloud.stereo.depth_scene import (
     sweep_all,
 )
 from engine.cloud.stereo.sweep import choose_sources
+
+logger = logging.getLogger(__name__)
 
 Report = Callable[[str], None]
 
@@ -55,19 +58,20 @@ def estimate_depth_maps(
     sources = choose_sources(small_rig, near, far)
     inverse, n_planes = sweep_all(greys, is_usable, small_rig, sources, near, far, keep)
     height, width = greys.shape[1:]
-    report(
-        f"Depth sweep: {len(rig)} cameras at {width} x {height}, {min(n_planes)}-{max(n_planes)} planes of at most "
-        f"1 px, {np.mean([len(s) for s in sources]):.1f} neighbours each ({time.perf_counter() - started:.1f} s)"
+    report(f"Depth maps: {len(rig)} cameras at {width} x {height}")
+    logger.info(
+        "depth sweep: %d to %d planes of at most 1 px, %.1f neighbours each; %.1f s",
+        *(min(n_planes), max(n_planes), np.mean([len(s) for s in sources]), time.perf_counter() - started),
     )
     started = time.perf_counter()
     scene = DepthScene(greys, is_usable, small_rig, sources, near, far, gains)
     swept, depths = scene.completed(inverse)
     prior = 1.0 / depths
     maps = DepthMaps.of(scene, scene.better(scene.refined(np.stack([prior, inverse]), prior, keep), inverse))
-    report(
-        f"Slanted patches: from {swept.mean():.0%} to {maps.is_agreed.mean():.0%} of pixels agree with {MIN_AGREE} "
-        f"or more neighbours within {AGREE_TOLERANCE:.0%}; the rest filled by a thin plate "
-        f"({time.perf_counter() - started:.1f} s)"
+    report(f"Depth maps: neighbours agree on {100 * maps.is_agreed.mean():.0f} % of the pixels, the rest is filled in")
+    logger.info(
+        "slanted patches: %.0f %% before; agreed is what %d or more neighbours have within %.0f %%; %.1f s",
+        *(100 * swept.mean(), MIN_AGREE, 100 * AGREE_TOLERANCE, time.perf_counter() - started),
     )
     return gains, maps
 
@@ -108,9 +112,9 @@ def _search_ranges(
     if has_points:
         near = np.where(is_measured, np.minimum(near, np.maximum(point_near, 0.8 * near)), near)
         far = np.where(is_measured, np.maximum(far, np.minimum(point_far, 1.25 * far)), far)
-    report(
-        f"Depth range: {np.median(near):.3g} to {np.median(far):.3g} scene units (medians over cameras): coarse sweep "
-        f"in {is_measured.sum()} of {len(rig)}, the rest from "
-        + (f"{n_points} sparse points" if has_points else "the focus distance")
+    report(f"Depths: {np.median(near):.3g} to {np.median(far):.3g} scene units in a typical camera")
+    logger.info(
+        "depth ranges: coarse sweep in %d of %d cameras, the rest from %s",
+        *(is_measured.sum(), len(rig), f"{n_points} sparse points" if has_points else "the focus distance"),
     )
     return near, far

@@ -8,6 +8,7 @@ Letters: C cameras, M frames of the clip, H W full pictures.
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from engine.cloud.stereo.depth_scene import DepthMaps
 from engine.cloud.stereo.sampling import median_footprint, sample_tiers, seen_pixels, working_pictures
 from engine.cloud.voxel import voxel_keys, voxel_means
 from engine.errors import PreparationError
+
+logger = logging.getLogger(__name__)
 
 Report = Callable[[str], None]
 
@@ -108,10 +111,11 @@ def build_frames_cloud(
         size *= 1.02 * float(np.sqrt(len(merged) / max_points))  # surface points fall with the spacing squared
         merged, merged_colors, n_of_frames = merged_frames(points, colors, frame_of, n_frames, size)
     limit = "as given" if spacing else f"asked {asked:.4g} = {FRAME_SPACING_PX:g} px, limit {max_points}"
-    report(
-        f"Frames merged: {len(merged)} points at {size:.4g} scene units ({limit}), {n_of_frames[0]} of the first frame "
-        f"and {n_of_frames[1:].mean() if n_frames > 1 else 0:.0f} that each later one adds, of "
-        f"{len(points) / n_frames:.0f} found in each ({time.perf_counter() - started:.1f} s)"
+    added = n_of_frames[1:].mean() if n_frames > 1 else 0
+    report(f"Frames merged: {len(merged):,} points, of which each frame after the first adds {added:,.0f}")
+    logger.info(
+        "frames merged at %.4g scene units (%s): %d of the first frame, of %.0f found in each; %.1f s",
+        *(size, limit, n_of_frames[0], len(points) / n_frames, time.perf_counter() - started),
     )
     return FramesCloud(
         points=merged.astype(np.float32),
@@ -183,10 +187,8 @@ class _FrameStereo:
         self.fine_spacing = float(found["fine_spacing"])
         if not self._has_gains:
             self.gains, self._has_gains = found["gains"], bool(len(found["points"]))
-        self._report(
-            f"Frame {frame_in_clip}: {len(found['points'])} points that cameras agree on "
-            f"({time.perf_counter() - started:.1f} s)"
-        )
+        self._report(f"Frame {frame_in_clip}: {len(found['points']):,} points that cameras agree on")
+        logger.info("frame %d took %.1f s", frame_in_clip, time.perf_counter() - started)
         return found["points"], found["colors"]
 
     def _find(self, frame_in_clip: int, spacing: float | None) -> Arrays:

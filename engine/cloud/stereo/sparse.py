@@ -5,15 +5,18 @@ A failure costs the points, never the job: they only set depth ranges, and the c
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.children.running import STALL_S
-from engine.features.child import ChildFailed, run_child
+from engine.children.kind import STALL_S, ChildFailed
+from engine.features.child import arrays_kind, work_on_arrays
 from engine.images.image_filters import erode
+
+logger = logging.getLogger(__name__)
 
 MAX_CAMERAS = 48
 """Of more cameras so many are matched, spread over all: every pair of them is, and depth ranges need no more."""
@@ -21,6 +24,9 @@ MIN_POINTS = 30
 """Fewer points than this are noise."""
 MASK_MARGIN_PX = 6
 """Features so near to pixels that the camera does not see may be the edge between both."""
+TRIANGULATION = arrays_kind(
+    "engine.cloud.stereo.sparse:TRIANGULATION", "engine.cloud.stereo.sparse_child:main", "the triangulation process"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +72,7 @@ def triangulate(
     if is_valid is not None:
         job["is_valid"] = np.stack([erode(valid, MASK_MARGIN_PX) for valid in is_valid[rows]])
     try:
-        found = run_child(
-            "engine.cloud.stereo.sparse_child",
-            job,
-            what="the triangulation process",
-            alive=alive,
-            stall_s=stall_s,
-        )
+        found = work_on_arrays(TRIANGULATION, job, alive=alive, stall_s=stall_s)
     except ChildFailed as error:
         report(f"Sparse points: none, {error}; depth ranges come from a coarse sweep instead")
         return SparsePoints.none()
@@ -84,5 +84,6 @@ def triangulate(
         return SparsePoints.none()
     order = np.lexsort(points.T)  # the child's ids depend on thread timing
     points, colors, errors = points[order], colors[order], errors[order]
-    report(f"Sparse points: {len(points)} from {n_features} SIFT features, median error {np.median(errors):.2f} px")
+    report(f"Sparse points: {len(points):,}, typical error {np.median(errors):.2f} px")
+    logger.info("sparse points come from %d features", n_features)
     return SparsePoints(points, colors.astype(np.float32), errors)

@@ -1,5 +1,4 @@
-"""The child process of engine.cloud.stereo.sparse: `python -m engine.cloud.stereo.sparse_child JOB.npz RESULT.npz
-BEAT`.
+"""The child process of engine.cloud.stereo.sparse.
 
 Never imported by the program: pycolmap must stay out of its processes.
 """
@@ -10,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.features.child_side import extract_features, run_as_child, steady_verification
+from engine.children.child import Parent
+from engine.features.child_side import answer, extract_features, steady_verification
+from engine.progress import Progress
 
 MAX_ERROR_PX = 2.0
 
@@ -68,5 +69,6 @@ def _known_reconstruction(pycolmap, tables, names: list[str], Ks: np.ndarray, po
     return reconstruction
 
 
-if __name__ == "__main__":
-    run_as_child(triangulate_folder)
+def main(shared: Path, parent: Parent[Progress]) -> None:
+    """Runs in the child."""
+    answer(shared, triangulate_folder)

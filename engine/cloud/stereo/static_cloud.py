@@ -7,6 +7,7 @@ Letters: C cameras, H W full pictures, h w working pictures (about 160 x 90).
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,6 +22,8 @@ from engine.cloud.stereo.depth_maps import estimate_depth_maps
 from engine.cloud.stereo.sampling import median_footprint, sample_tiers, seen_pixels, working_pictures
 from engine.cloud.stereo.unseen import backdrop, unseen_points
 from engine.errors import PreparationError
+
+logger = logging.getLogger(__name__)
 
 Report = Callable[[str], None]
 
@@ -91,9 +94,10 @@ def build_static_cloud(
         is_seen=seen_pixels(is_valid, working_width),
     )
     shares = [len(tier.points) / maps.depths.size for tier in tiers]
-    report(
-        f"Depth maps: {shares[0]:.0%} of pixels agreed by 2 or more cameras, {shares[1]:.0%} filled and agreed, "
-        f"{shares[2]:.0%} filled and seen by one camera only (kept: holes cost more than soft walls)"
+    logger.info(
+        "depth maps: %.0f %% of pixels agreed by 2 or more cameras, %.0f %% filled and agreed, %.0f %% filled and seen "
+        "by one camera only (kept: holes cost more than soft walls)",
+        *(100 * share for share in shares),
     )
     spacing = SPACING_PX * median_footprint(maps) * maps.rig.image_sizes[0, 0] / rig.image_sizes[0, 0]
     points, _, colors = fuse_tiers(tiers, spacing)
@@ -107,24 +111,23 @@ def build_static_cloud(
         is_kept = keep_inliers(points)
     if not is_kept.any():
         raise PreparationError("No static surface was found: no pixel is agreed on by 2 cameras.")
-    report(
-        f"Static cloud: {is_kept.sum()} points at {spacing:.4g} scene units, {(~is_kept).sum()} statistical outliers "
-        f"removed, limit {max_points} with those where no camera looks ({time.perf_counter() - started:.1f} s)"
+    report(f"Static cloud: {is_kept.sum():,} points, {(~is_kept).sum():,} outliers removed")
+    logger.info(
+        "static cloud at %.4g scene units, limit %d with points where no camera looks; %.1f s",
+        *(spacing, max_points, time.perf_counter() - started),
     )
     points, colors = points[is_kept], colors[is_kept]
     log_colors = observe(points, backgrounds, is_stable, rig, maps)
     gains, seen_colors, decision = balance(points, log_colors, first_gains, color)
     n_colored = int(np.isfinite(seen_colors).all(axis=1).sum())
     colors = colored_by_neighbors(points, colors, seen_colors)
-    report(
-        f"White balance: {decision}; {n_colored} of {len(points)} points "
-        f"coloured by the median of the cameras that see them, the rest by their neighbours"
-    )
+    report(f"White balance: {decision}")
+    logger.info("%d of %d points coloured by the cameras that see them, the rest by neighbours", n_colored, len(points))
     shell, shell_colors, shell_sizes = backdrop(points, colors, maps.rig, maps.depths)
     more, more_colors, size = unseen_points(
         points, colors, maps.rig, maps.depths, spacing, max_points=max_points - len(points) - len(shell)
     )
-    report(f"Unseen: {len(more)} points continue surfaces where no camera looks, {len(shell)} lie behind everything")
+    report(f"Where no camera looks: {len(more):,} points continue surfaces, {len(shell):,} lie behind everything")
     sizes = np.concatenate([np.full(len(points), spacing), np.full(len(more), size), shell_sizes])
     points = np.concatenate([points, more, shell])
     colors = np.concatenate([colors, more_colors, shell_colors])

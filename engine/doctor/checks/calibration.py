@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.capture.rig_checks import rig_extent
+from engine.capture.cameras.rig_checks import rig_extent
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.epipolar import PairError, fundamental_matrices, pair_errors, sampson_px
 from engine.doctor.finding import Finding, PairEvidence, Point

@@ -66,8 +66,15 @@ def check_readable(unreadable: Mapping[str, CaptureError]) -> list[Finding]:
 
 
 def _n_frames(capture: Capture, row: int) -> int:
+    """Frames of a camera, counted at the rate of the capture: one of another rate has others, and none is missing."""
     source = capture.layout.cameras[row].source
-    return source.source.n_frames if isinstance(source, IndexedFrames) else source.n_frames
+    if not isinstance(source, IndexedFrames):
+        return source.n_frames
+    own, shown = source.source.n_frames, source.frame_indices
+    n_across = int(shown[-1]) - int(shown[0])
+    if n_across <= 0 or n_across == len(shown) - 1:
+        return own
+    return round(own * (len(shown) - 1) / n_across)
 
 
 def _span(counts: np.ndarray) -> str:

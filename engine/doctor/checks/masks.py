@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from engine.capture.capture import Capture
-from engine.capture.frame_files import IMAGE_SUFFIXES
+from engine.capture.files.frame_files import IMAGE_SUFFIXES
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.finding import Finding
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.capture.rig_checks import rig_extent
+from engine.capture.cameras.rig_checks import rig_extent
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.finding import Finding, PairEvidence
 

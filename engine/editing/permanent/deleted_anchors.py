@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.editing.edit import Delete, Edit, Hide
+from engine.editing.actions import Delete, Hide
+from engine.editing.edit import Edit
 from engine.editing.edited_clip import EditedClip
 from engine.editing.effects import EditStack, Effects
 

@@ -1,4 +1,5 @@
-"""The .ply of 3D Gaussian Splatting: 14 floats per Gaussian, which nearly every program reads."""
+"""The .ply of 3D Gaussian Splatting: 14 floats per Gaussian, which nearly every program reads, or all 62 of the
+reference code for programs that want a row of 248 bytes."""
 
 from __future__ import annotations
 
@@ -13,29 +14,57 @@ COLUMNS = (
     *("x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
     *("scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"),
 )
+FULL_COLUMNS = (
+    *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"),
+    *(f"f_rest_{index}" for index in range(45)),
+    *("opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"),
+)
+"""As the reference code of 3D Gaussian Splatting writes them."""
 _MAX_HEADER_BYTES = 1 << 16
+_ROWS = 1 << 16
+"""Full rows made at a time."""
 
 
 def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
     """Centres, colours of degree 0, logits of opacities, logarithms of scales, rotations wxyz."""
+    file.write(header({"vertex": (len(splats), "float", COLUMNS)}))
+    file.write(_rows(splats).tobytes())
+    return ()
+
+
+def write_full(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
+    """Likewise in the columns of the reference code: normals and colours of higher degrees are 0, as the scene has
+    none of either."""
+    file.write(header({"vertex": (len(splats), "float", FULL_COLUMNS)}))
+    wide = np.zeros((min(len(splats), _ROWS), len(FULL_COLUMNS)), "<f4")
+    rows = _rows(splats)
+    places = [FULL_COLUMNS.index(name) for name in COLUMNS]
+    for start in range(0, len(rows), _ROWS):
+        part = rows[start : start + _ROWS]
+        wide[: len(part), places] = part
+        file.write(wide[: len(part)].tobytes())
+    return ()
+
+
+def _rows(splats: Splats) -> np.ndarray:
+    """The values of COLUMNS. [N, 14]"""
     rows = np.empty((len(splats), len(COLUMNS)), "<f4")
     rows[:, 0:3] = splats.means
     rows[:, 3:6] = splats.f_dc
     rows[:, 6] = splats.opacity_logits
     rows[:, 7:10] = np.log(splats.scales.astype(np.float64))
     rows[:, 10:14] = splats.quats
-    file.write(header({"vertex": (len(splats), "float", COLUMNS)}))
-    file.write(rows.tobytes())
-    return ()
+    return rows
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` wrote. Raises ProjectError where it is something else."""
+    """What `write` or `write_full` wrote. Raises ProjectError where it is something else."""
     elements = read_header(file)
-    names = elements.get("vertex", (0, ()))[1]
-    if tuple(names) != COLUMNS:
+    names = tuple(elements.get("vertex", (0, ()))[1])
+    if names not in (COLUMNS, FULL_COLUMNS):
         raise damaged("its columns are others")
-    rows = read_rows(file, elements["vertex"][0], len(COLUMNS), "<f4")
+    rows = read_rows(file, elements["vertex"][0], len(names), "<f4")
+    rows = rows[:, [names.index(name) for name in COLUMNS]]
     return Splats(
         means=rows[:, 0:3],
         quats=rows[:, 10:14],

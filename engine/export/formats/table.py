@@ -1,4 +1,4 @@
-"""The file formats that Gaussians are written in: suffix, what each keeps, and how near a file has to come."""
+"""The file formats that Gaussians are written in: their names and words, and how near a file has to come."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ class Format(NamedTuple):
     """One file format.
 
     Attributes:
+        title: What users call it.
+        use: What it is for, in a few words.
         suffix: With its point.
-        summary: What it is for and what it keeps, for lists of choices.
         min_psnr_db: A file that was read back looks this much like the scene, or something went wrong.
         bytes_each: Of a Gaussian in a file, about; for a forecast.
         write: Writes splats into a file and returns sentences about what it could not store as it is.
         read: Reads them back.
     """
 
+    title: str
+    use: str
     suffix: str
-    summary: str
     min_psnr_db: float
     bytes_each: float
     write: Callable[[Splats, BinaryIO], tuple[str, ...]]
@@ -30,34 +32,37 @@ class Format(NamedTuple):
 
 
 FORMATS: dict[str, Format] = {
-    "ply": Format(".ply", "everything as it is, in 14 floats; read by nearly all", 50.0, 56.0, ply.write, ply.read),
+    "ply": Format(
+        "PLY",
+        "floats, for nearly all programs: SuperSplat, Blender, Unity, Unreal, Open3D and others",
+        ".ply",
+        50.0,
+        56.0,
+        ply.write,
+        ply.read,
+    ),
     "compressed-ply": Format(
+        "Compressed PLY",
+        "a third of that, for SuperSplat, PlayCanvas, Spark and Brush",
         ".compressed.ply",
-        "positions to 1/2000 of a small block, colours to 8 bits; PlayCanvas, SuperSplat",
         38.0,
         16.3,
         compressed_ply.write,
         compressed_ply.read,
     ),
     "spz": Format(
+        "SPZ",
+        "a quarter of that, for Niantic's programs, Blender, SuperSplat and Spark",
         ".spz",
-        "positions to 1/4096 unit, the rest to 6 to 10 bits; small, widely read",
         38.0,
         15.0,
         spz.write,
         spz.read,
     ),
-    "splat": Format(
-        ".splat",
-        "positions and scales as they are, the rest to 8 bits; older viewers",
-        33.0,
-        32.0,
-        splat.write,
-        splat.read,
-    ),
-    "glb": Format(".glb", "everything as it is, as glTF with KHR_gaussian_splatting", 50.0, 60.0, glb.write, glb.read),
-    "sog": Format(
-        ".sog", "pictures in a zip file; the smallest, for PlayCanvas and SuperSplat", 38.0, 12.5, sog.write, sog.read
-    ),
+    "splat": Format("splat", "for older viewers in browsers", ".splat", 33.0, 32.0, splat.write, splat.read),
+    "glb": Format("glTF (.glb)", "glTF 2.0 with KHR_gaussian_splatting", ".glb", 50.0, 60.0, glb.write, glb.read),
+    "sog": Format("SOG", "the smallest, for SuperSplat, PlayCanvas and Spark", ".sog", 38.0, 12.5, sog.write, sog.read),
 }
-"""By the name that the command line has for it."""
+"""By the name that the command line has for it, in the order in which they are offered."""
+FULL_PLY = FORMATS["ply"]._replace(bytes_each=248.0, write=ply.write_full)
+"""For programs that read rows of 248 bytes only."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.metrics.clips.seams import PairRow, SeamMaps, change_of, seam_maps
 from engine.metrics.clips.summary import EvalRow
-from engine.metrics.clips.tof import Motion, motion_of, tof
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.metrics.pictures.colors import Precision, as_shown
 from engine.metrics.pictures.picture import Choice, measure_picture
@@ -37,11 +35,6 @@ class _Shot:
     image: np.ndarray
     pixels: np.ndarray
     is_moving: np.ndarray
-
-    @cached_property
-    def motion(self) -> Motion | None:
-        """The frame made ready for tOF, which both of its pairs need."""
-        return motion_of(self.image, self.pixels) if np.isfinite(self.image).all() else None
 
 
 class Evaluation:
@@ -150,8 +143,7 @@ class Evaluation:
                 if last is None or last.frame_index != frame - 1:
                     last = self._shot(trained, camera, frame - 1)
                 maps = self._maps(camera, shot, last)
-                flow = self._tof(camera, shot, last, maps)
-                yield _pair_row(maps, clip, frame, name, is_held_out, is_boundary=False, flow_error=flow)
+                yield _pair_row(maps, clip, frame, name, is_held_out, is_boundary=False)
             last = shot
 
     def boundary_maps(self, before: TrainedClip, after: TrainedClip, camera: int) -> SeamMaps:
@@ -190,15 +182,7 @@ class Evaluation:
             is_boundary=True,
             two_clips=two_clips,
             is_held=is_held,
-            flow_error=self._tof(camera, shot, last, maps),
         )
-
-    def _tof(self, camera: int, shot: _Shot, last: _Shot, maps: SeamMaps) -> float | None:
-        """tOF of a pair, None where it is not measured: it takes as long as all other figures of a picture."""
-        is_wanted = self.metrics == "all" and (camera in self.holdout or not self.holdout)
-        if not is_wanted or shot.motion is None or last.motion is None:
-            return None
-        return tof(last.motion, shot.motion, maps.is_valid)
 
     def _shot(self, trained: TrainedClip, camera: int, frame: int) -> _Shot:
         pixels = self.capture.frame(camera, frame)
@@ -249,7 +233,6 @@ def _pair_row(
     is_boundary: bool,
     two_clips: tuple[float | None, float | None] = (None, None),
     is_held: bool = False,
-    flow_error: float | None = None,
 ) -> PairRow:
     (r_static, r_moving), (g_static, g_moving), (e_static, e_moving) = (
         maps.means(values) for values in (maps.change, maps.truth_change, maps.excess)
@@ -271,5 +254,4 @@ def _pair_row(
         two_clips_moving=two_clips[1],
         is_extrapolated=is_boundary,
         is_held=is_held,
-        tof=flow_error,
     )

@@ -73,8 +73,6 @@ class PairRow:
             the later clip there|, an evaluation of one instant by two clips. None inside clips.
         is_extrapolated: The instant lies outside what the clip before was trained on: always so at a boundary.
         is_held: That clip answers with its last frame, because its field ends there; two_clips is R then.
-        tof: See engine.metrics.clips.tof, px per frame. Of held-out cameras, all where none is held out; None of
-            others, with the quick choice of metrics and for small pictures.
     """
 
     frame_index: int
@@ -93,7 +91,6 @@ class PairRow:
     two_clips_moving: float | None = None
     is_extrapolated: bool = False
     is_held: bool = False
-    tof: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-able."""
@@ -159,8 +156,8 @@ def summarize(rows: Sequence[PairRow]) -> dict[str, Any]:
         boundaries: one entry per boundary, in order: frame_index, clips (before and after), the measures of `_measures`
             over all cameras, `held_out` and `trained_on`, `cameras` (the same per name) and `worst_camera`.
         cameras: the measures per camera over all boundaries.
-        means: `all`, `held_out`, `trained_on`: the measures over all boundaries, `tof` over all pairs, and `boundary`
-            and `interior`, the means of every figure over boundary and interior pairs.
+        means: `all`, `held_out`, `trained_on`: the measures over all boundaries, and `boundary` and `interior`, the
+            means of every figure over boundary and interior pairs.
         definitions: what the measures are, in words, with the constants.
     """
     boundaries = []
@@ -193,7 +190,6 @@ def summarize(rows: Sequence[PairRow]) -> dict[str, Any]:
         "means": {
             name: {
                 **_measures(part),
-                "tof": mean_of([row.tof for row in part]),
                 "boundary": _means([row for row in part if row.is_boundary], (*_FIGURES, *_TWO_CLIPS)),
                 "interior": _means([row for row in part if not row.is_boundary], _FIGURES),
             }
@@ -214,8 +210,6 @@ DEFINITIONS = {
     " pixels may move more at a boundary than elsewhere: truth_ratio_moving is the same of G",
     "two_clips": "mean over channels of |clip before the boundary, asked beyond its last frame, - clip after it, at its"
     " first frame|; extrapolated, and equal to R where is_held",
-    "tof": "mean |optical flow of the render - that of the truth| from one frame to the next, px per frame, Farneback's"
-    " flow and border as TecoGAN takes them; of held-out cameras, all where none is held out, and with all metrics",
     "map_range": f"maps of R, G and E are drawn from {MAP_RANGE[0]:g} to {MAP_RANGE[1]:g} in every frame",
 }
 
@@ -280,7 +274,6 @@ def _means(rows: Sequence[PairRow], names: Sequence[str]) -> dict[str, Any]:
 _FIGURES = (
     *(f"{what}_{part}" for what in ("change", "truth_change", "excess") for part in ("static", "moving")),
     "static_share",
-    "tof",
 )
 _TWO_CLIPS = ("two_clips_static", "two_clips_moving")
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.images.psnr import psnr_of, squared_error
 from engine.metrics.columns import COLUMNS
-from engine.metrics.pictures import flip, lpips
+from engine.metrics.pictures import flip
 from engine.metrics.pictures.colors import Precision, as_shown, correct_colors, fit_colors
 from engine.metrics.pictures.light import fit_light
 from engine.metrics.pictures.similarity import (
@@ -24,8 +24,6 @@ from engine.metrics.pictures.similarity import (
 
 Choice = Literal["quick", "all"]
 CHOICES: tuple[Choice, ...] = get_args(Choice)
-FIGURES_VERSION = 5
-"""Raised when a figure of the same picture changes: kept figures of earlier versions are not mixed with new ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,19 +91,11 @@ def measure_picture(
         found[f"dssim_ms{fit}"] = dssim_ms_of(picture, truth, similarity, is_valid)
         noticed = flip.flip_of(flip.seen(picture), truth_seen)
         found |= {f"flip{fit}{part}": masked_mean(noticed, mask) for part, mask in parts.items()}
-        found[f"lpips{fit}"] = _of_valid(lpips.lpips(picture, truth), is_valid)
-    if metrics == "all":
-        found["lpips_unscaled"] = _of_valid(lpips.lpips_unscaled(shown, truth), is_valid)
     return _filled(found, None, metrics, is_moving, image.shape)
 
 
 def _with_truth(picture: np.ndarray, truth: np.ndarray, is_valid: np.ndarray | None) -> np.ndarray:
     return picture if is_valid is None else np.where(is_valid[..., None], picture, truth)
-
-
-def _of_valid(distance: float | None, is_valid: np.ndarray | None) -> float | None:
-    """A mean over all places of two pictures that differ at valid ones only, as one over those."""
-    return distance if distance is None or is_valid is None else distance / float(is_valid.mean())
 
 
 def _psnr_in_same_light(
@@ -130,8 +120,6 @@ def _filled(
             missing[name] = "not measured: the quick choice of metrics"
         elif fault is not None:
             missing[name] = fault
-        elif name.startswith("lpips"):
-            missing[name] = lpips.why_missing() or "the network gave no finite value"
         elif name.startswith("dssim_ms"):
             is_small = min(shape[:2]) < MS_MIN_SIDE_PX
             side = f"a side of {min(shape[:2])} px is below {MS_MIN_SIDE_PX} px"

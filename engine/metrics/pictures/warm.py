@@ -1,6 +1,6 @@
 """Compile, or load from the cache, every kernel that measures pictures."""
 
-from engine.metrics.pictures import flip, optical_flow
+from engine.metrics.pictures import flip
 from engine.metrics.pictures import ssim_window as window
 
 
@@ -8,4 +8,3 @@ def warm_up() -> None:
     """Run each kernel once."""
     window.warm_up()
     flip.warm_up()
-    optical_flow.warm_up()

@@ -6,7 +6,6 @@ sees the whole schedule.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -14,12 +13,14 @@ import torch
 from torch import Tensor, nn
 
 from engine.backends.backend import Backend
-from engine.errors import NonFiniteLoss
+from engine.backends.phase import Schedule
 from engine.model.clip_model import ClipModel
 from engine.model.host_array import host_array
 from engine.training.config import TrainConfig
 
 _HEADS = ("opacity", "color", "shape", "offset")
+Mark = tuple[int, dict[str, int]]
+"""Counts of steps: of the phase, and of every parameter."""
 
 
 def named_parameters(
@@ -61,64 +62,75 @@ def named_parameters(
     return chosen
 
 
-class PhaseOptimizer:
-    """Adam over the trainable parameters of one phase. Owns moments and schedule, not the parameters.
+def schedule_of(
+    parameters: Mapping[str, tuple[nn.Parameter, float]],
+    config: TrainConfig,
+    *,
+    n_steps: int,
+    final_ratios: Mapping[str, float] | None = None,
+) -> Schedule:
+    """How fast they learn.
 
     Args:
         parameters: By name, with the rate at the start.
-        n_steps: Steps of the phase, over which rates fall.
         config: Final ratio of the rates and the norm to clip at.
+        n_steps: Steps of the phase, over which rates fall.
         final_ratios: Of parameters whose rates end elsewhere, by name.
+    """
+    rates = {name: rate for name, (_, rate) in parameters.items()}
+    ratios = dict.fromkeys(parameters, config.final_lr_ratio) | dict(final_ratios or {})
+    return Schedule(n_steps, rates, ratios, config.max_gradient_norm)
+
+
+class PhaseOptimizer:
+    """Adam over the trainable parameters of one phase. Owns moments, not the parameters.
+
+    Args:
+        parameters: By name.
+        schedule: How fast they learn.
         backend: What Adam is computed with.
     """
 
-    def __init__(
-        self,
-        parameters: dict[str, tuple[nn.Parameter, float]],
-        *,
-        n_steps: int,
-        config: TrainConfig,
-        final_ratios: Mapping[str, float],
-        backend: Backend,
-    ) -> None:
-        self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
-        self._rates = {name: rate for name, (_, rate) in parameters.items()}
-        self._final_ratios = dict.fromkeys(parameters, config.final_lr_ratio) | dict(final_ratios)
-        self._max_norm = config.max_gradient_norm
-        self.n_steps = n_steps
+    def __init__(self, parameters: Mapping[str, nn.Parameter], *, schedule: Schedule, backend: Backend) -> None:
+        self._parameters, self._schedule = dict(parameters), schedule
+        self._is_sound = torch.ones((), dtype=torch.bool, device=backend.device)
         self.steps_done = 0
         self._adam = backend.adam(self._parameters)
 
-    def step(self) -> float:
-        """Apply the gradients and clear them.
+    def step(self, is_sound: Tensor | None = None) -> Tensor:
+        """Apply the gradients and clear them. It counts, but changes no value, where a gradient is not finite.
 
+        Args:
+            is_sound: Scalar bool; where it is false nothing changes either.
         Returns:
-            Norm over all gradients before clipping.
-        Raises:
-            NonFiniteLoss: A gradient is not finite; parameters are left as they were.
+            Norm over all gradients before clipping. Scalar
         """
         gradients = {name: p.grad for name, p in self._parameters.items() if p.grad is not None}
-        norm = self._adam.norm(gradients)
-        if not math.isfinite(norm):
-            bad = [name for name, gradient in gradients.items() if not torch.isfinite(gradient).all()]
-            raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
-        scale = self._max_norm / norm if self.clips(norm) else 1.0
-        share_done = self.share_done
-        rates = {name: rate * self._final_ratios[name] ** share_done for name, rate in self._rates.items()}
-        self._adam.update(gradients, rates, scale)
-        for parameter in self._parameters.values():
-            parameter.grad = None
+        done, ratios = self.steps_done / max(self._schedule.n_steps, 1), self._schedule.final_ratios
+        rates = {name: rate * ratios[name] ** done for name, rate in self._schedule.rates.items()}
+        is_sound = self._is_sound if is_sound is None else is_sound
+        norm = self._adam.step(gradients, rates, max_norm=self._schedule.max_gradient_norm, is_sound=is_sound)
+        self.clear()
         self.steps_done += 1
         return norm
 
-    @property
-    def share_done(self) -> float:
-        """How much of the fall of the rates lies behind, 0 to 1; rates are start * final_ratio ** this."""
-        return self.steps_done / max(self.n_steps, 1)
+    def clear(self) -> None:
+        """Forget the gradients."""
+        for parameter in self._parameters.values():
+            parameter.grad = None
 
-    def clips(self, norm: float) -> bool:
-        """Whether gradients of this norm are scaled down."""
-        return 0.0 < self._max_norm < norm
+    def not_finite(self) -> tuple[str, ...]:
+        """Names of the parameters whose gradient is not finite."""
+        gradients = ((name, p.grad) for name, p in self._parameters.items())
+        return tuple(name for name, grad in gradients if grad is not None and not torch.isfinite(grad).all())
+
+    def mark(self) -> Mark:
+        """What to go back to if the steps from here on change nothing."""
+        return self.steps_done, dict(self._adam.steps)
+
+    def go_back(self, mark: Mark) -> None:
+        """Forget that steps which changed nothing were counted."""
+        self.steps_done, self._adam.steps = mark[0], dict(mark[1])
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Moments and step counts, for a checkpoint. Copies."""

@@ -8,9 +8,9 @@ import time
 import torch
 from torch import nn
 
-from engine.backends.table import backend_called
+from engine.backends.backend import Backend
 from engine.model.clip_view import render_gaussians
-from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
+from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters, schedule_of
 from engine.training.plan.plan import StepSizes
 from engine.training.plan.synthetic_clip import N_FRAMES, ClipRecipe, make_clip, make_truth, make_view
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
@@ -21,7 +21,7 @@ MOTION_SHARE = 0.4
 """Of width and height: what moves is mostly in the middle of a picture, so that source clips draw a part of it."""
 
 
-def measured_step_s(sizes: StepSizes, phase: str) -> float:
+def measured_step_s(sizes: StepSizes, phase: str, backend: Backend) -> float:
     """Seconds of a step of a phase, the lower quartile of N_STEPS, on the threads of the kernels.
 
     A quartile, as the median of a second or two says more about what else runs right now than about minutes of
@@ -30,8 +30,9 @@ def measured_step_s(sizes: StepSizes, phase: str) -> float:
     Args:
         sizes: Of the clip.
         phase: "static", "joint" or "source".
+        backend: What they are computed with.
     """
-    run = _Steps(sizes, phase)
+    run = _Steps(sizes, phase, backend)
     times_s = []
     for _ in range(N_WARM + N_STEPS):
         started_s = time.perf_counter()
@@ -43,7 +44,7 @@ def measured_step_s(sizes: StepSizes, phase: str) -> float:
 class _Steps:
     """Steps as engine.training.clip_training does them, without a capture, checks and statistics."""
 
-    def __init__(self, sizes: StepSizes, phase: str) -> None:
+    def __init__(self, sizes: StepSizes, phase: str, backend: Backend) -> None:
         config = sizes.config
         recipe = ClipRecipe(
             n_anchors=sizes.n_static + (0 if phase == "static" else sizes.n_moving),
@@ -54,7 +55,7 @@ class _Steps:
             n_static=sizes.n_static,
             motion_share=MOTION_SHARE,
         )
-        self._backend = backend_called(config.backend)
+        self._backend = backend
         self._config, self._model = config, make_clip(recipe, config=config, backend=self._backend)
         self._view, self._truth = make_view(recipe), torch.from_numpy(make_truth(recipe))
         self._gain = nn.Parameter(torch.ones(3, dtype=self._backend.dtype), requires_grad=phase != "source")
@@ -62,9 +63,8 @@ class _Steps:
         has_tiles = phase == "source" and ActiveTiles.applies(self._model)
         self._tiles = ActiveTiles(self._model, backend=self._backend) if has_tiles else None
         parameters = named_parameters(self._model, self._gain, config)
-        self._optimizer = PhaseOptimizer(
-            parameters, n_steps=10_000, config=config, final_ratios={}, backend=self._backend
-        )
+        schedule, learning = schedule_of(parameters, config, n_steps=10_000), {n: p for n, (p, _) in parameters.items()}
+        self._optimizer = PhaseOptimizer(learning, schedule=schedule, backend=self._backend)
         self._frame = 0
 
     def step(self) -> None:

@@ -67,8 +67,8 @@ def fit_field(
     is_published = config.initial == "published"
     model.attach_field(SpatioTemporalField(shape, generator, is_published=is_published))
     return (
-        f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
-        f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({most_alive} anchors alive)"
+        f"Field: {len(cells)} levels of up to {cells[-1]} cells a side (anchors {spacing:.3g} scene units apart), "
+        f"{2**log2_entries:,} entries {'in all' if is_shared else 'per frame'} (at most {most_alive:,} anchors alive)"
     )
 
 

@@ -174,7 +174,9 @@ class ClipPreparation:
         cloud = self._static_cloud(backgrounds, self._stages.keep)
         gains = self._gains(cloud.gains)
         model = static_model(cloud, self._clip, self._config, self._backend, self._generator)
-        self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {cloud.spacing:.4g}")
+        self._say(
+            "Building the static cloud", f"{len(cloud.points):,} static anchors, {cloud.spacing:.3g} scene units apart"
+        )
         return ClipParts(model, gains, drift, backgrounds, float(cloud.spacing))
 
     def whole_parts(self, pictures: TrainingPictures) -> ClipParts:
@@ -202,7 +204,7 @@ class ClipPreparation:
         parts = replace(parts, backgrounds=seen_still(backgrounds, pictures, masks))
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
-        self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
+        self._say("Carving what moves", f"{len(cloud.points):,} moving anchors")
         reasons = self._make_dynamic(parts, self._field_spacing(parts, cloud))
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
 
@@ -260,7 +262,7 @@ class ClipPreparation:
         elif self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
-            self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
+            self._say("Building the static cloud", f"{len(own.points):,} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
         if "static" in self._method.covering(model):  # what can change learns its light by itself
             return parts
@@ -363,7 +365,7 @@ class ClipPreparation:
             "gains": None if gains is None else gains.tolist(),
         }
         cloud = kept_cloud(self._prep_dir, self._clip.start, key, build)
-        self._say("Building the cloud", f"{len(cloud.points)} points, spacing {cloud.spacing:.4g}")
+        self._say("Building the cloud", f"{len(cloud.points):,} points, {cloud.spacing:.3g} scene units apart")
         return cloud
 
     def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:

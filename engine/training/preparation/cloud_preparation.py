@@ -194,7 +194,7 @@ def _given_points(layout: Layout, backgrounds: Backgrounds, rig: CameraRig, say:
     if cloud is None:
         return np.zeros((0, 3))
     found = true_points(cloud.points, backgrounds.images, backgrounds.is_stable, rig)
-    numbers = f"neighbouring cameras agree in {found.share:.0%} of its {found.n_seen} points that they see"
+    numbers = f"neighbouring cameras agree in {100 * found.share:.0f} % of its {found.n_seen} points that they see"
     say(f"The point cloud that came along is {'used' if found.is_used else 'not used'}: {numbers}")
     return found.points
 

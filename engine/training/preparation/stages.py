@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,8 @@ from engine.cloud.keeping import Arrays
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
 from engine.storage.array_files import ArraysError, read_arrays, read_metadata, write_arrays
+from engine.storage.files import discard
+from engine.training.retired_settings import without_retired
 
 VERSION = 3
 """To be raised whenever the code of any preparation step changes what it gives."""
@@ -80,9 +81,9 @@ class Stages:
             except (OSError, ArraysError) as error:
                 self._drop(path, str(error))
                 continue
-            if texts.get("key") != self._key:
+            if _current(texts.get("key", "")) != self._key:
                 n_stale += 1
-                _remove(path)
+                discard(path)
                 continue
             found |= {name.rpartition("/")[0]: path for name in sizes}
         if n_stale:
@@ -117,10 +118,19 @@ class Stages:
 
     def _drop(self, path: Path, reason: str) -> None:
         self._say(f"{path.name} is damaged ({reason}); removed, and its part of the preparation is done again")
-        _remove(path)
+        discard(path)
 
     def _say(self, message: str) -> None:
         self._report(Progress(STAGE, 1.0, message))
+
+
+def _current(key: str) -> str:
+    """A key as it would be written now: settings that are retired say nothing."""
+    try:
+        values = json.loads(key)
+        return json.dumps({**values, "config": without_retired(values["config"])}, sort_keys=True)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return key
 
 
 def stage_files(prep_dir: Path, clip_index: int) -> list[Path]:
@@ -128,16 +138,15 @@ def stage_files(prep_dir: Path, clip_index: int) -> list[Path]:
     return sorted(prep_dir.glob(f"clip-{clip_index:04d}-*.safetensors"))
 
 
-def remove_stages(prep_dir: Path, clip_index: int) -> None:
-    """The clip is finished, or given up: forget the pieces of its preparation."""
-    for path in stage_files(prep_dir, clip_index):
-        _remove(path)
+def all_stage_files(prep_dir: Path) -> list[Path]:
+    """The files that the preparations of all clips have kept."""
+    return sorted(prep_dir.glob("clip-[0-9]*-*.safetensors"))
+
+
+def remove_stages(prep_dir: Path, clip_index: int) -> int:
+    """The clip is trained, or given up: forget the pieces of its preparation. Returns how many files have gone."""
+    return sum(map(discard, stage_files(prep_dir, clip_index)))
 
 
 def _file_name(clip_index: int, number: int) -> str:
     return f"clip-{clip_index:04d}-{number}.safetensors"
-
-
-def _remove(path: Path) -> None:
-    with suppress(OSError):
-        path.unlink()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from engine.training.setting import Value
+from engine.setting import Value
 
 Follows = Literal["both", "paper", "released code", "neither"]
 

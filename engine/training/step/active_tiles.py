@@ -123,8 +123,8 @@ class ActiveTiles:
         first, last = frozen_view.pictures[0], frozen_view.pictures[-1]
         return first if first is last else torch.lerp(first, last, self._model.light_weights(clip_time)[1])
 
-    def square_outside(self, picture: ActivePicture, item: int, truth: Tensor, gain: Tensor) -> float:
-        """Mean square that tiles which are not active add to that of the whole picture.
+    def square_outside(self, picture: ActivePicture, item: int, truth: Tensor, gain: Tensor) -> Tensor | float:
+        """Mean square that tiles which are not active add to that of the whole picture. Scalar
 
         Args:
             item: Number of the truth, by which sums are kept.
@@ -135,7 +135,7 @@ class ActiveTiles:
             return 0.0
         if item not in self._squares:
             self._squares[item] = self._backend.tile_squares(picture.rest, truth, gain.detach())
-        return float(self._squares[item][~picture.tile_mask].sum()) / truth.numel()
+        return torch.where(picture.tile_mask, 0.0, self._squares[item]).sum() / truth.numel()
 
     def _frozen_view(self, camera_row: int, view: View, rows: dict[str, Tensor]) -> _FrozenView | None:
         known = self._views.get(camera_row)

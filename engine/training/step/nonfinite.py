@@ -4,39 +4,31 @@ from __future__ import annotations
 
 import math
 
-import torch
-from torch import Tensor
-
+from engine.backends.phase import Fault
 from engine.errors import NonFiniteLoss
 from engine.training.config import TrainConfig
 
 
-def loss_not_finite(
-    *, image: Tensor, photometric: float, volume: float, where: str, config: TrainConfig
-) -> NonFiniteLoss:
-    """The error for a loss that is not finite; names the term, and rendered values where they are the cause.
+def not_finite(fault: Fault, *, where: str, config: TrainConfig) -> NonFiniteLoss:
+    """The error for a step whose loss or gradient is not finite; names the term, and rendered values where they are the
+    cause, or the parameters.
 
     Args:
-        image: As rendered. [H, W, 3]
-        photometric: Its part of the loss.
-        volume: The volume term's part, 0 without one.
+        fault: What was found.
         where: Step and camera.
         config: Settings of the training, for the advice.
     """
+    photometric, volume = fault.photometric, fault.volume
     if not math.isfinite(photometric):
-        n_bad = int((~torch.isfinite(image)).sum())
-        cause = f"; {n_bad} of {image.numel()} rendered values are not finite" if n_bad else ""
+        cause = f"; {fault.n_bad} of {fault.n_values} rendered values are not finite" if fault.n_bad else ""
         said = f"The photometric loss became {photometric} at {where}{cause}."
     elif not math.isfinite(volume):
         said = f"The volume term of the loss became {volume} at {where}; a Gaussian's scales are not finite."
+    elif fault.is_of_gradient:
+        said = f"The gradient of {', '.join(fault.gradients) or 'the sum'} is not finite at {where}."
     else:
         said = f"The loss overflowed at {where}: photometric {photometric:.3g}, volume {volume:.3g}."
     return NonFiniteLoss(said, hint=advice(config))
-
-
-def gradient_not_finite(error: NonFiniteLoss, *, where: str, config: TrainConfig) -> NonFiniteLoss:
-    """The optimiser's error, which names the parameters, with step and camera."""
-    return NonFiniteLoss(f"{error.message.rstrip('.')} at {where}.", hint=advice(config))
 
 
 def advice(config: TrainConfig) -> str:

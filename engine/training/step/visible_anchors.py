@@ -21,6 +21,10 @@ def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
     ]
 
 
+MAX_BYTES = 256 << 20
+"""Memory for rows of moving anchors, of each camera and frame; what does not fit is found at every step."""
+
+
 class Sight:
     """Rows to decode, camera by camera. What a camera can see of anchors that stay in place is found once.
 
@@ -49,6 +53,8 @@ class Sight:
             self.reaches[role] = known
         self._seen: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._present: dict[str, Tensor] = {}  # of dynamic sets, a row a frame; [M, A]
+        self._rows: dict[tuple[str, int, float], Tensor] = {}  # of dynamic sets
+        self._n_bytes = 0
 
     def rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
         """Rows of every set that a camera can see and that exist at this time. [n] int64 each"""
@@ -60,9 +66,24 @@ class Sight:
                 self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
             rows[role] = self._seen[key]
             if anchors.presence is not None:
-                if role not in self._present:
-                    self._present[role] = anchors.presence.T.contiguous()
-                frames = [self._present[role][knot] for knot, _ in self._model.knots(clip_time)]
-                is_present = frames[0] if len(frames) == 1 else torch.logical_or(*frames)
-                rows[role] = (is_present & self._seen[key]).nonzero()[:, 0]
+                rows[role] = self._present_rows(
+                    role, camera_row, clip_time, is_kept=not anchors.positions.requires_grad
+                )
+        return rows
+
+    def _present_rows(self, role: str, camera_row: int, clip_time: float, *, is_kept: bool) -> Tensor:
+        """Rows of a dynamic set that the camera can see and that exist at this time, found once where they are kept."""
+        known = self._rows.get((role, camera_row, clip_time))
+        if known is not None:
+            return known
+        presence = self._model.anchor_set(role).presence
+        assert presence is not None
+        if role not in self._present:
+            self._present[role] = presence.T.contiguous()
+        frames = [self._present[role][knot] for knot, _ in self._model.knots(clip_time)]
+        is_present = frames[0] if len(frames) == 1 else torch.logical_or(*frames)
+        rows = (is_present & self._seen[role, camera_row]).nonzero()[:, 0]
+        if is_kept and self._n_bytes < MAX_BYTES:
+            self._n_bytes += rows.nbytes
+            self._rows[role, camera_row, clip_time] = rows
         return rows

@@ -17,24 +17,12 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.export.scene_frames import SceneFrames
 from app.project import clip_exchange
 from app.project.clip_versions import list_versions, restore_version, set_aside
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from engine.clip_files.array_names import LOG_DRIFT
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
-from engine.editing.edit import (
-    Box,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hide,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Transform,
-)
+from engine.editing.actions import Delete, Expose, Hide, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
 from engine.errors import DiskError, ProjectError
 from engine.raster.gaussians import Gaussians

@@ -65,11 +65,11 @@ def test_the_doctor_names_vectors_and_threads():
 
 
 def test_compiling_reports_groups_and_says_each_once(monkeypatch):
-    def warm_up_all(report):
+    def compile_all(report, *, backend):
         for done, n, what in ((0, 2, "a and b"), (0, 2, "a and b"), (1, 2, "b"), (1, 2, "b"), (2, 2, "")):
             report(done, n, what)
 
-    monkeypatch.setattr(kernels, "warm_up_all", warm_up_all)
+    monkeypatch.setattr(kernels, "compile_all", compile_all)
     said: list[Progress] = []
     kernels.warm_up_reporting(said.append)
     assert {progress.stage for progress in said} == {kernels.COMPILING}
@@ -80,7 +80,7 @@ def test_compiling_reports_groups_and_says_each_once(monkeypatch):
 
 
 def test_failing_to_start_processes_is_no_failure(monkeypatch, caplog):
-    def refuse() -> bool:
+    def refuse(*, backend: str) -> bool:
         raise OSError("no more processes")
 
     monkeypatch.setattr(kernels, "compile_all", refuse)

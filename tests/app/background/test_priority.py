@@ -10,8 +10,8 @@ import threading
 import numpy as np
 import pytest
 
-from app.background.priority import lower_thread
 from app.playback.point_spacing import point_spacing
+from engine.children.priority import lower_thread
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux has a niceness per thread")
@@ -35,7 +35,7 @@ def test_only_the_calling_thread_steps_back() -> None:
 def test_an_idle_process_and_its_threads_compute_with_what_nobody_else_wants() -> None:
     code = """
 import os, threading
-from app.background.priority import idle_process
+from engine.children.priority import idle_process
 idle_process()
 show = lambda: print(os.getpriority(os.PRIO_PROCESS, 0), os.sched_getscheduler(0) == os.SCHED_IDLE)
 show()

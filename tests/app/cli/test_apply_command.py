@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.project.project import open_project
+from app.project.project_access import open_project
 from engine.clip_files.clip_state import read_clip_state
-from engine.editing.edit import Delete, Edit, Picked, PickedRows
+from engine.editing.actions import Delete
+from engine.editing.edit import Edit, Picked, PickedRows
 from engine.editing.picks import pack_rows
 from tests.app.residuals.conftest import make_project
 

@@ -7,7 +7,7 @@ import shlex
 
 import pytest
 
-from app.cli.correction_arguments import (
+from app.cli.captures.correction_arguments import (
     add_correction_arguments,
     asked_corrections,
     correction_flags,

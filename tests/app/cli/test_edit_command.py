@@ -10,20 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from app.project.project import open_project
-from engine.editing.edit import (
-    Box,
-    Delete,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Transform,
-)
+from app.project.project_access import open_project
+from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Everything, Scope, Sphere
 from tests.app.made_projects import make_project
 from tests.app.residuals.conftest import make_project as make_trained
 
@@ -189,6 +178,8 @@ def test_everything_as_json(run, folder):
             "scope": {"first": 3, "stop": 9, "is_reference_only": False},
             "is_inverted": False,
             "is_on": True,
+            "acts": [],
+            "note": "",
         }
     ]
     assert {"undo", "redo", "past", "future"} <= found.keys()
@@ -209,20 +200,20 @@ def test_a_name_is_shown_in_one_line(run, folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--delete", "--hide"), "--delete and --hide are given together"),
+        (("--delete", "--hide"), "--hide and --delete are given together"),
         (("--move", 0, 0, 0, "--exposure", 1), "are given together"),
         (("--frame", 3), "Nothing says what the edit does"),
         (("--name", "x"), "Nothing says what the edit does"),
         (BALL, "Nothing says what the edit does"),
-        (("--delete", "--sphere", 0, 0, 0, 0), "--sphere makes no sense: a sphere with the radius 0.0 is empty"),
+        (("--delete", "--sphere", 0, 0, 0, 0), "--sphere is not valid: a sphere with the radius 0.0 is empty"),
         (("--delete", "--sphere", 0, 0, "nan", 1), "not finite"),
-        (("--delete", "--box", 0, 0, 0, 1, 0, 1), "--box makes no sense"),
+        (("--delete", "--box", 0, 0, 0, 1, 0, 1), "--box is not valid"),
         (("--delete", "--turned-box", 0, 0, 0, 1, 1, 1, 1, 1, 0, 0), "not a rotation"),
-        (("--scale", 0), "makes everything vanish"),
-        (("--rotate", 0, 0, 0, 90), "--rotate has no axis"),
+        (("--scale", 0), "--scale is not valid: a transform with the scale 0 makes everything vanish"),
+        (("--rotate", 0, 0, 0, 90), "--rotate is not valid: there is no axis"),
         (("--rotate", 0, 1, 0, 90, "--quat", 1, 0, 0, 0), "given together"),
-        (("--exposure", 99), "99.0 stops is out of range"),
-        (("--hold", -1), "--hold is -1; frames are counted from 0"),
+        (("--exposure", 99), "--exposure is not valid: stops is 99.0; it has to be a number between -16 and 16"),
+        (("--hold", -1), "--hold is not valid: frame_index is -1; it has to be a whole number between 0 and"),
         (("--hide", "--frame", -1), "frames are counted from 0"),
         (("--hide", "--frames", "5:5"), "holds no frame"),
         (("--hide", "--frames", "a:b"), "not a range A:B"),
@@ -237,8 +228,8 @@ def test_a_name_is_shown_in_one_line(run, folder):
         (("--put", "{"), "--put is not JSON"),
         (("--put", "[]"), "not an object"),
         (("--put", '{"edit": []}'), "makes no sense (it has an entry 'edit', which is not known)"),
-        (("--hide", "--target", '{"type": "cone"}'), "--target makes no sense"),
-        (("--hide", "--target", "{"), "--target makes no sense"),
+        (("--hide", "--target", '{"type": "cone"}'), "--target is not valid"),
+        (("--hide", "--target", "{"), "--target is not valid"),
     ],
 )
 def test_it_names_what_is_wrong_with_its_arguments(run, folder, arguments, message):
@@ -258,3 +249,13 @@ def test_what_is_open_elsewhere_is_listed_but_not_changed(run, folder):
     assert (code, "Traceback" in err) == (2, False)
     writer.close()
     assert run("edit", folder / "nothing")[0] == 2
+
+
+def test_where_an_edit_acts_is_said_before_it_is_made_and_in_the_list(run, tmp_path):
+    trained = make_trained(tmp_path)
+    code, out, err = run("edit", trained, "--where", "clip=1", "--at", 4, "--hide")
+    assert (code, err.startswith("Note: Acts in frames 3-5 only: other clips have other Gaussians.")) == (0, True)
+    assert out.splitlines()[1].endswith("of clip 1, frames 3-5 only")
+    code, out, err = run("edit", trained, "--where", "motion=static", "--at", 4, "--hide", "--from", 9)
+    assert (code, out) == (2, "")
+    assert "The edit can never act (from 9 on): what is selected exists in frames 0-5 only." in err

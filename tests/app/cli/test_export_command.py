@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from pathlib import Path
 
 import pytest
 
-from app.cli import export_command, export_gaussians
-from engine.export.formats.table import FORMATS
+from app.cli import export_command
 from tests.app.residuals.conftest import make_project
 
 
@@ -22,17 +22,13 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_formats_of_the_command_are_those_of_the_table():
-    assert list(export_gaussians.FORMATS) == list(FORMATS)
-
-
 def test_frames_are_exported_and_measured(run, project: Path, tmp_path: Path):
     code, out, err = run("export", project, "--format", "ply", "--frames", "1:6", "--step", 2, "--out", tmp_path / "o")
     assert (code, out) == (0, "")
     assert names(tmp_path / "o") == ["p_0001.ply", "p_0003.ply", "p_0005.ply", "p_export.json"]
     assert "Coordinates: axes as in the capture, scale as in the capture." in err
     assert "p_0003.ply: 100.0 dB against the live picture" in err
-    assert "4 files, 0.0 MB, in" in err
+    assert re.search(r"4 files, [1-9]\d* kB, in", err)
 
 
 def test_a_clip_is_exported_and_printed_as_json(run, project: Path, tmp_path: Path):
@@ -45,6 +41,20 @@ def test_a_clip_is_exported_and_printed_as_json(run, project: Path, tmp_path: Pa
     assert document["psnr_db"] >= 38
     assert "y and z reversed" in document["lines"][0]
     assert names(tmp_path / "o") == ["p_0003.spz", "p_0004.spz", "p_0005.spz", "p_export.json"]
+
+
+def test_edits_that_go_along_are_named(run, project: Path, tmp_path: Path):
+    run("edit", project, "--delete", "--sphere", 0, 0, 0, 1)
+    said = "1 edit goes along: delete sphere of radius 1"
+    export = ("export", project, "--format", "ply", "--frames", "1:2", "--out")
+    render = ("render", project, "--turntable", "--frames", "1:2", "--size", "32x24", "--out")
+    for name, command in (("export", export), ("render", render)):
+        code, _, err = run(*command, tmp_path / name)
+        assert (code, said in err) == (0, True)
+        code, _, err = run(*command, tmp_path / f"{name} plain", "--without-edits")
+        assert (code, "goes along" in err) == (0, False)
+    code, _, err = run("export", project, "--format", "metrics-csv", "--out", tmp_path / "figures.csv")
+    assert (code, "goes along" in err) == (0, False)
 
 
 def test_every_nth_of_all_frames(run, project: Path, tmp_path: Path):
@@ -62,7 +72,7 @@ def test_it_names_what_is_wrong_with_its_arguments(run, project: Path, tmp_path:
         (("--clip", 1), "not trained"),
         (("--clip", 7), "There is no clip 7. The project has clips 0 to 1."),
         (("--step", 0), "--step is 0"),
-        (("--scale", 0), "The scale is 0"),
+        (("--scale", 0), "Scale is 0.0; it has to be a number between 0.000001 and 1000000"),
         (("--out", tmp_path / "file"), "something under this name already"),
         (("--out", tmp_path / "file" / "x"), "is a file"),
         (("--out", project), "inside of the project"),

@@ -6,7 +6,7 @@ import re
 import numpy as np
 from PIL import Image
 
-from app.cli.exposure_lines import curve_signs, exposure_document, exposure_lines
+from app.cli.captures.exposure_lines import curve_signs, exposure_document, exposure_lines
 from engine.cloud.background.exposure_survey import ExposureCurve, ExposureSurvey
 from tests.app.fakes import write_capture
 
@@ -58,7 +58,9 @@ def test_inspecting_measures_the_pictures_of_a_capture(run, tmp_path):
         Image.fromarray((wall * (1.0 if i < 3 else 0.9) + 0.5).astype(np.uint8)).save(path, quality=95)
     code, out, err = run("inspect", folder)
     assert code == 0
-    assert all(line.startswith("Capture doctor ") for line in err.splitlines())  # progress
+    first, *others = err.splitlines()
+    assert first.startswith("The doctor takes up to about ")
+    assert all(line.startswith("Capture doctor ") for line in others)  # progress
     assert re.search(r"step of -(9\.[5-9]|10\.[0-5]) % between frames 2 and 3 \(auto exposure\)", out)
     found = json.loads(run("inspect", folder, "--json")[1])["exposure"]
     assert found["frames"] == list(range(6))

@@ -9,6 +9,7 @@ import pytest
 
 from app.project.capture_report import report_of
 from engine.capture.capture import open_capture
+from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from tests.clip_headers import with_header
 
@@ -203,3 +204,21 @@ def test_inspecting_says_what_the_doctor_found(run, capture_folder):
     document = json.loads(run("inspect", capture_folder, "--json")[1])
     assert {"findings", "pairs", "cameras", "seconds", "n_pictures"} <= document["doctor"].keys()
     assert document["exposure"]["n_measured"] == 4
+
+
+def test_frames_of_quite_another_shape_are_refused_until_it_is_said_what_became_of_them(run, capture_folder, tmp_path):
+    folder = tmp_path / "capture"
+    shutil.copytree(capture_folder, folder)
+    document = capture_document(open_capture(folder).layout, folder)
+    for row in document["cameras"]:
+        row["height"] += 6
+    write_capture_json(folder, document)
+    code, _, said = run("inspect", folder, "--quick")
+    assert code == 2
+    assert "its calibration is for 32x30" in said
+    assert "--fit" in said
+    code, out, _ = run("inspect", folder, "--fit", "cropped-start")
+    assert (code, "Written" in out) == (0, True)
+    code, out, _ = run("inspect", folder, "--quick")
+    assert code == 0
+    assert "as they were cropped at the left and upper border" in out

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from engine.synthetic.writing import write_video
+from tests.engine.capture.made_videos import write_video_of_kind
 from tests.engine.synchronisation.made_recordings import FPS, made_recordings, ring
 
 
@@ -53,6 +54,35 @@ def test_plain_videos_need_no_calibration_but_cannot_be_corrected(run, tmp_path)
     code, _, err = run("synchronise", folder, "--apply")
     assert code != 0
     assert "no calibration" in err
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("fault", ["one frame", "false timescale"])
+def test_a_video_without_a_rate_is_named(run, tmp_path, fault):
+    for name in ("cam0", "cam1", "cam2"):
+        write_video_of_kind(tmp_path / f"{name}.mp4", n_frames=1 if (name, fault) == ("cam1", "one frame") else 20)
+    if fault == "false timescale":
+        path = tmp_path / "cam1.mp4"
+        content = bytearray(path.read_bytes())
+        at = content.index(b"mdhd") + 16
+        content[at : at + 4] = (2**31 - 1).to_bytes(4, "big")
+        path.write_bytes(content)
+    code, _, err = run("synchronise", tmp_path)
+    assert code == 2
+    assert "cam1.mp4" in err
+    assert ("1 frame," if fault == "one frame" else "frames per second; cameras have") in err
+    assert err.strip().count("\n") == 0
+
+
+def test_links_out_of_the_folder_are_followed_only_when_allowed(run, tmp_path):
+    folder = shifted_capture(tmp_path / "videos", [0.0, 2.0])
+    (folder / "cameras.json").unlink()
+    (folder / "cam01.mp4").rename(tmp_path / "elsewhere.mp4")
+    (folder / "cam01.mp4").symlink_to(tmp_path / "elsewhere.mp4")
+    code, _, err = run("synchronise", folder)
+    assert code == 2
+    assert "leads out of the capture folder" in err
+    assert run("synchronise", folder, "--follow-links")[0] == 0
 
 
 def test_a_folder_of_something_else_is_refused(run, tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.cli.cli import main
-from app.project.project import open_project
+from app.project.project_access import open_project, read_settings
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.fakes import N_STEPS, make_crashing, make_fake, write_capture
 
@@ -28,7 +29,7 @@ def test_training_writes_clips_and_a_document(run, capture_folder, tmp_path):
         (1, "trained", N_STEPS),
     ]
     assert read_clip_state(tmp_path / "p" / "clips" / "0001.safetensors").header.role == "source"
-    assert "held-out PSNR 26.00 dB" in err
+    assert "held-out PSNR ~26.00 dB, few pictures" in err
     open_project(tmp_path / "p").close()  # the lock was given back
 
 
@@ -117,6 +118,31 @@ def test_options_that_contradict_a_trained_project_are_refused(run, capture_fold
     assert code == 2
     assert "clip_length 3" in err
     assert run(*arguments, "--clip-length", 3)[0] == 0  # the same value is not a contradiction
+
+
+def test_settings_may_change_until_a_clip_is_finished(run, capture_folder, tmp_path):
+    arguments = ("train", capture_folder, "--project", tmp_path / "p")
+    assert run(*arguments, "--preset", "toy", "--set", "static_steps=4")[0] == 1  # it fails at step 5, which is kept
+    assert (tmp_path / "p" / "checkpoints" / "0000.safetensors").is_file()
+    code, _, err = run(*arguments, "--preset", "small")
+    assert code == 0, err
+    assert "Discarded: the progress of clip 0 (step " in err
+    assert read_clip_state(tmp_path / "p" / "clips" / "0000.safetensors").header.step == N_STEPS
+    assert read_settings(tmp_path / "p").overrides == {}  # another preset takes the place of all that was set
+
+
+def test_starting_over_discards_what_is_trained_and_takes_other_settings(run, capture_folder, tmp_path):
+    arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3)
+    assert run(*arguments, "--preset", "toy")[0] == 0
+    before = (tmp_path / "p" / "clips" / "0001.safetensors").stat().st_mtime_ns
+    assert run(*arguments, "--preset", "small")[0] == 2
+    assert run(*arguments, "--start-over", "--clips", "7")[0] == 2
+    assert (tmp_path / "p" / "clips" / "0001.safetensors").stat().st_mtime_ns == before  # bad input discards nothing
+    code, _, err = run(*arguments, "--preset", "small", "--start-over", "--clips", "0")
+    assert code == 0, err
+    assert re.search(r"Discarded: 2 trained clips \(\d+:\d\d of training\), \d+(\.\d)? [kM]B", err)
+    assert [path.stem for path in (tmp_path / "p" / "clips").iterdir()] == ["0000"]
+    assert read_settings(tmp_path / "p").overrides == {}
 
 
 def test_a_source_clip_alone_is_refused(run, capture_folder, tmp_path):

@@ -8,22 +8,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from engine.editing.edit import (
-    Box,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Transform,
-)
+from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
 
 HARD_NAMES = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import shlex
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,15 +14,14 @@ from app.cli.cli import build_parser
 from app.command_text.job_command import export_command as as_command
 from app.command_text.job_command import mend_command, training_command, version_command
 from app.document.project_settings import ProjectSettings
-from app.export.cameras_job import CamerasJob
-from app.export.export_jobs import KINDS
-from app.export.gaussians_job import GaussiansJob
-from app.export.metrics_job import MetricsJob
-from app.export.named_jobs import JOB_FORMATS, format_name_of, named_job
+from app.export.jobs.cameras import CamerasJob
+from app.export.jobs.gaussians import GaussiansJob
+from app.export.jobs.metrics import MetricsJob
+from app.export.jobs.player import PlayerJob
+from app.export.jobs.table import KINDS, formats_of, named_job
+from app.export.jobs.video import Turntable, VideoJob
 from app.export.picked_frames import PickedFrames
-from app.export.player_job import PlayerJob
 from app.export.video.formats import FORMATS as VIDEO_FORMATS
-from app.export.video.job import Turntable, VideoJob
 from app.mending.request import MendRequest
 from app.scripting import scripted_project
 from engine.errors import ProjectError
@@ -35,6 +33,7 @@ OUT = Path("/somewhere/it's 100 % out")
 JOBS = [
     GaussiansJob(OUT),
     GaussiansJob(OUT, "spz", range(3, 4), axes="rub"),
+    GaussiansJob(OUT, fields="full"),
     GaussiansJob(OUT, "sog", range(0, 20, 3), "split", "-y", 1e-5),
     GaussiansJob(OUT, "glb", GAPS, "moving", "+z", 100.0, scene_up=(0.0, -1.0, 1e-6)),
     PlayerJob(OUT.with_suffix(".html")),
@@ -49,18 +48,12 @@ JOBS = [
     CamerasJob(OUT, "transforms"),
     VideoJob(OUT.with_suffix(".mp4"), "mp4", camera="two words, and a comma"),
     VideoJob(OUT, "png", camera="-x", is_transparent=True, size=(64, 48), supersampling=2, features="static"),
-    VideoJob(OUT.with_suffix(".webm"), "webm", path='it\'s "mine"', frames=(3, 9), speed=0.25, fps=24.0, sound="-x"),
+    VideoJob(
+        OUT.with_suffix(".webm"), "webm", path='it\'s "mine"', frames=range(3, 9), speed=0.25, fps=24.0, sound="-x"
+    ),
     VideoJob(OUT.with_suffix(".mp4"), "mp4", turntable=Turntable(-1.0, 1e-5, 2.5), hold=3.0, background=(1, 2, 255)),
     VideoJob(OUT, "exr", turntable=Turntable(), shows="depth"),
 ]
-
-
-def kind_of(job: Any) -> str:
-    return next(
-        name
-        for name, row in KINDS.items()
-        if type(job).__module__.startswith(row.module.rsplit(".", 1)[0]) and name in type(job).__name__.lower()
-    )
 
 
 class Opened(SimpleNamespace):
@@ -74,33 +67,14 @@ def opened() -> Any:
 
 
 @pytest.mark.parametrize("job", JOBS, ids=lambda job: f"{type(job).__name__}-{JOBS.index(job)}")
-def test_an_export_as_a_command_line(job, opened, monkeypatch):
-    kind = kind_of(job)
-    command = as_command(Path("/somewhere/-p"), kind, job)
+def test_an_export_as_a_command_line(job, opened):
+    command = as_command(Path("/somewhere/-p"), job)
     arguments = shlex.split(command.shell(is_windows=False))[1:]
     options = build_parser(arguments[:1]).parse_args(arguments)
     assert options.project == Path("/somewhere/-p")
-    assert _job_of(options, opened, monkeypatch) == job
-
-
-def _job_of(options: argparse.Namespace, opened: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The job that the command hands over to whoever carries it out."""
-    if options.command == "render":
-        return render_command._job(options, opened)
-    made: list[Any] = []
-
-    class Work:
-        def estimate(self, opened: Any, job: Any) -> Any:
-            return SimpleNamespace(lines=())
-
-        def run(self, opened: Any, job: Any, report: Any) -> None:
-            made.append(job)
-
-    monkeypatch.setattr("app.export.export_jobs.ExportKind.load", lambda row: Work())
-    kind = next((kind for kind in export_command.KINDS if options.format in kind.FORMATS), export_command.export_player)
-    export_command._check_options(options, kind)
-    kind.export(opened, options, export_command._frames(options, opened), lambda progress: None)
-    return made[0]
+    if options.command == "export":
+        export_command.check_options(options)
+    assert (render_command if options.command == "render" else export_command).job_of(options, opened) == job
 
 
 @pytest.mark.parametrize("job", JOBS, ids=lambda job: f"{type(job).__name__}-{JOBS.index(job)}")
@@ -109,15 +83,16 @@ def test_an_export_as_python(job, tmp_path, monkeypatch):
 
     make_project(tmp_path / "it's mine").close()
     made: list[Any] = []
-    monkeypatch.setattr(
-        scripted_project,
-        "run_named_job",
-        lambda opened, report, name, out, **options: made.append(named_job(name, out, **options)),
-    )
+
+    class Work:
+        def run(self, opened: Any, job: Any, report: Any) -> None:
+            made.append(job)
+
+    monkeypatch.setattr("app.export.jobs.job.Job.load", lambda job: Work())
     monkeypatch.setattr(scripted_project.ScriptedProject, "open_trained", lambda project: None)
-    command = as_command(tmp_path / "it's mine", kind_of(job), job)
+    command = as_command(tmp_path / "it's mine", job)
     exec(compile(command.python, "pasted", "exec"), {"__name__": "__main__"})
-    assert made == [(kind_of(job), job)]
+    assert made == [job]
 
 
 def test_a_training():
@@ -158,16 +133,12 @@ def test_a_version():
     assert command.statement == "project.restore_version(3, 12)"
 
 
-def test_the_table_of_names_is_complete():
-    gaussians = [name for name, row in JOB_FORMATS.items() if row.kind == "gaussians"]
-    assert gaussians == list(GAUSSIAN_FORMATS)
-    assert [name for name, row in JOB_FORMATS.items() if row.kind == "video"] == list(VIDEO_FORMATS)
-    assert {row.kind for row in JOB_FORMATS.values()} == set(KINDS)
-    on_command_line = {name for kind in export_command.KINDS for name in kind.FORMATS}
-    assert on_command_line | {"player"} | set(VIDEO_FORMATS) == set(JOB_FORMATS)
-    for name, row in JOB_FORMATS.items():
-        kind, job = named_job(name, "x")
-        assert (kind, format_name_of(kind, job)) == (row.kind, name)
+def test_every_format_has_a_name_and_a_job():
+    assert list(KINDS["gaussians"].formats()) == list(GAUSSIAN_FORMATS)
+    assert list(formats_of("render")) == list(VIDEO_FORMATS)
+    for name, job in formats_of().items():
+        made = named_job(name, "x")
+        assert (type(made), made.format_name) == (job, name)
 
 
 def test_names_and_options_that_are_not_known():

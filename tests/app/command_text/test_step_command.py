@@ -16,13 +16,15 @@ from msgspec import structs
 
 from app.cli.cli import main
 from app.command_text.step_command import step_command
-from app.document.note_changes import put_marker, set_label
+from app.document.changes.note_changes import put_marker, set_label
+from app.document.changes.world_changes import set_scale
 from app.document.project_document import ProjectDocument, World
-from app.document.world_changes import set_scale
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from app.scripting import scripted_project
 from engine.capture.exclusions import ExcludedFrames, Exclusions
-from engine.editing.edit import Delete, Edit, Everything, Hide, Sphere
+from engine.editing.actions import Delete, Hide
+from engine.editing.edit import Edit, Everything, Sphere
 from engine.gate.regions import GateRegion
 from tests.app.command_text.documents import EDITS, HARD_NAMES, NAMES, STACKS
 from tests.app.made_projects import make_project

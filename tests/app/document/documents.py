@@ -14,10 +14,11 @@ from msgspec import structs
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
 from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings
-from app.document.stored_document import plain_document
+from app.document.storing.stored_document import plain_document
 from engine.camera.path_presets import turntable
 from engine.capture.exclusions import Exclusions, PaintedMask, Stroke
-from engine.editing.edit import Box, Delete, Edit, Expose, Hide, Picked, PickedRows, Recolor, Scope, Sphere, Transform
+from engine.editing.actions import Delete, Expose, Hide, Recolor, Transform
+from engine.editing.edit import Box, Edit, Picked, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
 from engine.gate.regions import sphere_region
 

@@ -6,10 +6,10 @@ import random
 
 import pytest
 
-from app.document.clip_changes import with_merge, with_reference, with_split
+from app.document.changes.clip_changes import with_merge, with_reference, with_split
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
-from app.document.stored_document import document_of, plain_document
+from app.document.storing.stored_document import document_of, plain_document
 from app.project.clip_names import clip_name
 from engine.errors import ProjectError
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.document.document_file import BACKUP_FILE, MAX_DOCUMENT_BYTES, read_document, write_document
 from app.document.project_document import (
     Label,
     Marker,
@@ -17,11 +16,13 @@ from app.document.project_document import (
     World,
 )
 from app.document.project_settings import ProjectSettings
-from app.document.stored_document import plain_document
-from app.project.project import create_project, open_project
+from app.document.storing.document_file import BACKUP_FILE, MAX_DOCUMENT_BYTES, read_document, write_document
+from app.document.storing.stored_document import plain_document
+from app.project.project_access import create_project, open_project
 from engine.camera.path_presets import turntable
 from engine.capture.exclusions import ExcludedFrames, Exclusions, PaintedMask, Stroke
-from engine.editing.edit import Box, Delete, Edit, Expose, Picked, PickedRows, Scope, Sphere, Transform
+from engine.editing.actions import Delete, Expose, Transform
+from engine.editing.edit import Box, Edit, Picked, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
 from engine.errors import ProjectError
 from engine.gate.regions import parse_region

@@ -3,17 +3,19 @@
 import os
 import random
 import shutil
+import threading
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from app.document import document_store
-from app.document.document_store import DocumentStore
 from app.document.history import Changed, DocumentHistory, Event, Placed, Redone, Undone
-from app.document.journal_file import read_journal
 from app.document.project_document import Marker
-from app.document.replay import journal_path, journal_steps
+from app.document.storing import document_store, journal_file
+from app.document.storing.document_store import DocumentStore
+from app.document.storing.journal_file import read_journal
+from app.document.storing.kept_json import KeptText
+from app.document.storing.replay import journal_path, journal_steps
 from engine.errors import DiskError, ProjectError
 from tests.app.document.documents import EMPTY, as_bytes, random_events
 
@@ -191,12 +193,15 @@ def test_a_journal_that_breaks_off_costs_the_last_step_and_says_so(tmp_path: Pat
     path = journal_path(tmp_path / "p", 0)
     data = path.read_bytes()
     known = read_journal(path)[0]
-    for cut in range(known.ends[2] + 1, len(data)):
+    for cut in range(known.ends[0], len(data)):
         path.write_bytes(data[:cut])
         store = DocumentStore(tmp_path / "p")
         n_whole = sum(end <= cut for end in known.ends) - 1
         same(store.read(), states[n_whole])
-        assert "breaks off" in store.notes[0]
+        n_missing = len(states) - 1 - n_whole
+        said = f"{n_missing} later steps were" if n_missing > 1 else "1 later step was" if n_missing else "not written"
+        assert store.notes[0].startswith(f"The journal breaks off after step {n_whole}: ")
+        assert said in store.notes[0]
     assert len(states) == 5
     history = happen(store, store.read(), marked(states[4], 77))
     again = DocumentStore(tmp_path / "p")
@@ -211,10 +216,10 @@ def test_any_other_damage_of_the_journal_is_named_with_its_line(tmp_path: Path) 
     path = journal_path(tmp_path, 0)
     lines = path.read_bytes().splitlines(keepends=True)
     for broken, number in (
-        ([lines[0], lines[1], *lines[3:]], 3),
-        ([*lines[:2], lines[2].replace(b"mark", b"mork"), *lines[3:]], 3),
-        ([*lines[:2], lines[3], lines[2], *lines[4:]], 3),
-        ([*lines, lines[1]], 7),
+        ([*lines[:3], *lines[4:]], 4),
+        ([*lines[:3], lines[3].replace(b"mark", b"mork"), *lines[4:]], 4),
+        ([*lines[:3], lines[4], lines[3], *lines[5:]], 4),
+        ([*lines, lines[2]], 8),
         ([b"", *lines[1:]], 1),
     ):
         path.write_bytes(b"".join(broken))
@@ -222,6 +227,95 @@ def test_any_other_damage_of_the_journal_is_named_with_its_line(tmp_path: Path) 
             DocumentStore(tmp_path).read()
         assert "clipgstream repair" in caught.value.hint
         assert caught.value.path == path
+
+
+def test_no_step_waits_while_the_document_is_written_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(document_store, "MAX_EVENTS", 3)
+    may_write = threading.Event()
+    write = document_store.write_document_text
+
+    def slowly(folder: Path, text: KeptText, **options: bool) -> None:
+        assert may_write.wait(60.0)
+        write(folder, text, **options)
+
+    store, history = made(tmp_path / "p")
+    monkeypatch.setattr(document_store, "write_document_text", slowly)
+    try:
+        for frame in range(8):  # the disk is still at work on the document of step 3
+            history = happen(store, history, marked(history, frame))
+            kept = DocumentStore(tmp_path / "p")
+            same(kept.read(), history)
+            assert (kept.notes, kept.n_replayed) == ((), frame + 1)
+        shutil.copytree(tmp_path / "p", tmp_path / "killed")
+    finally:
+        may_write.set()
+    store.compact()
+    again = DocumentStore(tmp_path / "p")
+    same(again.read(), history)
+    assert (again.notes, again.n_replayed) == ((), 0)
+    killed = DocumentStore(tmp_path / "killed")
+    history = happen(killed, killed.read(), marked(history, 99))
+    killed.compact()
+    again = DocumentStore(tmp_path / "killed")
+    same(again.read(), history)
+    assert (again.notes, again.n_replayed) == ((), 0)
+
+
+def test_a_document_that_cannot_be_written_anew_stays_in_the_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(document_store, "MAX_EVENTS", 3)
+    store, history = made(tmp_path)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(document_store, "write_document_text", refuse)
+    for frame in range(6):
+        history = happen(store, history, marked(history, frame))
+    same(DocumentStore(tmp_path).read(), history)
+    monkeypatch.undo()
+    store.compact()  # no step has come since the last file of the journal began
+    again = DocumentStore(tmp_path)
+    same(again.read(), history)
+    assert (again.notes, again.n_replayed) == ((), 0)
+    history = happen(again, history, marked(history, 7))
+    same(DocumentStore(tmp_path).read(), history)
+
+
+def test_a_journal_of_an_earlier_version_goes_on_and_counts_nothing(tmp_path: Path) -> None:
+    store, history = made(tmp_path / "p")
+    path = journal_path(tmp_path / "p", 0)
+    known = read_journal(path)[0]
+    first, link = journal_file._line({"journal": 1, "step": 0, "document": known.document, "after": ""})
+    path.write_bytes(first + journal_file._last(0, link))
+    store = DocumentStore(tmp_path / "p")
+    history = store.read()
+    for frame in range(3):
+        history = happen(store, history, marked(history, frame))
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert len(lines) == 5
+    again = DocumentStore(tmp_path / "p")
+    same(again.read(), history)
+    assert again.notes == ()
+    path.write_bytes(b"".join(lines[:2]))
+    again.read()
+    assert "breaks off after step 1" in again.notes[0]
+    assert "not known how many" in again.notes[0]
+
+
+def test_a_damaged_count_costs_nothing(tmp_path: Path) -> None:
+    store, history = made(tmp_path / "p")
+    history = happen(store, history, marked(history, 1))
+    path = journal_path(tmp_path / "p", 0)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join([lines[0], b"{}\n", *lines[2:]]))
+    again = DocumentStore(tmp_path / "p")
+    same(again.read(), history)
+    assert again.notes == ()
+    history = happen(again, history, marked(history, 2))  # into a new file
+    same(DocumentStore(tmp_path / "p").read(), history)
+    assert path.exists() is False
 
 
 def test_a_missing_file_of_the_journal_is_noticed(tmp_path: Path) -> None:

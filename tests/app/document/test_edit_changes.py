@@ -7,24 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from app.document import edit_changes as change
+from app.document.changes import edit_changes as change
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
-from app.document.stored_document import document_of, plain_document
-from engine.editing.edit import (
-    Box,
-    Delete,
-    Everything,
-    Expose,
-    Hide,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Transform,
-)
+from app.document.storing.stored_document import document_of, plain_document
+from engine.editing.actions import Delete, Expose, Hide, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Everything, Picked, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
 from engine.errors import ProjectError
 

@@ -5,26 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.document.edit_words import edit_title, scope_text, what_text
+from app.document.changes.edit_words import edit_title, scope_text, what_text
 from engine.capture.clip import split_clips
-from engine.editing.edit import (
-    Action,
-    Box,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Target,
-    Transform,
-)
+from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
 from engine.editing.picks import pack_rows
 
 BOX, SPHERE = Box((0.0, 0.0, 0.0), (0.4, 0.25, 0.6)), Sphere((1.0, 0.0, 0.0), 0.5)

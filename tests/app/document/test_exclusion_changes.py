@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.document.exclusion_changes import (
+from app.document.changes.exclusion_changes import (
     with_cameras_excluded,
     with_frames_excluded,
     with_stroke,
@@ -13,7 +13,7 @@ from app.document.exclusion_changes import (
 )
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
-from app.document.stored_document import document_of, plain_document
+from app.document.storing.stored_document import document_of, plain_document
 from engine.capture.exclusions import NOTHING_EXCLUDED, ExcludedFrames, Stroke, exclusion_key
 from engine.errors import ProjectError
 

@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from app.document import note_changes as notes
-from app.document import world_changes as world
+from app.document.changes import note_changes as notes
+from app.document.changes import world_changes as world
 from app.document.project_document import Label, Marker, ProjectDocument
 from app.document.project_settings import ProjectSettings
-from app.document.stored_document import document_of, plain_document
+from app.document.storing.stored_document import document_of, plain_document
 from engine.errors import ProjectError
 
 EMPTY = ProjectDocument(ProjectSettings("capture", "fingerprint"))

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import structs
 
-from app.document.document_patch import document_difference, document_with
-from app.document.plain_patch import PatchError, difference, patched
+from app.document.storing.document_patch import document_difference, document_with
+from app.document.storing.plain_patch import PatchError, difference, patched
 from engine.editing.edit import Edit
 from engine.errors import ProjectError
 from tests.app.document.documents import EMPTY, as_bytes, picked_edit, random_events

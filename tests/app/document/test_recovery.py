@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from app.cli.cli import main
-from app.document.document_store import DocumentStore
 from app.document.history import DocumentHistory
-from app.document.journal_file import read_journal
-from app.document.recovery import look_for_recovery, plain_history, recover
-from app.document.replay import journal_path, journal_steps
-from app.project.project import create_project, open_project, repair_project
+from app.document.storing.document_store import DocumentStore
+from app.document.storing.journal_file import read_journal
+from app.document.storing.recovery import look_for_recovery, plain_history, recover
+from app.document.storing.replay import journal_path, journal_steps
+from app.project.project_access import create_project, open_project, repair_project
 from engine.errors import ProjectError
 from tests.app.document.documents import EMPTY, SETTINGS, as_bytes, random_events
 
@@ -39,7 +39,7 @@ def test_a_line_in_the_middle_costs_what_follows_it(tmp_path: Path) -> None:
     states = edited(tmp_path)
     path = journal_path(tmp_path, 20)
     lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"".join([*lines[:5], lines[5].replace(b'"', b"'", 1), *lines[6:]]))
+    path.write_bytes(b"".join([*lines[:6], lines[6].replace(b'"', b"'", 1), *lines[7:]]))
     found = look_for_recovery(tmp_path)
     assert found is not None
     assert (found.step, found.n_replayed, found.plain_step, found.is_from_backup) == (24, 4, 20, False)
@@ -77,7 +77,7 @@ def test_a_repair_that_does_not_end_can_be_done_again(tmp_path: Path, monkeypatc
         raise OSError(28, "No space left on device")
 
     for name in ("write_history", "write_document_text", "create_journal"):
-        monkeypatch.setattr(f"app.document.document_store.{name}", refuse)
+        monkeypatch.setattr(f"app.document.storing.document_store.{name}", refuse)
         with pytest.raises(ProjectError, match="No space left"):
             recover(tmp_path)
         monkeypatch.undo()
@@ -117,7 +117,7 @@ def test_the_command_line_says_what_is_left_and_repairs_on_request(
     path.write_bytes(data)
     assert main(["gate", str(tmp_path)]) == 2
     said = capsys.readouterr().err
-    assert "Line 5 is damaged" in said
+    assert "Line 6 is damaged" in said
     assert f"clipgstream repair {tmp_path}" in said
     assert main(["repair", str(tmp_path)]) == 2
     assert "up to step 23" in capsys.readouterr().out
@@ -127,3 +127,25 @@ def test_the_command_line_says_what_is_left_and_repairs_on_request(
     assert as_bytes(project.document) == as_bytes(states[23].present)
     project.close()
     assert main(["repair", str(tmp_path / "nowhere")]) == 2
+
+
+@pytest.mark.parametrize("command", ["repair", "gate"])
+def test_a_journal_that_was_cut_off_is_said_by_every_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    edited(tmp_path)
+    path = journal_path(tmp_path, 20)
+    n_steps = len(read_journal(path)[0].rows)
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:4]))
+    assert main([command, str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    assert f"breaks off after step 22: {n_steps - 2} later steps were kept and are missing" in said.out + said.err
+    assert "whole" not in said.out
+
+
+def test_a_damaged_history_is_said_on_the_command_line_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    edited(tmp_path)
+    (tmp_path / "history.json").write_text("{")
+    assert main(["gate", str(tmp_path), "--forget"]) == 0
+    said = capsys.readouterr().err
+    assert said.count("cannot be taken back") == 1

@@ -18,10 +18,11 @@ from app.cli.cli import main
 from app.evaluation.evaluation import ClipMeasuring, evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.kept_figures import KeptFigures
-from app.project.project import open_project
+from app.project.project_access import open_project
 from engine.metrics.clips.seams import PairRow
 from engine.metrics.clips.summary import EvalRow
 from engine.metrics.columns import COLUMNS
+from engine.storage.json_files import checked_line
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import change_header, train
 
@@ -138,6 +139,25 @@ def test_a_line_that_was_cut_off_spoils_no_other(project):
     n_lines = len(path.read_bytes().splitlines())
     assert evaluate(project, "--quiet") == whole
     assert len(path.read_bytes().splitlines()) == n_lines  # all of it is there now
+
+
+def test_files_of_versions_that_kept_optical_flow_and_lpips_are_read(project, capsys):
+    whole = evaluate(project, "--quiet")
+    for path in (project / "evaluations").iterdir():
+        header, *lines = (json.loads(line) for line in path.read_text().splitlines())
+        header |= {"holdout": ["0"], "lpips": False}
+        for line in lines:
+            if "pair" in line:
+                line["pair"]["tof"] = 0.5
+            else:
+                line["row"]["figures"] |= dict.fromkeys(("lpips", "lpips_fit", "lpips_unscaled"))
+                line["row"]["missing"] |= {"lpips": "the package lpips is not installed"}
+        entries = [{key: value for key, value in line.items() if key != "checksum"} for line in (header, *lines)]
+        path.write_text("".join(map(checked_line, entries)))
+    before = lines_of(project)
+    assert evaluate(project) == whole
+    assert "24/24" in capsys.readouterr().err
+    assert lines_of(project) == before
 
 
 def test_another_version_of_a_clip_or_of_its_reference_is_measured_again(project, capsys):

@@ -21,33 +21,18 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.export.export_progress import ExportProgress
 from app.export.gaussians_job import GaussiansJob
 from app.export.gaussians_job import run as export_gaussians
+from app.export.jobs.video import VideoJob
 from app.export.player_job import PlayerJob
 from app.export.player_job import run as export_player
-from app.export.video.job import VideoJob
 from app.export.video.render import render_video
 from app.playback.frame_decoder import ShownFrame
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.project.opened_project import opened_project
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.training.service import ShownState
-from engine.editing.edit import (
-    Action,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Target,
-    Transform,
-)
+from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
 from engine.editing.picks import pack_rows
 from engine.export.formats.table import FORMATS
 from tests.app.stored_project import copy_stored
@@ -252,7 +237,7 @@ def test_renders_show_it_in_its_frames_alone(name: str, opened: TrainedProject, 
     for has_edits in (False, True):
         out = tmp_path / f"pictures{has_edits}"
         camera = opened.capture.rig.names[2]
-        render_video(VideoJob(out, "png", camera=camera, frames=(0, 6), has_edits=has_edits), opened)
+        render_video(VideoJob(out, "png", camera=camera, frames=range(0, 6), has_edits=has_edits), opened)
         pictures.append(contents(out))
     assert in_scope([one != other for one, other in zip(*pictures, strict=True)], name)
 
@@ -261,7 +246,7 @@ def test_renders_show_it_in_its_frames_alone(name: str, opened: TrainedProject, 
 def test_videos_show_it_in_its_frames_alone(format_name: str, opened: TrainedProject, tmp_path: Path) -> None:
     give(opened, Edit(1, "", Everything(), Delete(), SCOPE))
     out = tmp_path / f"film.{format_name}"
-    render_video(VideoJob(out, format_name, camera=opened.capture.rig.names[2], frames=(0, 6)), opened)
+    render_video(VideoJob(out, format_name, camera=opened.capture.rig.names[2], frames=range(0, 6)), opened)
     with av.open(str(out)) as container:
         brightness = [float(frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)]
     assert in_scope([value < 20.0 for value in brightness])
@@ -270,7 +255,7 @@ def test_videos_show_it_in_its_frames_alone(format_name: str, opened: TrainedPro
 def test_a_moment_between_two_frames_belongs_to_the_one_before(opened: TrainedProject, tmp_path: Path) -> None:
     """At the seam between two clips, too, where the pictures of both are mixed."""
     give(opened, Edit(1, "", Everything(), Delete(), Scope(2, 3)))
-    job = VideoJob(tmp_path / "slow", "png", camera=opened.capture.rig.names[2], frames=(0, 6), speed=0.5)
+    job = VideoJob(tmp_path / "slow", "png", camera=opened.capture.rig.names[2], frames=range(0, 6), speed=0.5)
     render_video(job, opened)
     sizes = [len(data) for data in contents(tmp_path / "slow")]
     assert [size < 0.2 * max(sizes) for size in sizes] == [number in (4, 5) for number in range(len(sizes))]

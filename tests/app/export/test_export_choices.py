@@ -30,8 +30,13 @@ def test_answers_belong_to_a_kind_and_survive_a_file():
     kept = msgspec.json.decode(msgspec.json.encode(choices), type=ExportChoices)
     assert kept == choices
     assert hash(kept) == hash(choices)
-    with pytest.raises(msgspec.ValidationError):
-        msgspec.convert({"step": 0}, ExportChoices)
+
+
+def test_frames_that_are_left_out_belong_to_a_kind_too():
+    choices = ExportChoices(kind="gaussians").with_step(5)
+    assert (choices.step, choices.changed(kind="player").step) == (5, 1)
+    assert [choices.with_step(step).step for step in (0, 7, 10**9)] == [1, 7, 100_000]
+    assert choices.with_answer("step", "many").step == 1
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from app.export.export_process import ExportProcess
 from app.export.export_progress import ExportProgress
 from app.export.export_worker import Wanted
 from app.export.metrics_job import MetricsJob
-from app.project.project import open_project
+from app.project.project_access import open_project
 from engine.storage.files import PARTIAL_PREFIX
 
 DEADLINE_S = 120.0
@@ -34,7 +34,7 @@ def start(project: Path, tmp_path: Path) -> Iterator[Start]:
     def begin(**entries: Any) -> ExportProcess:
         settings = open_project(project, is_writable=False).settings
         out = entries.pop("out", tmp_path / "out" / "m.csv")
-        task = ExportTask("metrics", MetricsJob(out), str(project), settings.capture, 1.0, None, False, 1)
+        task = ExportTask(MetricsJob(out), str(project), settings.capture, 1.0, None, False, 1)
         processes.append(ExportProcess(task, **entries))
         return processes[-1]
 

@@ -45,7 +45,7 @@ class Bench:
         return self.started[-1]
 
     def add(self, name: str) -> int:
-        task = ExportTask("metrics", MetricsJob(Path("/out") / name), "/p", "/c", 1.0, None, False)
+        task = ExportTask(MetricsJob(Path("/out") / name), "/p", "/c", 1.0, None, False)
         return self.queue.add(task, name)
 
     def say(self, *events: Event) -> list[str]:
@@ -139,7 +139,7 @@ def test_one_that_waits_never_begins_once_it_is_cancelled(bench: Bench):
     assert bench.listed == [("a", "cancelled")]
     bench.queue.cancel(a)
     bench.queue.cancel(99)
-    bench.queue.clear()
+    bench.queue.remove(a)
     assert bench.listed == []
 
 

@@ -7,20 +7,21 @@ import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
-from app.document import world_changes
+from app.document.changes import world_changes
 from app.evaluation.headless import TrainedProject, open_trained
 from app.export import gaussian_sequence, gaussians_job, read_back
 from app.export.export_progress import ExportCancelled, ExportProgress
 from app.export.gaussian_files import GaussianFile, base_name, moment_files, static_file
 from app.export.gaussians_job import GaussiansJob, estimate, run
 from app.export.scene_frames import Part, SceneFrames
-from app.project.project import open_project
+from app.project.project_access import open_project
 from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.splats import Splats
@@ -93,6 +94,24 @@ def test_a_scene_that_is_turned_and_scaled_still_measures_well(opened: TrainedPr
     np.testing.assert_allclose(found.scales, 3 * live.scales, rtol=1e-4)
 
 
+def test_full_fields_are_read_back_and_measured_as_others(opened: TrainedProject, tmp_path: Path):
+    job = GaussiansJob(tmp_path / "out", frames=range(2, 3), fields="full")
+    result = run(opened, job, quiet)
+    assert (result.psnr_db or 0) > 60
+    path = tmp_path / "out" / "p.ply"
+    assert b"property float f_rest_44\n" in path.read_bytes()[:4096]
+    live = Splats.of(SceneFrames(opened).gaussians(2))
+    np.testing.assert_array_equal(read(path, "ply").means, live.means)
+    assert sidecar(tmp_path / "out")["settings"]["fields"] == "full"
+    usual = estimate(opened, GaussiansJob(tmp_path / "o", frames=range(2, 3)))
+    assert estimate(opened, job).n_bytes == pytest.approx(usual.n_bytes * 248 / 56)
+    wrongs: tuple[dict[str, Any], ...] = ({"format": "spz", "fields": "full"}, {"fields": "all"})
+    for wrong in wrongs:
+        with pytest.raises(ProjectError, match="ields"):
+            run(opened, GaussiansJob(tmp_path / "x", **wrong), quiet)
+    assert not (tmp_path / "x").exists()
+
+
 def test_parts_are_the_whole(opened: TrainedProject, tmp_path: Path):
     run(opened, GaussiansJob(tmp_path / "split", "ply", range(3), part="split"), quiet)
     assert names(tmp_path / "split") == [
@@ -144,7 +163,7 @@ def test_names_are_those_of_sequences():
 
 def test_a_project_with_another_name_gives_it_to_its_files(project: Path, tmp_path: Path):
     from app.evaluation.headless import open_trained
-    from app.project.project import open_project
+    from app.project.project_access import open_project
 
     renamed = project.rename(tmp_path / "Tänzer 数 100%s {x}")
     opened = open_trained(open_project(renamed, is_writable=False))
@@ -271,21 +290,21 @@ def test_untrained_clips_are_named_before_anything_is_made(opened: TrainedProjec
     [
         ({"frames": range(4, 9)}, "There is no frame 6; the capture has frames 0 to 5"),
         ({"frames": range(0)}, "no frames"),
-        ({"format": "obj"}, "no format 'obj'"),
-        ({"up": "up"}, "no axis 'up'"),
-        ({"scale": 0.0}, "The scale is 0"),
-        ({"scale": float("nan")}, "The scale is nan"),
-        ({"scale": 1e30}, r"The scale is 1e\+30"),
+        ({"format": "obj"}, "Format is 'obj'; it has to be 'ply'"),
+        ({"up": "up"}, "Up axis is 'up'"),
+        ({"scale": 0.0}, "Scale is 0.0"),
+        ({"scale": float("nan")}, "Scale is nan"),
+        ({"scale": 1e30}, r"Scale is 1e\+30"),
         ({"format": "spz", "scale": 1e6}, None),
     ],
 )
 def test_bad_input_is_an_error_in_words(opened: TrainedProject, tmp_path: Path, change: dict, said: str | None):
-    job = replace(GaussiansJob(tmp_path / "out"), **change)
     if said is None:
+        job = GaussiansJob(tmp_path / "out", **change)
         assert any("larger than 379" in line for line in run(opened, job, quiet).lines)
         return
     with pytest.raises(ProjectError, match=said):
-        run(opened, job, quiet)
+        run(opened, GaussiansJob(tmp_path / "out", **change), quiet)
     assert not (tmp_path / "out").exists()
 
 
@@ -347,5 +366,5 @@ def test_up_and_scale_are_those_of_the_project_unless_others_are_asked_for(proje
     assert estimate(opened, job).lines == ("Coordinates: turned so that +z is up, 0.25 units per unit of the capture.",)
     run(opened, job, quiet)
     assert sidecar(tmp_path / "out")["up"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
-    other = replace(job, out=tmp_path / "other", scale=2.0, scene_up=(0.0, 1.0, 0.0))
+    other = structs.replace(job, out=tmp_path / "other", scale=2.0, scene_up=(0.0, 1.0, 0.0))
     assert "2 units per unit" in estimate(opened, other).lines[0]

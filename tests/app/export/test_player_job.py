@@ -17,7 +17,7 @@ from app.export.export_progress import ExportCancelled, ExportProgress
 from app.export.player_job import PlayerJob, estimate, run
 from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
-from app.playback.orbit_view import OrbitView
+from app.playback.views.orbit_view import OrbitView
 from engine.conventions import ALPHA_MIN
 from engine.errors import EngineError, ProjectError
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -46,6 +47,19 @@ def test_what_fails_leaves_nothing(tmp_path: Path, error: BaseException):
     assert names(tmp_path) == []
 
 
+def test_what_killed_programs_left_of_the_same_export_goes(tmp_path: Path):
+    dead, alive = 999_999_999, os.getppid()
+    (tmp_path / f".partial-{dead}-b").mkdir()
+    (tmp_path / f".partial-{dead}-b" / "x").write_text("x")
+    for name in (f".partial-{dead}-a.ply", f".partial-{dead}-other.ply", f".partial-{alive}-a.ply"):
+        (tmp_path / name).write_text("x")
+    with staged_file(tmp_path / "a.ply") as partial:
+        partial.write_text("a")
+    with staged_folder(tmp_path / "b") as folder:
+        (folder / "b").write_text("b")
+    assert names(tmp_path) == [f".partial-{alive}-a.ply", f".partial-{dead}-other.ply", "a.ply", "b"]
+
+
 def fill_meanwhile(path: Path) -> None:
     with staged_folder(path) as partial:
         (partial / "x").write_text("x")
@@ -81,12 +95,36 @@ def test_targets_are_refused_before_work_starts(tmp_path: Path, monkeypatch: pyt
 
 def test_too_little_room_is_said_before_work_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     class Usage:
-        free = 50 << 20
+        free, total = 50 << 20, 1 << 30
 
     monkeypatch.setattr(staging.shutil, "disk_usage", lambda _: Usage)
     check_target(tmp_path / "a.ply", n_bytes=30_000_000)
     with pytest.raises(ProjectError, match="About 40 MB are to be written, but only 52 MB are free"):
         check_target(tmp_path / "a.ply", n_bytes=40_000_000)
+
+
+def test_a_table_needs_little_room_and_little_room_is_told_in_kilobytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    class Usage:
+        free, total = 600_000, 1 << 30
+
+    monkeypatch.setattr(staging.shutil, "disk_usage", lambda _: Usage)
+    check_target(tmp_path / "a.csv", n_bytes=30_000)
+    with pytest.raises(ProjectError, match="About 400 kB are to be written, but only 600 kB are free"):
+        check_target(tmp_path / "a.csv", n_bytes=400_000)
+    Usage.free = 100_000
+    with pytest.raises(ProjectError, match="262 kB have to be free, but only 100 kB are free"):
+        check_target(tmp_path / "a.csv")
+
+
+def test_a_file_system_without_room_for_files_is_told_from_a_full_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    class Usage:
+        free = total = 0
+
+    monkeypatch.setattr(staging.shutil, "disk_usage", lambda _: Usage)
+    with pytest.raises(ProjectError, match="holds no files of users"):
+        check_target(tmp_path / "a.csv", n_bytes=30_000)
 
 
 def test_nothing_is_written_into_what_is_exported(opened: TrainedProject):

@@ -98,14 +98,14 @@ def test_peak_memory_sees_what_a_call_allocates():
     assert 60 < found < 80
 
 
-def prepare_nothing_good():
+def prepare_nothing_good(_: int):
     """Imported by the process that measures; dies there."""
     raise SystemExit(3)
 
 
 @pytest.mark.slow
 def test_peak_memory_of_a_process_that_dies_is_none():
-    assert peak_extra_mb(prepare_nothing_good) is None
+    assert peak_extra_mb(prepare_nothing_good, 0) is None
 
 
 # ---------------------------------------------------------------- rows
@@ -220,8 +220,8 @@ def skewed(tensor: torch.Tensor) -> torch.Tensor:
 class HastyAdam(CpuAdam):
     """Learns one percent too fast."""
 
-    def update(self, gradients: Any, rates: Any, scale: float) -> None:
-        super().update(gradients, {name: 1.01 * rate for name, rate in rates.items()}, scale)
+    def step(self, gradients: Any, rates: Any, **options: Any) -> torch.Tensor:
+        return super().step(gradients, {name: 1.01 * rate for name, rate in rates.items()}, **options)
 
 
 class WrongBackend(CpuBackend):

@@ -55,7 +55,7 @@ def source(state: ClipState, *, adapted: bool = False) -> tuple[ClipModel, ClipS
         field=field,
         clip_length=CLIP_LENGTH,
         n_frames=CLIP_LENGTH,
-        backend=backend_called(),
+        backend=backend_called("cpu"),
     ).requires_grad_(requires_grad=False)
     header = make_header(role="source", clip_index=1, reference_fingerprint=state.header.fingerprint, spacing=0.2)
     return model, ClipState({}, header)

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.playback.arrays import AnchorArrays, GaussianArrays
 from app.playback.frame_decoder import ShownFrame
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays
+from app.playback.modes.view_modes import ALL, ShownAs
 from app.playback.picture_source import PictureSource
 from app.playback.render import Look, RenderRequest
-from app.playback.view_modes import ALL, ShownAs
+from app.playback.views.orbit_view import OrbitView
 from engine.clip_files.roles import ROLES
 from engine.raster.pinhole_view import PinholeView
 from tests.ui.fake_session import make_rig

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from app.playback.ahead import MOST_UNASKED, Ahead
-from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.views.orbit_view import OrbitView
 from app.project.opened_project import OpenedProject
 from app.training.service import ShownState
 from tests.app.fakes import write_trained
@@ -97,6 +97,42 @@ def test_another_view_or_state_has_nothing_ready(screen: Screen):
 def test_a_snapshot_is_not_decoded_ahead_while_it_stands(screen: Screen):
     screen.states[1] = ShownState(screen.states[1].file, "live", is_live=True)
     assert screen.turns() == [(0, 3)]
+
+
+def test_around_a_seam_every_frame_is_loaded_before_it_plays(screen: Screen):
+    timeline, playback = screen.timeline, screen.playback
+    timeline.toggle_around()
+    assert (timeline.around, timeline.plays_every_frame) == ((0, 5), True)
+    seen = []
+    for _ in range(8):
+        screen.turn(size=FULL)
+        seen.append(playback.loading)
+    assert seen[0] is not None
+    assert seen[0] < (6, 6)
+    assert [n for n in seen if n is not None] == sorted(n for n in seen if n is not None)
+    assert seen[-1] is None, "all are there"
+    assert playback.cached_frames() == [(0, 6)]
+    screen.view.orbit(10.0, 0.0)
+    screen.turn(size=FULL)
+    assert playback.loading is None, "another view does not hold up what plays already"
+    timeline.toggle_around()
+    screen.turn(size=FULL)
+    screen.view.orbit(10.0, 0.0)
+    timeline.toggle_around()
+    screen.turn(size=FULL)
+    assert playback.loading is not None, "of this view frames are missing"
+    timeline.toggle_every_frame()
+    screen.turn(size=FULL)
+    assert playback.loading is None, "who leaves frames out need not wait"
+    assert not timeline.is_every_frame
+
+
+def test_a_seam_of_which_a_clip_is_damaged_still_plays(screen: Screen):
+    screen.states[1].file.write_bytes(b"not a clip")
+    screen.timeline.toggle_around()
+    for _ in range(8):
+        screen.turn(size=FULL)
+    assert screen.playback.loading is None
 
 
 def test_what_is_asked_is_not_held_up_by_what_fails_ahead(screen: Screen):

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from app.playback.capture_pictures import CapturedPictures, downsized
-from app.playback.hatching import DARK, LIGHT
+from app.playback.modes.hatching import DARK, LIGHT
 from app.playback.picture_source import PictureSource
 from engine.capture.capture import Capture, open_capture
 from engine.images.exposure_curve import to_reference

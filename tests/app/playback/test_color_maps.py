@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.playback.color_maps import COLOR_MAPS, SIGNED, mapped
+from app.playback.modes.color_maps import COLOR_MAPS, SIGNED, mapped
 
 # Linear RGB as seen without the long, the middle and the short cones, after Machado, Oliveira and Fernandes, 2009.
 BLINDNESS = {

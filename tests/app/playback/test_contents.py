@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from app.playback.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE, ClipParts, part_of
-from app.playback.view_modes import CONTENTS
+from app.playback.modes.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE, ClipParts, part_of
+from app.playback.modes.view_modes import CONTENTS
 from engine.clip_files.clip_state import ClipState
 from engine.model.clip_model import ClipModel
 from tests.app.playback.clip_models import CLIP, reference, source

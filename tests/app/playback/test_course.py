@@ -7,7 +7,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.playback.course import Course
+from app.playback.prefetch_order import Course
 from app.playback.timeline import Timeline
 from engine.capture.clip import split_clips
 

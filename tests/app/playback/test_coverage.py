@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.playback.arrays import AnchorArrays
-from app.playback.coverage import CoverageRequest, coverage_of
+from app.playback.modes.arrays import AnchorArrays
+from app.playback.modes.coverage import CoverageRequest, coverage_of
 from engine.clip_files.roles import ROLES
 
 

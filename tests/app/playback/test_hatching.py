@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.playback.hatching import DARK, LIGHT, hatched
+from app.playback.modes.hatching import DARK, LIGHT, hatched
 
 
 def test_it_leaves_what_is_seen_and_covers_the_rest_with_lines() -> None:

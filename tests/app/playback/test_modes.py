@@ -7,20 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.playback import hues
-from app.playback.arrays import BACKGROUND
-from app.playback.color_maps import COLOR_MAPS
 from app.playback.frame_decoder import ShownFrame
-from app.playback.mode_arrays import MAX_KEPT, ModeArrays, drawn_arrays
-from app.playback.mode_pictures import mode_picture, normals_of
-from app.playback.orbit_view import OrbitView
-from app.playback.render import _gaussians, render
-from app.playback.view_modes import BIRTH_HUES, CONTENTS, MODES, ShownAs, decoded_as, range_of
+from app.playback.modes import hues
+from app.playback.modes.arrays import BACKGROUND
+from app.playback.modes.color_maps import COLOR_MAPS
+from app.playback.modes.mode_arrays import MAX_KEPT, ModeArrays, drawn_arrays
+from app.playback.modes.mode_pictures import mode_picture, normals_of
+from app.playback.modes.view_modes import BIRTH_HUES, CONTENTS, MODES, ShownAs, decoded_as, range_of
+from app.playback.render import Picture, RenderRequest, _gaussians
+from app.playback.render import render as render_by
+from app.playback.views.orbit_view import OrbitView
+from engine.backends.table import backend_called
 from tests.app.playback.mode_scenes import AHEAD, SIZE, only, pinhole, request, scene, view
 from tests.golden_images import assert_matches_golden
 from tests.ui.fake_session import make_rig
 
 NOTHING = np.round(np.array(BACKGROUND) * 255).astype(int)
+CPU = backend_called("cpu")
+
+
+def render(request: RenderRequest) -> Picture:
+    return render_by(request, CPU)
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +194,9 @@ def test_ranges_follow_the_rig_and_nothing_else() -> None:
 
 def test_a_mode_that_is_no_picture_of_numbers_is_refused(shown: ShownFrame) -> None:
     with pytest.raises(ValueError, match="'birth' is not a mode"):
-        mode_picture("birth", _gaussians(shown.gaussians, request(shown, "color").look), pinhole(view()), (0.0, 1.0))
+        mode_picture(
+            "birth", _gaussians(shown.gaussians, request(shown, "color").look), pinhole(view()), (0.0, 1.0), backend=CPU
+        )
 
 
 def test_labels_name_everything_that_is_not_as_usual() -> None:

@@ -7,16 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.playback.arrays import AnchorArrays, GaussianArrays, Picture
 from app.playback.frame_decoder import ShownFrame
-from app.playback.orbit_view import FLAT_REACH, OrbitView
-from app.playback.pointing import pixel_ray, point_beside, seen_point
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture
+from app.playback.modes.view_modes import ShownAs
 from app.playback.render import Look, RenderRequest, render
-from app.playback.scene_axes import AXIS_VIEWS, UP_AXES, axis_rotation, rig_radius, scene_axes, view_from
-from app.playback.view_angles import angles_of, rotation_of
-from app.playback.view_modes import ShownAs
-from app.playback.view_motion import EASE_S, LONGEST_STEP_S
-from app.playback.view_place import ViewPlace
+from app.playback.views.orbit_view import FLAT_REACH, OrbitView
+from app.playback.views.pointing import pixel_ray, point_beside, seen_point
+from app.playback.views.scene_axes import AXIS_VIEWS, UP_AXES, axis_rotation, rig_radius, scene_axes, view_from
+from app.playback.views.view_angles import angles_of, rotation_of
+from app.playback.views.view_motion import EASE_S, LONGEST_STEP_S
+from app.playback.views.view_place import ViewPlace
+from engine.backends.table import backend_called
 from engine.camera.rig import CameraRig
 from tests.app.playback.test_orbit_view import make_rig, project
 from tests.app.playback.test_pointing import gaussians as gaussians_at
@@ -353,7 +354,9 @@ def drawn(view: OrbitView, gaussians: GaussianArrays, mode: str = "color") -> Pi
     """The rasterizer's picture, 64 x 48."""
     anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="none")
     look = Look.of(view, 64, 48, shown_as=ShownAs(mode))
-    return render(RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(gaussians, anchors)))
+    return render(
+        RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(gaussians, anchors)), backend_called("cpu")
+    )
 
 
 def true_orthographic(view: OrbitView, points: np.ndarray, width: int, height: int) -> np.ndarray:

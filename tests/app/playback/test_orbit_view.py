@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.playback.orbit_view import OrbitView
+from app.playback.views.orbit_view import OrbitView
 from engine.camera.rig import CameraRig
 from tests.app.fakes import look_at, ring
 

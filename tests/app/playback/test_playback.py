@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.playback.arrays import Picture
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import Picture
+from app.playback.modes.view_modes import ShownAs
 from app.playback.picture_source import PictureSource
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.playback.view_modes import ShownAs
+from app.playback.views.orbit_view import OrbitView
 from app.project.opened_project import OpenedProject
 from app.training.service import ShownState
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from app.playback.arrays import GaussianArrays
-from app.playback.pointing import pixel_ray, seen_point
+from app.playback.modes.arrays import GaussianArrays
+from app.playback.views.pointing import pixel_ray, seen_point
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, rasterize
 

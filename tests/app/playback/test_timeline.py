@@ -90,6 +90,21 @@ def test_playing_every_frame_waits_for_each_picture_and_does_not_catch_up():
     assert timeline.frame_index <= 6  # what was lost is not made up for in a hurry
 
 
+def test_around_a_seam_no_frame_is_left_out_unless_the_user_wants_that():
+    timeline = Timeline(split_clips(10, 5), fps=10.0)
+    timeline.play_around(5, reach=3)
+    assert not timeline.tick(5.0, is_shown=False)
+    assert timeline.tick(5.0)
+    assert timeline.frame_index == 3
+    timeline.toggle_every_frame()
+    timeline.tick(0.2, is_shown=False)
+    assert timeline.frame_index > 4, "some were left out"
+    assert not timeline.is_every_frame, "elsewhere it plays as before"
+    timeline.toggle_around()
+    timeline.play_around(5, reach=3)
+    assert timeline.plays_every_frame
+
+
 def test_playing_every_frame_is_never_faster_than_the_capture():
     timeline = Timeline(split_clips(20, 5), fps=10.0)
     timeline.is_every_frame = True

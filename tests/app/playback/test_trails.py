@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.playback.contents import ClipParts
-from app.playback.trails import N_TRAILS, TrailMaker, TrailRequest, paths_of, trail_lines
-from engine.editing.edit import Edit, Everything, Hide, Scope
+from app.playback.modes.contents import ClipParts
+from app.playback.modes.trails import N_TRAILS, TrailMaker, TrailRequest, paths_of, trail_lines
+from engine.editing.actions import Hide
+from engine.editing.edit import Edit, Everything, Scope
 from engine.editing.effects import NO_EFFECTS, EditStack
 from tests.app.playback.clip_models import CLIP, reference, source
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from app.project import clip_versions
 from app.project.clip_catalog import ClipCatalog
 from app.project.clip_versions import (
     MAX_VERSIONS,
@@ -19,7 +20,8 @@ from app.project.clip_versions import (
     set_aside,
     version_path,
 )
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from engine.errors import DiskError, ProjectError
 from tests.app.made_projects import clip_header, make_project, write_header
 
@@ -74,6 +76,28 @@ def test_a_version_comes_back_with_its_curves_and_can_be_left_again(tmp_path: Pa
     assert project.metrics_path(0).read_text() == "curves of d"
     with pytest.raises(ProjectError, match="no version 99"):
         restore_version(project, 0, 99)
+
+
+def test_curves_of_a_version_that_came_back_follow_when_the_program_was_killed_in_between(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    project = make_project(tmp_path / "p")
+    for name in "ab":
+        train(project, 0, name)
+
+    def killed(source: Path, target: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(clip_versions, "_bring_curves", killed)
+    with pytest.raises(KeyboardInterrupt):
+        restore_version(project, 0, 1)
+    monkeypatch.undo()
+    project.close()
+    project = open_project(tmp_path / "p")
+    assert (current(project, 0), fingerprints(project, 0)) == ("a", ["b"])
+    assert project.metrics_path(0).read_text() == "curves of a"
+    restore_version(project, 0, list_versions(project, 0)[0].number)
+    assert project.metrics_path(0).read_text() == "curves of b"
 
 
 def test_what_depends_on_the_reference_is_out_of_date_by_its_fingerprint_alone(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.document.clip_changes import with_reference
+from app.document.changes.clip_changes import with_reference
 from app.project.clip_catalog import ClipCatalog
 from app.project.clip_versions import (
     DAMAGED,

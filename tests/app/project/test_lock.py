@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import platform
@@ -13,10 +14,11 @@ from pathlib import Path
 
 import pytest
 
+from app.document.project_settings import ProjectSettings
 from app.project import lock as module
 from app.project.lock import ProcessLock, boot_id, is_process_alive, machine_id, process_start, read_owner
-from app.project.project import ProjectSettings, create_project, open_project
-from engine.errors import ProjectError
+from app.project.project_access import create_project, open_project
+from engine.errors import DiskError, ProjectError
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -240,3 +242,18 @@ def test_many_processes_and_kills_never_make_two_owners():
     assert (found["double owners"], found["untyped"]) == (0, 0)
     assert min(found["takes"], found["over left-over"], found["owners killed"]) > 0
     assert run.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "kind", "hint"),
+    [(errno.ENOSPC, DiskError, "Free some space"), (errno.EACCES, ProjectError, "Choose a folder you may write to")],
+)
+def test_a_full_disk_is_told_from_a_folder_that_may_not_be_written(path, monkeypatch, number, kind, hint):
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(module, "atomic_path", refuse)
+    with pytest.raises(ProjectError) as caught:
+        ProcessLock(path).acquire()
+    assert type(caught.value) is kind
+    assert hint in str(caught.value)

@@ -24,7 +24,8 @@ from app.project.mends.record import (
     records_dir,
     write_record,
 )
-from app.project.project import Project, open_project
+from app.project.project import Project
+from app.project.project_access import open_project
 from engine.errors import DiskError, ProjectError
 from engine.mending.figures import Attempt, StretchFigures
 from tests.app.made_projects import clip_header, make_project, write_header

@@ -7,7 +7,7 @@ import pytest
 
 from app.project.metrics_file import read_metrics
 from app.project.recents import RecentProject
-from app.session.settings import Settings
+from app.session.projects.settings import Settings
 from engine.storage.json_files import checked_line
 
 

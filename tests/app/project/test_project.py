@@ -10,14 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from app.document.project_settings import ProjectSettings
 from app.project.metrics_file import read_metrics
-from app.project.project import (
-    ProjectSettings,
-    create_project,
-    default_settings,
-    open_project,
-    read_settings,
-)
+from app.project.project_access import create_project, default_settings, open_project, read_settings
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 

@@ -7,7 +7,7 @@ import pytest
 
 from app.background.jobs import JobCancelled
 from app.document.project_document import Marker
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.project.project_copy import copy_bytes, copy_project
 from engine.errors import ProjectError
 from tests.app.made_projects import make_chain
@@ -70,4 +70,23 @@ def test_a_copy_takes_no_place_that_is_taken(tmp_path: Path) -> None:
     with pytest.raises(ProjectError, match="in the project itself"):
         copy_project(project, project.folder / "copy", nothing)
     assert [path.name for path in taken.iterdir()] == ["file"]
+    project.close()
+
+
+def test_nothing_outside_of_a_project_is_copied(tmp_path: Path) -> None:
+    project = made(tmp_path / "project")
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "letter").write_text("x" * 1000)
+    n_bytes = copy_bytes(project.folder)
+    (project.folder / "notes").symlink_to(mine)
+    assert copy_bytes(project.folder) == n_bytes
+    copy_project(project, tmp_path / "copy", nothing)
+    assert not (tmp_path / "copy" / "notes").exists()
+    project.metrics_path(0).unlink()
+    project.metrics_path(0).parent.rmdir()
+    project.metrics_path(0).parent.symlink_to(mine)
+    with pytest.raises(ProjectError, match='cannot be copied: its folder "metrics"'):
+        copy_project(project, tmp_path / "again", nothing)
+    assert not (tmp_path / "again").exists()
     project.close()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from app.project.recents import MAX_RECENT, RecentProject, missing_folders, project_name
-from app.session.settings import Settings
+from app.project.projects_folder import project_name
+from app.project.recents import MAX_RECENT, RecentProject, missing_folders
+from app.session.projects.settings import Settings
 
 
 def entry(name: str, **values: object) -> RecentProject:
@@ -69,7 +70,8 @@ def test_what_is_gone_is_found_out(tmp_path: Path) -> None:
     assert missing_folders([there, bare, emptied, gone]) == {emptied.folder, gone.folder}
 
 
-def test_a_project_is_called_by_the_folder_that_the_user_chose(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("app.project.recents.data_dir", lambda: tmp_path)
-    assert project_name(tmp_path / "projects" / "kitchen-12ab", "/captures/kitchen") == "kitchen"
+def test_a_project_is_called_by_the_folder_that_the_user_chose(tmp_path: Path) -> None:
+    named = "kitchen-0123456789abcdef"
+    assert project_name(tmp_path / named, "/captures/kitchen") == "kitchen"
+    assert project_name(tmp_path / f"{named}-2", "/captures/kitchen") == "kitchen 2"
     assert project_name(tmp_path / "kitchen-toy", "/captures/kitchen") == "kitchen-toy"

@@ -7,7 +7,7 @@ import pytest
 
 from app.evaluation.evaluation import boundary_maps, evaluate_project
 from app.evaluation.headless import open_trained
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.residuals.figures import mean_excess
 from app.residuals.heat_map import HEAT_KINDS, LEVELS
 from engine.capture.capture import Capture
@@ -82,8 +82,11 @@ def test_two_clips_at_one_instant(open_residuals, document):
         heat = opened.heat(opened.opened.rig.names.index(row["camera"]), 3, "clips")
         assert heat.mean == pytest.approx(LEVELS * mean, rel=ROUNDING)
         assert heat.is_extrapolated
-        assert "Clip 0 ends there and answers with its last frame" in heat.note
-    assert "Clip 1 begins later and answers with its first frame" in opened.heat(0, 2, "clips").note
+        assert "Clip 0 ends before this frame: its last one stands in, which shows no more than R" in heat.note
+    assert (
+        "Clip 1 begins after this frame: its first one stands in, which shows no more than R"
+        in opened.heat(0, 2, "clips").note
+    )
     for frame, note in (
         (1, "Frame 1 lies inside clip 0; two clips meet at its first and last frame only."),
         (0, "No other clip meets clip 0 at frame 0."),

@@ -17,7 +17,7 @@ from app.residuals import measuring
 from app.residuals.figures import PairFigures, RowFigures
 from app.residuals.measuring_messages import LookAt, Measured, MeasureJob, MeasuringEnded, SetShare, Trouble
 from app.residuals.measuring_order import Look
-from app.residuals.measuring_process import DIED, MeasuringProcess
+from app.residuals.measuring_process import KEPT, MeasuringProcess
 from app.status import CELL_COLUMNS, ResidualStatus
 from tests.app.residuals.conftest import DEADLINE_S, Opened, color, make_project
 from tests.app.residuals.test_measuring_worker import job_of
@@ -41,6 +41,15 @@ class FakeMeasurer:
 
     def end(self) -> None:
         self.is_ended = True
+
+
+class Clock:
+    """Passes when a test says so."""
+
+    now_s = 1000.0
+
+    def __call__(self) -> float:
+        return self.now_s
 
 
 class Launched:
@@ -136,6 +145,52 @@ def test_what_is_measured_shows_and_what_goes_wrong_is_told(open_residuals, laun
     assert len(launched.all) == 1, "what could not be measured is not tried again and again"
 
 
+def test_a_seam_is_provisional_and_a_clip_without_its_figure_until_all_cameras_are_in(open_residuals, launched):
+    opened = open_residuals(launch=launched)
+    opened.residuals.look_at(opened.timeline, None)
+    poll(opened)
+    (measurer,) = launched.all
+    held_out = opened.opened.holdout[0]
+    for camera in (held_out, *({0, 1, 2, 3} - {held_out})):
+        for frame in range(6):
+            measurer.events.append(Measured(frame // 3, row=RowFigures(frame, camera, 30.0 + frame, 0.1)))
+            if frame:
+                pair = PairFigures(frame, camera, 0.01, 0.004 if frame == 3 else 0.002, 0.02 if frame == 3 else 0.01)
+                measurer.events.append(Measured(frame // 3, pair=pair))
+        *most, last = measurer.events
+        measurer.events = most
+        status = poll(opened)
+        (seam,) = status.seams
+        assert seam.ratio == pytest.approx(2.0)
+        assert seam.is_provisional, "a pair inside of the later clip is missing"
+        if camera == held_out:
+            assert status.measured == {"psnr": (6, 24), "flip": (6, 24), "E": (4, 20)}
+            records = [opened.catalog[index] for index in range(2)]
+            assert [(record.held_out_psnr, record.held_out_whole) for record in records] == [(31.0, True), (34.0, True)]
+        measurer.events = [last]
+        poll(opened)
+    (seam,) = opened.residuals.status.seams
+    assert (seam.n_cameras, seam.n_all, seam.is_provisional) == (4, 4, False)
+
+
+def test_a_forecast_waits_until_it_is_known_and_does_not_follow_a_camera_that_begins_slowly(open_residuals, launched):
+    clock = Clock()
+    opened = open_residuals(launch=launched, clock=clock)
+    opened.residuals.look_at(opened.timeline, None)
+    poll(opened)
+    (measurer,) = launched.all
+    told = []
+    for frame, seconds in ((0, 30.0), (1, 10.0), (2, 30.0), (3, 10.0), (4, 30.0), (5, 10.0)):
+        clock.now_s += seconds
+        measurer.events = [Measured(frame // 3, row=RowFigures(frame, 2, 30.0, 0.1))]
+        measurer.events += [Measured(frame // 3, pair=PairFigures(frame, 2, 0.01, 0.002, 0.01))] if frame else []
+        status = poll(opened)
+        told.append(status.eta_s)
+    assert told[:2] == [None, None]
+    per_picture = [eta / (24 - done) for eta, done in zip(told[2:], (3, 4, 5, 6), strict=True)]
+    assert max(per_picture) < 1.35 * min(per_picture)
+
+
 def test_while_a_clip_trains_it_is_held_back_where_training_has_every_core(open_residuals, launched, monkeypatch):
     opened = open_residuals(launch=launched)
     opened.residuals.look_at(opened.timeline, None)
@@ -160,6 +215,37 @@ def test_kept_figures_are_there_without_measuring(open_residuals, launched, proj
     poll(opened)
     assert launched.all == []
     assert status.message == ""
+
+
+@pytest.mark.parametrize("metrics", ["all", "quick"])
+def test_the_held_out_psnr_of_a_clip_is_the_evaluations_everywhere(open_residuals, launched, project, capsys, metrics):
+    few = 20.0
+    (project / "metrics").mkdir(exist_ok=True)
+    (project / "metrics" / "0000.jsonl").write_text(json.dumps({"step": 3, "held_out_psnr": few}) + "\n")
+    assert main(["clips", str(project), "--json"]) == 0
+    clip = json.loads(capsys.readouterr().out)["clips"][0]
+    assert (clip["held_out_psnr"], clip["held_out_whole"]) == (few, False)
+    assert main(["clips", str(project)]) == 0
+    assert "held-out PSNR ~20.00 dB, few pictures" in capsys.readouterr().out
+    means = evaluate(project, "--metrics", metrics)["means"]["clips"]
+    expected = [means[str(index)]["held_out"]["psnr"] for index in range(2)]
+    assert abs(expected[0] - few) > 0.1
+    assert main(["clips", str(project), "--json"]) == 0
+    clips = json.loads(capsys.readouterr().out)["clips"]
+    assert [clip["held_out_psnr"] for clip in clips] == expected
+    assert all(clip["held_out_whole"] for clip in clips)
+    assert main(["train", str(project.parent / "ring"), "--project", str(project), "--json", "--quiet"]) == 0
+    outcomes = json.loads(capsys.readouterr().out)["clips"]
+    assert [clip["held_out_psnr"] for clip in outcomes] == expected
+    opened = open_residuals(launch=launched)
+    poll_until(opened, lambda status: status.measured["psnr"] == (24, 24))
+    records = [opened.catalog[index] for index in range(2)]
+    assert [record.held_out_psnr for record in records] == expected
+    assert all(record.held_out_whole for record in records)
+    reference = opened.project.headers.read(project / "clips" / "0000.safetensors").header.fingerprint
+    color(project / "clips" / "0001.safetensors", seed=5, reference=reference)
+    opened.catalog.update(1)
+    assert not opened.catalog[1].held_out_whole, "it was trained again"
 
 
 def test_quick_figures_are_shown_and_flip_is_measured(open_residuals, launched, project):
@@ -284,15 +370,15 @@ def test_a_process_that_is_killed_is_told_once_and_nothing_is_lost(open_residual
     opened = open_residuals(launch=launch)
     opened.residuals.look_at(opened.timeline, None)
     poll_until(opened, lambda status: status.is_measuring)
-    made[0]._starter.join(DEADLINE_S)
-    pid = made[0].process.pid
+    pid = made[0].child.pid
     assert pid is not None
     os.kill(pid, signal.SIGKILL)
     status = poll_until(opened, lambda status: not status.is_measuring)
-    assert status.message == DIED
+    died = f"The process that measures was ended by signal 9, perhaps because memory ran out. {KEPT}"
+    assert status.message == died
     poll(opened, 5)
     assert len(made) == 1
-    assert opened.residuals.status.message == DIED
+    assert opened.residuals.status.message == died
 
 
 @pytest.mark.slow
@@ -310,21 +396,19 @@ def test_a_process_that_is_not_wanted_any_more_while_it_starts_is_ended(project)
     process = MeasuringProcess(job_of(project, rows=np.zeros((6, 4), bool), pairs=np.zeros((6, 4), bool)))
     process.end()
     process.end()
-    process._starter.join(DEADLINE_S)
-    process.process.join(DEADLINE_S)
-    assert not process.process.is_alive()
+    until_s = time.monotonic() + DEADLINE_S
+    while not process.child.is_over:
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
     assert process.poll() == []
 
 
 def test_a_process_that_cannot_be_started_is_told(project, monkeypatch):
-    def refuse(process) -> None:
+    def refuse(*_, **__) -> None:
         raise OSError(12, "Cannot allocate memory")
 
-    monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", refuse)
+    monkeypatch.setattr("engine.children.process.subprocess.Popen", refuse)
     process = MeasuringProcess(job_of(project))
-    process._starter.join(DEADLINE_S)
-    assert process.poll() == [
-        Trouble("Pictures cannot be measured in the background (Cannot allocate memory)."),
-        MeasuringEnded(),
-    ]
+    reason = f"The process that measures could not be started (Cannot allocate memory). {KEPT}"
+    assert process.poll() == [Trouble(reason), MeasuringEnded()]
     process.end()

@@ -10,7 +10,7 @@ import pytest
 
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.residuals import measuring_worker
 from app.residuals.figures import ClipFigures, Figures
 from app.residuals.heat_map import LEVELS
@@ -23,11 +23,10 @@ from app.residuals.measuring_messages import (
     MeasureJob,
     SetShare,
     Trouble,
-    decode_event,
-    encode,
 )
 from app.residuals.measuring_order import Look, first_item
-from app.residuals.measuring_worker import ParentGone, Talk, measure
+from app.residuals.measuring_worker import Talk, measure
+from engine.children.messages import decoded, encoded
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.residuals.conftest import color
 
@@ -42,7 +41,7 @@ class Heard:
         self.n_rests = 0
 
     def send(self, event) -> None:
-        self.events.append(decode_event(encode(event)))
+        self.events.append(decoded(encoded(event), Event))
 
     def say(self, message: str) -> None:
         self.send(Trouble(message))
@@ -232,62 +231,43 @@ def test_order():
     assert [clip for clip, _ in order[8:12]] == [1, 1, 1, 1]
 
 
-class FakePipe:
+class FakeParent:
     """A clock that passes while it is waited for messages."""
 
     def __init__(self, *messages: tuple[float, Command]) -> None:
         self.now_s, self.cpu_s = 100.0, 0.0
         self._messages = list(messages)
-        self.is_broken = False
 
-    def poll(self, wait_s: float) -> bool:
-        if self.is_broken:
-            raise OSError
+    def receive(self, wait_s: float) -> Command | None:
         if self._messages and self._messages[0][0] <= self.now_s + wait_s:
             self.now_s = max(self.now_s, self._messages[0][0])
-            return True
+            return self._messages.pop(0)[1]
         self.now_s += wait_s
-        return False
-
-    def recv_bytes(self) -> bytes:
-        return encode(self._messages.pop(0)[1])
-
-    def send_bytes(self, data: bytes) -> None:
-        raise BrokenPipeError
+        return None
 
 
-def talk_of(project, monkeypatch, pipe: FakePipe) -> Talk:
-    monkeypatch.setattr(measuring_worker.time, "monotonic", lambda: pipe.now_s)
-    monkeypatch.setattr(measuring_worker.time, "process_time", lambda: pipe.cpu_s)
-    return Talk(job_of(project), cast(Any, pipe), cast(Any, pipe))
+def talk_of(project, monkeypatch, parent: FakeParent) -> Talk:
+    monkeypatch.setattr(measuring_worker.time, "monotonic", lambda: parent.now_s)
+    monkeypatch.setattr(measuring_worker.time, "process_time", lambda: parent.cpu_s)
+    return Talk(job_of(project), cast(Any, parent))
 
 
 def test_while_a_clip_trains_it_rests_nineteen_times_as_long_as_it_computes(project, monkeypatch):
-    pipe = FakePipe((100.0, SetShare(0.05)))
-    talk = talk_of(project, monkeypatch, pipe)
+    parent = FakeParent((100.0, SetShare(0.05)))
+    talk = talk_of(project, monkeypatch, parent)
     talk.rest()
-    assert pipe.now_s == 100.0
-    pipe.cpu_s += 2.0
+    assert parent.now_s == 100.0
+    parent.cpu_s += 2.0
     talk.rest()
-    assert pipe.now_s == pytest.approx(138.0)
+    assert parent.now_s == pytest.approx(138.0)
     talk.rest()
-    assert pipe.now_s == pytest.approx(138.0), "what it did before is paid for"
+    assert parent.now_s == pytest.approx(138.0), "what it did before is paid for"
 
 
 def test_the_rest_ends_when_the_training_does_and_commands_are_heard_in_it(project, monkeypatch):
-    pipe = FakePipe((100.0, SetShare(0.05)), (103.0, LookAt(Look(1, 2))), (110.0, SetShare(1.0)))
-    talk = talk_of(project, monkeypatch, pipe)
-    pipe.cpu_s += 2.0
+    parent = FakeParent((100.0, SetShare(0.05)), (103.0, LookAt(Look(1, 2))), (110.0, SetShare(1.0)))
+    talk = talk_of(project, monkeypatch, parent)
+    parent.cpu_s += 2.0
     talk.rest()
-    assert pipe.now_s == pytest.approx(110.0)
+    assert parent.now_s == pytest.approx(110.0)
     assert talk.look == Look(1, 2)
-
-
-def test_when_nobody_listens_it_ends(project, monkeypatch):
-    pipe = FakePipe()
-    talk = talk_of(project, monkeypatch, pipe)
-    with pytest.raises(ParentGone):
-        talk.send(Trouble("nobody hears this"))
-    pipe.is_broken = True
-    with pytest.raises(ParentGone):
-        talk.rest()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 import subprocess
 import sys
 from pathlib import Path
 
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.scripting.scripted_project import open_scripted
 from tests.app.conftest import inline
 from tests.app.residuals.conftest import make_project
@@ -39,6 +40,18 @@ def test_the_example_of_the_documents(tmp_path, capsys, monkeypatch):
     assert "clip 0: skipped, 6 steps" in said
     assert "clip 1: trained, 6 steps" in said
     check(project, tmp_path / "out")
+
+
+def test_the_program_on_the_page_of_scripts(tmp_path, monkeypatch):
+    """As it stands there, on a project of six frames; only its place is another."""
+    project = make_project(tmp_path)
+    [program] = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "scripting.md").read_text(), re.DOTALL)
+    (tmp_path / "program.py").write_text(program)
+    project.rename(tmp_path / "my-project")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path("program.py", run_name="__main__")
+    assert (tmp_path / "turn.mp4").is_file()
+    assert len(list((tmp_path / "frames").glob("*.spz"))) == 2
 
 
 def test_it_says_why_it_cannot(tmp_path):

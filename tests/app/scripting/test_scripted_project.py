@@ -9,15 +9,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as replace_struct
 from PIL import Image
 
 import clipgstream
-from app.document.edit_words import n_picked
-from app.document.note_changes import put_marker
-from app.project.project import Project, create_project, default_settings, open_project
+from app.document.changes.edit_words import n_picked
+from app.document.changes.note_changes import put_marker
+from app.project.project import Project
+from app.project.project_access import create_project, default_settings, open_project
 from app.scripting.scripted_project import ScriptedProject, open_scripted
 from engine.capture.capture import open_capture
-from engine.editing.edit import Delete, Expose, Hide, Scope, Sphere
+from engine.editing.actions import Delete, Expose, Hide
+from engine.editing.edit import Picked, PickedRows, Scope, Sphere
+from engine.editing.picks import pack_rows
 from engine.errors import CaptureError, ProjectError, TrainingError
 from tests.app.conftest import inline
 from tests.app.fakes import N_ANCHORS, N_STEPS, make_crashing, make_fake
@@ -118,7 +122,7 @@ def test_what_cannot_be_an_edit(trained):
         wrong: Any = (
             (("explode",), {}, "no edit 'explode'. Edits are hide"),
             (("expose",), {}, "no stops"),
-            (("expose",), {"stops": 99.0}, "99.0 stops is out of range"),
+            (("expose",), {"stops": 99.0}, "stops is 99.0; it has to be a number between -16 and 16"),
             (("expose",), {"stops": "much"}, "not a number"),
             (("hide",), {"stops": 1.0}, "not known"),
             ((Delete(),), {"stops": 1.0}, "Delete is given with 'stops' beside it"),
@@ -147,7 +151,7 @@ def test_the_document_is_changed_by_functions_and_by_plain_data(trained):
             with pytest.raises(ProjectError, match=message):
                 project.put(entries)
         fixed = replace(project.document, settings=replace(project.document.settings, clip_length=2))
-        with pytest.raises(ProjectError, match="fixed once training has begun"):
+        with pytest.raises(ProjectError, match="fixed once a clip is finished"):
             project.change(fixed, "change the clip length")
 
 
@@ -163,12 +167,34 @@ def test_reading_only(trained):
                 lambda: project.train_clip(0),
                 lambda: project.change(project.document, "x"),
             ):
-                with pytest.raises(ProjectError, match="reading only"):
+                with pytest.raises(ProjectError, match="reading only") as caught:
                     forbidden()
+                assert caught.value.hint == "It was opened read-only. Open it for writing to change something."
         assert writing.is_writable
     with pytest.raises(ProjectError, match="closed"):
         writing.apply_edit("delete", BALL)
     writing.close()
+
+
+def test_edits_that_act_in_some_frames_only_say_so(trained):
+    told: list[str] = []
+    with opened(trained) as project:
+        own = project.open_trained().header(1).origin
+        picked = Picked((PickedRows(1, own, "residual", pack_rows(np.arange(3))),))
+        with pytest.raises(ProjectError, match=r"can never act \(frames 0-2\): what is selected exists in frames 3-5"):
+            project.apply_edit("delete", picked, scope=project.scope_of_clip(0))
+        with pytest.raises(ProjectError, match=r"can never act \(from 6 on\): the capture has frames 0-5"):
+            project.apply_edit("delete", BALL, scope=Scope(6))
+        assert project.edits == ()
+        with pytest.warns(UserWarning, match="Acts in frames 3-5 only"):
+            edit = project.apply_edit("delete", picked)
+        assert project.reaches[edit.edit_id].acts == ((3, 6),)
+        project.replace_edit(replace_struct(edit, scope=Scope(0, 2)), on_note=told.append)
+        assert told == ["The edit can never act (frames 0-1): what is selected exists in frames 3-5 only."]
+    Path(project.document.settings.capture).rename(trained.parent / "gone")
+    with opened(trained) as project:  # which is nothing to an edit
+        project.apply_edit("delete", picked, scope=Scope(0, 2))
+        assert project.reaches[2].acts == ()
 
 
 def test_pictures_and_files(trained, tmp_path):

@@ -33,13 +33,14 @@ def made_up(work):
 
 
 def outcome(request, missing=()):
-    found = SimpleNamespace(rig=[0, 1, 2])
+    found = SimpleNamespace(rig=[0, 1, 2], doubts=("", "", ""))
     calibration = SimpleNamespace(found=found, missing=[SimpleNamespace(name=name) for name in missing])
     return SimpleNamespace(
         capture=request.out or request.videos,
         needs_links=request.out is not None,
         calibration=calibration,
         lines=("3.",),
+        is_written=True,
     )
 
 
@@ -71,7 +72,8 @@ def test_a_folder_without_cameras_says_so(make_session, tmp_path):
 
 def test_a_calibration_ends_with_a_capture_to_open(make_session, videos, tmp_path, monkeypatch):
     monkeypatch.setattr(
-        "app.session.calibrating.calibration_work", made_up(lambda request, context: outcome(request, ("a 2",)))
+        "app.session.captures.calibrating.calibration_work",
+        made_up(lambda request, context: outcome(request, ("a 2",))),
     )
     session = make_session(is_open=False)
     look(session, videos)
@@ -81,6 +83,31 @@ def test_a_calibration_ends_with_a_capture_to_open(make_session, videos, tmp_pat
     assert (result.capture, result.needs_links, result.missing) == (tmp_path / "elsewhere", True, ("a 2",))
     session.dispatch(c.CloseQuestion())
     assert session.calibrating.page is None
+
+
+def test_one_that_has_failed_can_be_kept(make_session, videos, monkeypatch):
+    def failed(request, context):
+        one = outcome(request)
+        one.is_written, one.calibration.failure = False, "Matches contradict 3 of 3 cameras."
+        return one
+
+    kept = []
+
+    def write(calibration, request):
+        kept.append(request)
+        return outcome(request)
+
+    monkeypatch.setattr("app.session.captures.calibrating.calibration_work", made_up(failed))
+    monkeypatch.setattr("app.session.captures.calibrating.written", write)
+    session = make_session(is_open=False)
+    look(session, videos)
+    session.dispatch(c.CalibrateVideos(CalibrationRequest(videos)))
+    poll_until(session, lambda: session.calibrating.page.state == "done")
+    assert session.calibrating.page.result.failure == "Matches contradict 3 of 3 cameras."
+    session.dispatch(c.KeepCalibration())
+    session.dispatch(c.KeepCalibration())
+    poll_until(session, lambda: not session.calibrating.page.result.failure)
+    assert kept == [CalibrationRequest(videos, keeps_doubtful=True)]
 
 
 def test_what_it_says_is_shown_and_stopping_leads_back_to_the_options(make_session, videos, monkeypatch):
@@ -94,7 +121,7 @@ def test_what_it_says_is_shown_and_stopping_leads_back_to_the_options(make_sessi
             ended.set()
             raise
 
-    monkeypatch.setattr("app.session.calibrating.calibration_work", made_up(work))
+    monkeypatch.setattr("app.session.captures.calibrating.calibration_work", made_up(work))
     session = make_session(is_open=False)
     look(session, videos)
     session.dispatch(c.CalibrateVideos(CalibrationRequest(videos)))
@@ -114,7 +141,7 @@ def test_why_it_failed_is_shown_beside_the_options(make_session, videos, monkeyp
     def work(request, context):
         raise errors.pop(0)
 
-    monkeypatch.setattr("app.session.calibrating.calibration_work", made_up(work))
+    monkeypatch.setattr("app.session.captures.calibrating.calibration_work", made_up(work))
     session = make_session(is_open=False)
     look(session, videos)
     for expected in ("Too little in common.", "RuntimeError: broken"):

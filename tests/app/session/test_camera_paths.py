@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from app.document.document_store import DocumentStore
+from app.document.storing.document_store import DocumentStore
 from app.session import commands as c
-from app.session import path_commands as p
+from app.session.paths import path_commands as p
 from engine.camera.projection import camera_center
 from engine.errors import ProjectError
 from tests.app.conftest import poll_until

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from app.session import commands
+from app.session.projects.settings import Settings
 from app.session.questions import CorrectionQuestion
 from app.session.session import Session
-from app.session.settings import Settings
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.doctor import Diagnosis
 from engine.doctor.finding import Finding
+from engine.doctor.memory import memory_bytes
 from engine.errors import CaptureError
 from engine.progress import Progress
 
@@ -55,6 +56,7 @@ def test_a_capture_is_examined_in_the_background(session) -> None:
     poll(session, lambda: session.doctor_status.state == "done")
     assert session.doctor_status.findings == (FOUND,)
     assert session.doctor_status.diagnosis.n_pictures == 7
+    poll(session, lambda: session.doctor_status.memory_bytes == memory_bytes(session.capture))
 
 
 def test_examining_can_be_stopped_and_a_failure_is_told(session) -> None:
@@ -70,9 +72,9 @@ def test_examining_can_be_stopped_and_a_failure_is_told(session) -> None:
 
     session.doctor.run = endless
     session.dispatch(commands.ExamineCapture())
-    poll(session, lambda: session.doctor_status.done > 0.2)
+    poll(session, lambda: session.doctor_status.progress is not None and session.doctor_status.progress.done > 0.2)
     assert session.doctor_status.state == "running"
-    assert session.doctor_status.eta_s is not None
+    assert session.doctor_status.progress.eta_s(time.monotonic()) is not None
     session.dispatch(commands.StopExamining())
     assert session.doctor_status.state == "idle"
     poll(session, lambda: bool(has_ended))
@@ -107,8 +109,9 @@ def test_a_correction_is_asked_about_then_written_and_opened_as_a_new_project(se
 def test_a_process_of_its_own_examines_and_says_what_is_wrong(session) -> None:
     seen = []
     session.dispatch(commands.ExamineCapture())
-    poll(session, lambda: seen.append(session.doctor_status.done) or session.doctor_status.state == "done")
-    assert seen == sorted(seen)
+    poll(session, lambda: seen.append(session.doctor_status.progress) or session.doctor_status.state == "done")
+    shares = [progress.done for progress in seen if progress is not None]
+    assert shares == sorted(shares)
     assert session.doctor_status.diagnosis.n_pictures == session.capture.n_frames * len(session.rig)
 
 

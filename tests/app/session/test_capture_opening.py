@@ -5,9 +5,9 @@ from __future__ import annotations
 import shutil
 
 from app.project.opening_answers import LastAnswers, OpeningAnswers
-from app.project.project import read_settings
+from app.project.project_access import read_settings
 from app.session import commands as c
-from app.session.settings import Settings
+from app.session.projects.settings import Settings
 from tests.app.conftest import poll_until
 
 

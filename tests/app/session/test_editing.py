@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from app.document.stored_document import plain_document
+from app.document.storing.stored_document import plain_document
 from app.session import commands as c
 from app.session.editing.edit_commands import (
     AddEdit,
@@ -25,7 +25,8 @@ from app.session.editing.edit_commands import (
     ToggleEdit,
 )
 from app.session.editing.selection import Selection
-from engine.editing.edit import Box, Delete, Expose, Hide, Recolor, Scope, Sphere
+from engine.editing.actions import Delete, Expose, Hide, Recolor
+from engine.editing.edit import Box, Scope, Sphere
 from engine.editing.gaussian_rows import RowSet
 from engine.storage.json_files import json_text
 

@@ -15,16 +15,20 @@ from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_messages import ExportDone, ExportFailed
 from app.export.export_plan import TAKEN, ExportPlan, plan_export
 from app.export.export_progress import ExportResult
-from app.export.forms.table import FORMS, answers_to
+from app.export.jobs.answers import Answers
+from app.export.jobs.table import KINDS
 from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject, opened_project
-from app.project.project import open_project
+from app.project.project import Project
+from app.project.project_access import open_project
+from app.scripting.scripted_project import open_scripted
 from app.session import commands
 from app.session.exporting import Exporting, ExportPage
 from app.session.notices import Notices
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from engine.capture.capture import open_capture
+from engine.editing.edit import Sphere
 from engine.errors import ProjectError
 from tests.app.export.test_export_choices import CONTEXT
 from tests.app.export.test_export_queue import FakeExporter
@@ -48,6 +52,7 @@ class Bench:
         self.started: list[FakeExporter] = []
         self.shown: list[Path] = []
         self.exporting = Exporting(self.notices, self.settings, launch=self._launch, show=self._show)
+        self.exporting.open(self.opened)
 
     def _launch(self, task: object) -> FakeExporter:
         self.started.append(FakeExporter(task))  # type: ignore[arg-type]
@@ -109,6 +114,19 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     made.exporting.close()
 
 
+def test_what_has_ended_is_listed_with_its_project_alone(bench: Bench, tmp_path: Path):
+    bench.start("first.csv")
+    bench.exporting.cancel(bench.exporting.statuses[0].export_id)
+    bench.start("second.csv")
+    (elsewhere := tmp_path / "elsewhere").mkdir()
+    other = opened_project(bench.opened.capture, Project(elsewhere, bench.opened.project.history, None), 2)
+    bench.exporting.open(other)
+    assert [status.state for status in bench.exporting.statuses] == ["waiting"]  # it goes on, and is listed
+    bench.exporting.clear()
+    bench.exporting.open(bench.opened)
+    assert [status.state for status in bench.exporting.statuses] == ["waiting", "cancelled"]
+
+
 def test_the_dialog_begins_with_what_was_chosen_last(bench: Bench):
     bench.timeline.seek(4)
     bench.timeline.set_range(1, 2)
@@ -138,7 +156,7 @@ def test_nothing_trained_is_said_and_a_damaged_memory_is_none(bench: Bench):
     bench.ask()
     page = bench.exporting.page
     assert page is not None
-    assert page.choices.kind == next(iter(FORMS))
+    assert page.choices.kind == next(iter(KINDS))
 
 
 def test_the_plan_tells_files_bytes_and_room(bench: Bench):
@@ -174,6 +192,7 @@ def test_places_that_cannot_be_written_are_told_before(bench: Bench, out: str, s
 
 
 def test_a_disk_without_room_is_told_before(bench: Bench, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("app.export.staging.LEAST_SPARE_BYTES", 1 << 60)
     monkeypatch.setattr("app.export.staging.SPARE_BYTES", 1 << 60)
     bench.ask()
     plan = bench.plan(METRICS.changed(out=str(bench.folder / "m.csv")))
@@ -204,6 +223,22 @@ def test_frames_that_are_not_there_and_single_ones_are_told_in_plain_words(bench
         bench.ask((0,))
 
 
+def test_the_plan_names_the_edits_that_go_along(tmp_path: Path):
+    folder = train(tmp_path / "p", write_capture(tmp_path / "ring", n_frames=6), n_clips=2)
+    with open_scripted(folder) as project:
+        project.apply_edit("delete", Sphere((0.0, 0.0, 0.0), 1.0))
+        project.apply_edit("expose", name="brighter", stops=1.0)
+        project.switch_edit(project.apply_edit("hide", name="not now").edit_id, is_on=False)
+    opened = open_trained(open_project(folder, is_writable=False))
+    context = msgspec.structs.replace(CONTEXT, clips=((0, 3), (3, 6)), trained=(0, 1), has_edits=True)
+    said = "2 edits go along: delete sphere of radius 1, brighter"
+    for kind, takes_edits in (("gaussians", True), ("video", True), ("player", True), ("metrics", False)):
+        choices = ExportChoices(kind=kind, out=str(tmp_path / "x"))
+        choices = choices.changed(out=f"{choices.out}{Answers(context, choices).suffix}")
+        assert (said in plan_export(opened, context, choices).lines) is takes_edits
+        assert said not in plan_export(opened, context, choices.with_answer("has_edits", "false")).lines
+
+
 @pytest.mark.parametrize("kind", ["gaussians", "video", "player", "metrics"])
 @pytest.mark.parametrize("step", [1, 2])
 def test_all_that_are_trained_may_have_gaps(tmp_path: Path, kind: str, step: int):
@@ -211,8 +246,8 @@ def test_all_that_are_trained_may_have_gaps(tmp_path: Path, kind: str, step: int
     (folder / "clips" / "0001.safetensors").unlink()
     opened = open_trained(open_project(folder, is_writable=False))
     context = msgspec.structs.replace(CONTEXT, clips=((0, 3), (3, 6), (6, 9)), trained=(0, 2))
-    choices = ExportChoices(kind=kind, step=step, out=str(tmp_path / "x"))
-    choices = choices.changed(out=f"{choices.out}{answers_to(context, choices).suffix}")
+    choices = ExportChoices(kind=kind, out=str(tmp_path / "x")).with_step(step)
+    choices = choices.changed(out=f"{choices.out}{Answers(context, choices).suffix}")
     plan = plan_export(opened, context, choices)
     assert plan.problems == ()
     if kind in ("player", "metrics"):
@@ -292,15 +327,15 @@ def test_every_answer_of_every_form_makes_a_job_or_says_why_not(bench: Bench):
     bench.ask()
     page = bench.exporting.page
     assert page is not None
-    for kind, form in FORMS.items():
+    for kind in KINDS:
         usual = ExportChoices(kind=kind, out=str(bench.folder / "new" / f"x{kind}"))
-        for option in form.options(page.context, usual):
-            for value, words in option.values:
+        for question in Answers(page.context, usual).questions:
+            for value, words in question.values:
                 assert words
-                choices = usual.with_answer(option.name, value)
-                answers = answers_to(page.context, choices)
+                choices = usual.with_answer(question.name, value)
+                answers = Answers(page.context, choices)
                 choices = choices.changed(out=f"{choices.out}{answers.suffix}")
-                job = form.make_job(answers_to(page.context, choices))
+                job = Answers(page.context, choices).make_job()
                 assert job.out == Path(choices.out)
                 assert hash(job) == hash(job)  # a value
 
@@ -311,7 +346,7 @@ def test_exports_run_one_after_another_and_failures_are_told(bench: Bench):
     bench.exporting.poll(is_training=True)
     assert len(bench.started) == 1
     task = bench.started[0].task
-    assert (task.kind, task.n_threads) == ("metrics", 1)
+    assert (task.job.kind, task.n_threads) == ("metrics", 1)
     assert Path(task.project) == bench.opened.project.folder
     bench.started[0].events.append(ExportFailed("The disk is full.", "Free some space."))
     bench.exporting.poll(is_training=False)

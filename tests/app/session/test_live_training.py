@@ -10,9 +10,9 @@ import pytest
 
 from app.background.jobs import Jobs
 from app.project.opened_project import OpenedProject
-from app.project.project import open_project
-from app.session.live_training import LiveTraining
+from app.project.project_access import open_project
 from app.session.notices import Notices
+from app.session.training.live_training import LiveTraining
 from app.training import run
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError

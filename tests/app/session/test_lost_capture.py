@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 from app.session.commands import OpenCapture
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from tests.app.conftest import poll_until
 
 

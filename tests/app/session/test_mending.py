@@ -25,7 +25,8 @@ from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended,
 from app.session.mending.mend_page import MendPage
 from app.session.session import Session
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
-from engine.editing.edit import Hide, Picked, PickedRows
+from engine.editing.actions import Hide
+from engine.editing.edit import Picked, PickedRows
 from engine.editing.picks import pack_rows
 from engine.errors import ProjectError
 from engine.mending.figures import StretchFigures

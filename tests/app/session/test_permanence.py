@@ -15,7 +15,8 @@ from app.session.clips.clip_questions import DeletionsQuestion
 from app.session.editing.edit_commands import AddEdit
 from app.session.session import Session
 from engine.clip_files.clip_state import read_clip_state
-from engine.editing.edit import Delete, Expose, Picked, PickedRows
+from engine.editing.actions import Delete, Expose
+from engine.editing.edit import Picked, PickedRows
 from engine.editing.lost_picks import LostPicks
 from engine.editing.picks import pack_rows
 from engine.errors import DiskError

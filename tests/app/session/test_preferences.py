@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.session.preferences import MAX_USED, Preferences, PreferencesFile
+from app.session.projects.preferences import MAX_USED, Preferences, PreferencesFile
 
 
 def test_what_was_chosen_is_read_again(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from app.document.replay import journal_path
-from app.project.project import open_project
+from app.document.storing.replay import journal_path
+from app.project.project_access import open_project
 from app.project.project_choices import ProjectChoices
 from app.session import commands as c
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, SaveProjectAs
@@ -66,7 +66,7 @@ def test_a_folder_with_capture_and_project_can_be_moved(make_session, together, 
 def damage_journal(project: Path) -> None:
     path = journal_path(project, 0)
     lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"".join([*lines[:3], lines[3].replace(b"sphere", b"sphare"), *lines[4:]]))
+    path.write_bytes(b"".join([*lines[:4], lines[4].replace(b"sphere", b"sphare"), *lines[5:]]))
 
 
 def test_a_damaged_journal_is_asked_about_and_the_good_steps_are_kept(make_session, together):
@@ -75,7 +75,7 @@ def test_a_damaged_journal_is_asked_about_and_the_good_steps_are_kept(make_sessi
     question = session.question
     assert isinstance(question, RecoveryQuestion)
     assert (question.recovery.step, question.recovery.n_replayed) == (2, 2)
-    assert "Line 4 is damaged" in question.recovery.problem
+    assert "Line 5 is damaged" in question.recovery.problem
     session.dispatch(c.OpenProject(together / "project", ProjectChoices(is_repaired=True)))
     poll_until(session, lambda: session.project is not None)
     assert len(session.regions.regions) == 2

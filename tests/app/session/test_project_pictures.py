@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.playback.arrays import AnchorArrays, GaussianArrays, Picture
 from app.playback.frame_decoder import ShownFrame
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture
 from app.playback.render import RenderRequest
+from app.playback.views.orbit_view import OrbitView
 from app.project import project_picture
 from app.project.opened_project import OpenedProject
 from app.project.project_picture import SIZE, fitted, picture_path, read_picture, write_picture
-from app.session import project_pictures
-from app.session.project_pictures import ProjectPictures
+from app.session.projects import project_pictures
+from app.session.projects.project_pictures import ProjectPictures
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +64,7 @@ def test_a_project_gets_what_the_first_camera_took_and_later_what_was_looked_at(
 ) -> None:
     asked: list[RenderRequest] = []
 
-    def draw(request: RenderRequest) -> Picture:  # the rasterizer has tests of its own
+    def draw(request: RenderRequest, backend: object) -> Picture:  # the rasterizer has tests of its own
         asked.append(request)
         look = request.look
         return Picture(np.full((look.height, look.width, 3), (200, 30, 30), np.uint8), "red")

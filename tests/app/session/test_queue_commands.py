@@ -12,9 +12,9 @@ from app.project.clip_catalog import ClipRecord
 from app.project.clip_versions import version_path
 from app.project.project import Project
 from app.session import commands as c
+from app.session.projects.settings import Settings
 from app.session.questions import RetrainQuestion, SettingsQuestion
 from app.session.session import Session
-from app.session.settings import Settings
 from app.status import SequenceForecast
 from app.training.service import TrainingService
 from engine.clip_files.clip_state import read_clip_state

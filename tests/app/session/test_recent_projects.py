@@ -8,8 +8,8 @@ from pathlib import Path
 
 from app.project.clip_catalog import ClipCatalog
 from app.project.opened_project import OpenedProject
-from app.session.recent_projects import RecentProjects
-from app.session.settings import Settings
+from app.session.projects.recent_projects import RecentProjects
+from app.session.projects.settings import Settings
 from tests.app.fakes import write_trained
 
 

@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from app.project.project import open_project, read_settings
+from app.project.project_access import open_project, read_settings
 from app.session import commands as c
+from app.session.questions import LeaveQuestion
 from app.status import PlanStatus
 from engine.clip_files.clip_state import read_clip_state
 from engine.training.presets import PRESETS
@@ -146,7 +147,7 @@ def test_stopping_keeps_what_was_learned_and_training_goes_on_there(make_session
     assert (session.clip_states[0].state, session.clip_states[0].resume_step) == ("stopped", step)
     assert (session.training.next_clip_index, session.training.resume_step) == (0, step)
     n_left = 10_000_000 - step
-    assert planned(session).summary.startswith(f"goes on at step {step:,}, {n_left:,} of 10,000,000 steps left, about ")
+    assert planned(session).summary.startswith(f"goes on at step {step:,}, {n_left:,} of 10,000,000 steps left, ")
 
     folder = session.project.folder
     session.close()
@@ -291,7 +292,7 @@ def test_what_was_learned_fixes_clip_length_and_hold_out(make_session):
     assert session.holdout == (1,)
     train_next(session)
     session.dispatch(c.SetClipLength(2))
-    assert "fixed" in session.notices[-1].title
+    assert "fixed once a clip is finished: there is 1 trained clip" in session.notices[-1].detail
     assert session.project.settings.clip_length == 6
 
 
@@ -306,7 +307,7 @@ def test_the_next_clip_has_a_plan_that_follows_the_settings(make_session):
     session.dispatch(c.SetClipLength(3))
     before = planned(session)
     assert (before.clip_index, before.preset, before.can_edit) == (0, "small", True)
-    assert before.summary.startswith("1,500 steps, about ")
+    assert before.summary.startswith("1,500 steps, ")
     assert {setting.name: setting.value for setting in before.settings}["joint_steps"] == 1200
     session.dispatch(c.SetTrainSetting("joint_steps", 50))
     assert session.plan.summary == ""  # the old figures would be wrong
@@ -356,7 +357,7 @@ def test_what_was_learned_fixes_the_training_settings(make_session):
     assert (found.clip_index, found.can_edit) == (1, False)
     assert any("inherited" in reason for _, _, reason in found.lines)
     session.dispatch(c.SetPreset("toy"))
-    assert "fixed" in session.notices[-1].title
+    assert "fixed" in session.notices[-1].detail
     assert session.project.settings.overrides == {}
 
 
@@ -452,6 +453,16 @@ def test_opening_another_capture_keeps_a_running_training(make_session, tmp_path
     first = session.project
     session.opener.project_dir = tmp_path / "q"
     session.dispatch(c.OpenCapture(capture_folder))
+    poll_until(session, lambda: session.question is not None, what="the question")
+    assert isinstance(session.question, LeaveQuestion)
+    assert (session.question.name, session.question.clip_index, session.question.step >= 2) == ("q", 0, True)
+    session.dispatch(c.CloseQuestion())
+    assert session.training.state == "running"
+    assert session.project is first
+    assert not (tmp_path / "q").exists()  # the project that was made for it is gone
+    session.dispatch(c.OpenCapture(capture_folder))
+    poll_until(session, lambda: session.question is not None, what="the question")
+    session.dispatch(c.LeaveTraining())
     poll_until(session, lambda: session.project.folder.name == "q" and not session.jobs)
     assert session.clip_states[0].state == "untrained"
     assert read_clip_state(first.checkpoint_path(0)).header.step >= 2

@@ -8,7 +8,7 @@ import pytest
 
 from app.project.opened_project import OpenedProject
 from app.session.commands import SetClipLength, SetHoldout, SetPreset, SettingCommand, SetTrainSetting
-from app.session.setting_changes import changed_settings
+from app.session.projects.setting_changes import changed_settings
 from engine.errors import EngineError
 from engine.training.presets import PRESETS
 

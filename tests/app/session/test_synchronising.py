@@ -47,7 +47,7 @@ def measure(session, monkeypatch, result):
             raise result
         return result
 
-    monkeypatch.setattr("app.session.synchronising.synchronise", synchronise)
+    monkeypatch.setattr("app.session.captures.synchronising.synchronise", synchronise)
     session.dispatch(c.SynchroniseCameras())
     poll_until(session, lambda: session.synchronising.page.state == "done")
     return session.synchronising.page
@@ -110,7 +110,7 @@ def test_closing_ends_the_measurement(session, monkeypatch):
             ended.set()
             raise
 
-    monkeypatch.setattr("app.session.synchronising.synchronise", synchronise)
+    monkeypatch.setattr("app.session.captures.synchronising.synchronise", synchronise)
     session.dispatch(c.SynchroniseCameras())
     poll_until(session, lambda: session.synchronising.progress.message == "motion - camera 3")
     session.dispatch(c.CloseQuestion())

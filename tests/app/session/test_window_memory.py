@@ -10,8 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-import app.session.window_memory
-from app.session.window_memory import MAX_PROJECTS, WindowMemory, markers_of, read_window_memory, show_again, view_of
+import app.session.projects.window_memory
+from app.playback.views.views import COUNTS
+from app.session.projects.window_memory import (
+    MAX_PROJECTS,
+    WindowMemory,
+    markers_of,
+    read_window_memory,
+    show_again,
+    view_of,
+)
 from tests.ui.fake_session import FakeSession
 
 
@@ -53,6 +61,22 @@ def test_a_session_goes_back_to_what_it_showed() -> None:
 
     show_again(other, view_of(left) | {"camera": "cam99"})
     assert other.view.look_through is None
+
+
+@pytest.mark.parametrize("n_views", COUNTS)
+def test_as_many_views_come_back_each_as_it_was(n_views: int) -> None:
+    left, other = FakeSession(), FakeSession()
+    left.views.show(n_views)
+    for index, look in enumerate(left.views.shown):
+        look.view.orbit(10.0 * index, 5.0)
+        look.overlays.show_residual = index % 2 == 1
+    left.views.activate(n_views - 1)
+    other.views.show(2)  # as the project before was left
+    show_again(other, json.loads(json.dumps(view_of(left))))
+    assert (other.views.n_shown, other.views.active_index) == (n_views, n_views - 1)
+    for mine, theirs in zip(other.views.shown, left.views.shown, strict=True):
+        np.testing.assert_array_equal(mine.view.world_to_camera(), theirs.view.world_to_camera())
+        assert mine.overlays == theirs.overlays
 
 
 def test_how_it_was_played_comes_back() -> None:
@@ -129,7 +153,7 @@ def test_a_disk_that_refuses_costs_no_more_than_the_memory(tmp_path: Path) -> No
 
 
 def test_saving_soon_waits_for_no_disk_and_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    module, began, go_on = app.session.window_memory, threading.Event(), threading.Event()
+    module, began, go_on = app.session.projects.window_memory, threading.Event(), threading.Event()
     write = module.write_checked_json
 
     def slow(path: Path, document: dict[str, Any]) -> None:

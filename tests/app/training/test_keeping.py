@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from app.project.project import PROJECT_FILE
+from app.document.storing.document_file import PROJECT_FILE
 from app.training.keeping import (
     PATIENCE_S,
     PATIENCE_UNKEPT_S,

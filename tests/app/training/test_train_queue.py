@@ -218,7 +218,7 @@ def test_settings_of_one_clip_are_those_that_leave_the_others_alone(six: OpenedP
     frames = replace(six.project.settings, overrides={"gate": "off", "cloud": "frames"})
     with_frames: Any = SimpleNamespace(settings=frames)
     assert set(offered(six.project, 0)) - set(offered(with_frames, 0)) == {"static_steps"}, "there is no such phase"
-    shared = {"static_feature_dim", "gaussians_per_anchor", "color", "gate", "decoder", "inherit", "field", "backend"}
+    shared = {"static_feature_dim", "gaussians_per_anchor", "color", "gate", "decoder", "inherit", "field"}
     assert not shared & set(ALLOWED)
     assert with_own(six.project, {"source_steps": 7, "residual": "none"}) == {"source_steps": 7, "residual": "none"}
 

@@ -19,6 +19,7 @@ def scratch(tmp_path, monkeypatch) -> Path:
     folder = tmp_path / "temporary"
     folder.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("TMPDIR", str(folder))  # of its child processes
     return folder
 
 
@@ -26,10 +27,13 @@ def test_pictures_without_anything_in_them_say_what_is_missing(tmp_path: Path, s
     for name in ("a", "b", "c"):
         (tmp_path / "grey" / name).mkdir(parents=True)
         Image.new("RGB", (64, 48), (120, 120, 120)).save(tmp_path / "grey" / name / "0.png")
-    with pytest.raises(PreparationError, match=r"No three cameras could be placed: 0 of 3 pairs") as caught:
+    with pytest.raises(PreparationError, match=r"No three cameras could be placed") as caught:
         calibrate(tmp_path / "grey", CalibrationOptions(), report=lambda _: None)
+    assert "  a  b       0 matches\n" in caught.value.message
+    assert "0 of 3 pairs have 30 matches or more" in caught.value.message
     assert "patterns" in caught.value.hint
-    assert not list(scratch.iterdir())
+    assert "Caliscope" in caught.value.hint
+    assert not list(scratch.glob("clipgstream-*"))
 
 
 def test_who_interrupts_it_leaves_no_files(tmp_path: Path, scratch: Path) -> None:
@@ -42,4 +46,4 @@ def test_who_interrupts_it_leaves_no_files(tmp_path: Path, scratch: Path) -> Non
 
     with pytest.raises(KeyboardInterrupt):
         calibrate(tmp_path / "grey", CalibrationOptions(), report=lambda _: None, alive=stop)
-    assert not list(scratch.iterdir())
+    assert not list(scratch.glob("clipgstream-*"))

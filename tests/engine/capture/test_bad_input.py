@@ -45,6 +45,25 @@ def test_a_folder_above_a_capture_points_to_it(make_sample: MakeCapture) -> None
     assert "Open sample inside it" in str(problem_of(make_sample().parent))
 
 
+@pytest.mark.parametrize(
+    ("name", "whose", "hint"),
+    [
+        ("other/Calib.qca.txt", "Qualisys", "Put it into the folder or into calibration/"),
+        ("take/Take 1.mcal", "OptiTrack", "write its cameras into capture.json"),
+        ("calibration/Cameras.PICKLE", "OpenCap", "Pickles are not read"),
+        ("Calib.qca", "Qualisys", "as text (.qca.txt)"),
+    ],
+)
+def test_calibrations_of_other_programs_are_named(tmp_path: Path, name: str, whose: str, hint: str) -> None:
+    (tmp_path / "videos").mkdir()
+    (tmp_path / "videos" / "a.mp4").touch()
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).touch()
+    message = str(problem_of(tmp_path))
+    assert f"not a capture ({name} looks like a calibration of {whose})" in message
+    assert hint in message
+
+
 def test_a_missing_folder_and_a_file_are_named(make_sample: MakeCapture) -> None:
     folder = make_sample()
     assert "no such folder" in str(problem_of(folder / "nowhere"))

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.capture.clock import common_clock
 from engine.capture.frames import IndexedFrames
+from engine.capture.times.clock import common_clock
 from engine.errors import CaptureError
 
 EVEN = np.arange(100) / 30

@@ -39,6 +39,29 @@ def test_references_in_capture_json_open_with_links_followed(tmp_path: Path) -> 
     check_reads_as(tmp_path / "new", scene, follow_links=True)
 
 
+@pytest.mark.parametrize("source", ["videos", "folders"])
+@pytest.mark.parametrize("target", TARGETS)
+def test_without_frames_it_opens_or_says_that_it_does_not(tmp_path: Path, target: str, source: str) -> None:
+    scene = make_scene(lens="opencv5")
+    written_colmap.write(tmp_path / "old", scene, lens="opencv5", frames=source)
+    done = convert(open_capture(tmp_path / "old").layout, tmp_path / "new", target, frames="none")  # type: ignore[arg-type]
+    if target == "colmap":
+        assert any("does not open as a capture" in line for line in done.lines)
+    else:
+        assert "Frames stay where they are: open the folder with --follow-links." in done.lines
+        check_reads_as(tmp_path / "new", scene, follow_links=True)
+
+
+def test_part_of_a_video_cannot_be_referred_to_by_transforms(tmp_path: Path) -> None:
+    scene = make_scene(lens="pinhole", n_frames=5)
+    written_colmap.write(tmp_path / "old", scene, lens="pinhole")
+    layout = open_capture(tmp_path / "old").layout
+    late = tuple(replace(entry, source=IndexedFrames(entry.source, np.arange(1, 5))) for entry in layout.cameras)
+    with pytest.raises(CaptureError, match="cannot say which frames of its videos"):
+        convert(replace(layout, cameras=late, n_frames=4), tmp_path / "new", "transforms")
+    assert not (tmp_path / "new").exists()
+
+
 def test_frames_of_videos_that_begin_later_are_decoded(tmp_path: Path) -> None:
     scene = make_scene(lens="pinhole", n_frames=5)
     written_colmap.write(tmp_path / "old", scene, lens="pinhole")

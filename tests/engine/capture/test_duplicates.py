@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from engine.capture.duplicates import SAMPLE_BYTES, CameraFiles, check_duplicates
+from engine.capture.files.duplicates import SAMPLE_BYTES, CameraFiles, check_duplicates
 
 
 def camera(folder: Path, name: str, *contents: bytes) -> CameraFiles:

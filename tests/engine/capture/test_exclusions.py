@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from engine.capture.capture import open_capture
-from engine.capture.excluded_pixels import ExcludedPixels, painted_pixels
 from engine.capture.exclusions import ExcludedFrames, Exclusions, PaintedMask, Stroke
+from engine.capture.pixels.excluded_pixels import ExcludedPixels, painted_pixels
 
 LINE = Stroke(((0.25, 0.5), (0.75, 0.5)), 0.1)
 EVERYTHING = Stroke(((-0.5, 0.5), (1.5, 0.5)), 1.0)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engine.capture.files.media import ImageHeader
 from engine.capture.format_checks import (
     check_equal_counts,
     check_fps,
@@ -20,7 +21,6 @@ from engine.capture.format_checks import (
     shortened,
 )
 from engine.capture.limits import FPS_RANGE, MAX_NAME_LENGTH, MAX_POSITION, MAX_SIDE
-from engine.capture.media import ImageHeader
 from engine.errors import CaptureError
 
 PATH = Path("cameras.json")

@@ -11,9 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.capture.camera_optics import resize_area
+from engine.capture import frames
+from engine.capture.cameras.camera_optics import resize_area
+from engine.capture.cameras.orientation import UPRIGHT
+from engine.capture.files.media import read_video_header
 from engine.capture.frames import VideoFrames
-from engine.capture.media import read_video_header
 
 
 def write_stream(path: Path, *, options: dict[str, str], n_frames: int, pts: list[int] | None = None) -> None:
@@ -32,6 +34,19 @@ def write_stream(path: Path, *, options: dict[str, str], n_frames: int, pts: lis
 def levels(source: VideoFrames, order: list[int]) -> list[int]:
     """Which frame each decoded picture is, read back from its grey level."""
     return [round((float(frame.mean()) - 10) / 5) for frame in source.read(order)]
+
+
+def test_a_video_is_asked_once_how_it_is_turned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every frame whose side data was looked at stays in memory for good: 3 MB each at 1088x1920."""
+    asked = []
+    monkeypatch.setattr(frames, "turn_of_frame", lambda frame: asked.append(frame.pts) or UPRIGHT)
+    path = tmp_path / "video.mp4"
+    write_stream(path, n_frames=40, options={"g": "10"})
+    source = VideoFrames(path, 40)
+    assert levels(source, list(range(40))) == list(range(40))
+    source.close()
+    assert levels(source, [7, 3]) == [7, 3]
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import socket
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from engine.capture.capture import open_capture
 from engine.capture.capture_summary import describe
 from engine.capture.limits import MAX_SIDE
 from engine.errors import CaptureError
+from tests.engine.capture.layouts import written_transforms
+from tests.engine.capture.layouts.scene import make_scene
 
 MakeCapture = Callable[..., Path]
 
@@ -278,7 +281,31 @@ def test_a_message_repeats_no_megabytes(make_sample: MakeCapture) -> None:
     assert len(refusal(make_sample(edit=edit))) < 3000
 
 
+def test_a_file_of_millions_of_numbers_is_refused_before_it_is_parsed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("engine.capture.format_checks.MAX_META_VALUES", 1000)
+    parsed: list[int] = []
+    monkeypatch.setattr("engine.storage.json_files.json.loads", lambda *_, **__: parsed.append(1))
+    (tmp_path / "transforms.json").write_text(f'{{"frames": [], "x": [{"0," * 1001}0]}}')
+    assert "The file has 1,002 values, at most 1,000 are read." in refusal(tmp_path)
+    assert not parsed
+
+
 # ---------------------------------------------------------------- right in itself, wrong in fact
+
+
+@pytest.mark.parametrize("value", ["1e308", "-1e308", "1e300"])
+def test_poses_of_transforms_json_beyond_all_numbers_are_refused_without_a_warning(tmp_path: Path, value: str) -> None:
+    written_transforms.write(tmp_path, make_scene(size=(32, 24)))
+    path = tmp_path / "transforms.json"
+    document = json.loads(path.read_text())
+    for row, column in ((0, 3), (0, 0), (1, 2)):
+        document["frames"][0]["transform_matrix"][row][column] = "here"
+    path.write_text(json.dumps(document).replace('"here"', value))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert path.name in refusal(tmp_path)
 
 
 def test_two_cameras_with_one_file(make_sample: MakeCapture) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.capture.opencv_yaml import YamlError, number, parse_opencv_yaml, read_opencv_yaml
+from engine.capture.cameras.opencv_yaml import YamlError, number, parse_opencv_yaml, read_opencv_yaml
 from engine.errors import CaptureError
 
 FILE = """%YAML:1.0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from engine.capture.places import MAX_NAME_BYTES, place_in
+from engine.capture.files.places import MAX_NAME_BYTES, place_in
 from engine.errors import CaptureError
 
 

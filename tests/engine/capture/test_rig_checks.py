@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.camera.rig import CameraRig
-from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
+from engine.capture.cameras.rig_checks import check_rig, rig_extent, rig_warnings
 from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(8, (80, 60))

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from engine.capture.capture import Capture, open_capture
+from engine.capture.files.sound import SoundReader, sound_source
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
-from engine.capture.sound import SoundReader, sound_source
 from engine.errors import CaptureError
 from engine.synthetic import make_scene
 from engine.synthetic.writing import cameras_document

@@ -26,6 +26,8 @@ FORMATS = {
     "transforms": "transforms.json",
     "immersive": "immersive",
     "panoptic_studio": "panoptic-studio",
+    "qualisys": "qualisys",
+    "vicon": "vicon",
     "technicolor": "technicolor",
 }
 """What readers call each layout."""

@@ -173,7 +173,7 @@ def test_names_with_spaces_dots_and_other_scripts(
     ("kind", "edit", "said"),
     [
         ("easyvolcap", lambda t: t.replace("names:", "nombres:", 1), "lists no names"),
-        ("easyvolcap", lambda t: t.replace('"cam2"', '"cam3"'), "'K_cam3'"),
+        ("easyvolcap", lambda t: t.replace("K_cam2", "K_cam3"), "'K_cam2'"),
         ("easyvolcap", lambda t: t.replace('"cam2"', '"cam1"'), '2 cameras are called "cam1"'),
         (
             "easyvolcap",
@@ -244,3 +244,49 @@ def test_all_problems_of_a_capture_come_at_once(written: Path, tmp_path: Path) -
         "cam10",
         "cam11",
     ]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ".".join("a" for _ in range(90_000)) + " = 1",
+        f"[{'.'.join('a' for _ in range(95_000))}]",
+        ".".join("1" for _ in range(90_000)) + " = 1",
+        " . ".join('"a"' for _ in range(60_000)) + " = 1",
+        f"a = {{{'.'.join('a' for _ in range(90_000))} = 1}}",
+        "1.1 . " * 30_000 + "a = 1",
+        "\n".join(f"[a{row}.{'.'.join('a' * 50)}]" for row in range(8_000)),
+    ],
+)
+def test_names_of_many_parts_are_refused_before_they_are_parsed(
+    tmp_path: Path, line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python's parser would take minutes; the file only has to lie there."""
+    parsed: list[int] = []
+    monkeypatch.setattr("tomllib.loads", lambda text: parsed.append(len(text)) or {})
+    (tmp_path / "extra.toml").write_text(f"{line}\n")
+    with pytest.raises(CaptureError) as caught:
+        open_capture(tmp_path)
+    assert "names of too many parts" in str(caught.value)
+    assert not parsed
+
+
+def test_long_lists_of_numbers_are_no_names(tmp_path: Path) -> None:
+    scene = make_scene(lens="opencv5")
+    written_toml.write(tmp_path, scene, has_times=False)
+    path = tmp_path / "Calib_scene.toml"
+    path.write_text(path.read_text() + f"\n[points]\nxyz = {[[0.5, -1.25, 1e-3, -2.5e10]] * 500}\n")
+    assert open_capture(tmp_path).rig.names == scene.names
+
+
+def test_cameras_without_a_pose_are_left_out(tmp_path: Path) -> None:
+    """EasyMocap keeps intrinsics of a whole stage, of which some cameras were used."""
+    scene = make_scene(lens="opencv5")
+    written_easyvolcap.write(tmp_path, scene)
+    path = tmp_path / "intri.yml"
+    more = "".join(f'  - "stage{row}"\n' for row in range(20))
+    path.write_text(path.read_text().replace("names:\n", f"names:\n{more}", 1))
+    capture = check_reads_as(tmp_path, scene)
+    assert capture.warnings[0] == (
+        "Cameras of which extri.yml has no pose are left out: 'stage0', 'stage1', 'stage2' and 17 more."
+    )

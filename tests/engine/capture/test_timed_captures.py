@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engine.capture.cameras import described_camera
 from engine.capture.capture import open_capture
+from engine.doctor.checks.frame_counts import check_frame_counts
+from engine.errors import CaptureError
 from tests.engine.capture.made_videos import SIZE, number_of, write_video_of_kind
 
 
@@ -56,6 +59,30 @@ def test_cameras_of_two_rates_meet_on_the_slower_clock(tmp_path):
     assert (capture.n_frames, capture.fps) == (20, pytest.approx(25, rel=1e-3))
     assert numbers(tmp_path, 0, 7, 19) == [[0, 7, 19], [0, 14, 38]]
     assert any("nearest frame of each" in warning for warning in capture.warnings)
+
+
+@pytest.mark.parametrize(("n_frames", "is_short"), [(24, False), (12, True)])
+def test_a_camera_of_another_rate_is_not_short_of_frames(tmp_path, n_frames, is_short):
+    """One at 24 per second among others at 30; and one at 24 that stops half-way, which is."""
+    times_ms = [1000 * row // 30 for row in range(30)]
+    for name in "bcd":
+        write_video_of_kind(tmp_path / f"{name}.mp4", n_frames=30, times_ms=times_ms, metadata={"title": name})
+    write_video_of_kind(tmp_path / "a.mp4", n_frames=n_frames, times_ms=[1000 * row // 24 for row in range(n_frames)])
+    described(tmp_path, a={}, b={}, c={}, d={})
+    found = check_frame_counts(open_capture(tmp_path))
+    assert [finding.cameras for finding in found if finding.severity == "warning"] == [("a",)] * is_short
+
+
+def test_a_video_of_many_cameras_is_looked_at_once(tmp_path, monkeypatch):
+    looked: list[Path] = []
+    look = described_camera.read_video_header
+    monkeypatch.setattr(described_camera, "read_video_header", lambda path: looked.append(path) or look(path))
+    write_video_of_kind(tmp_path / "a.mp4", n_frames=3)
+    same: dict[str, dict[str, object]] = {f"x{row}": {"video": "a.mp4"} for row in range(50)}
+    described(tmp_path, **same)
+    with pytest.raises(CaptureError, match='Cameras "x0" and "x1" and 48 more use the same file'):
+        open_capture(tmp_path)
+    assert len(looked) == 1
 
 
 def test_uneven_videos_meet_at_equal_times(tmp_path):

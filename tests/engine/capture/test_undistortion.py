@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.camera.lens import Lens
-from engine.capture.undistortion import Undistortion, undistorted_K
+from engine.capture.pixels.undistortion import Undistortion, undistorted_K
 
 SIZE = (160, 120)
 K = np.array([[150.0, 0.0, 83.0], [0.0, 148.0, 57.0], [0.0, 0.0, 1.0]])

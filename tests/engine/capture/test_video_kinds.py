@@ -8,10 +8,10 @@ import av
 import numpy as np
 import pytest
 
+from engine.capture.cameras.orientation import may_be_turned
 from engine.capture.capture import open_capture
+from engine.capture.files.media import read_frame_times, read_video_header
 from engine.capture.frames import VideoFrames
-from engine.capture.media import read_frame_times, read_video_header
-from engine.capture.orientation import may_be_turned
 from engine.errors import CaptureError
 from tests.engine.capture.made_videos import SIZE, number_of, numbered, write_video_of_kind
 
@@ -33,6 +33,8 @@ ORDER = [17, 3, 4, 29, 0, 28, 12, 12]
         ("mjpeg", ".avi", "yuvj420p", {}),
         ("prores_ks", ".mov", "yuv422p10le", {}),
         ("ffv1", ".mkv", "yuv444p", {}),
+        ("mpeg2video", ".mxf", "yuv422p", {"bf": "2", "g": "12"}),
+        ("libx264", ".mxf", "yuv422p10le", {"g": "1"}),
     ],
 )
 def test_every_kind_gives_exactly_the_frame_asked_for(tmp_path, monkeypatch, codec, suffix, pix_fmt, options):

@@ -9,20 +9,8 @@ import numpy as np
 
 from engine.camera.rotations import matrices_of, quat_product
 from engine.capture.clip import Clip
-from engine.editing.edit import (
-    Box,
-    Delete,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Picked,
-    Recolor,
-    Smooth,
-    Sphere,
-    Target,
-    Transform,
-)
+from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Everything, Picked, Sphere, Target
 from engine.editing.effects import Effect
 from engine.editing.picks import unpack_rows
 from engine.images.srgb import encoded_of, linear_of

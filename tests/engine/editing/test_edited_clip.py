@@ -8,24 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from engine.editing.edit import (
-    Action,
-    Box,
-    Delete,
-    Edit,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Picked,
-    PickedRows,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Target,
-    Transform,
-)
+from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
 from engine.editing.edited_clip import EditedGaussians
 from engine.editing.effects import NO_EFFECTS, EditStack, Effect, Effects
 from engine.editing.picks import pack_rows

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.editing.edit import Edit, Everything, Hide, Picked, PickedRows
+from engine.editing.actions import Hide
+from engine.editing.edit import Edit, Everything, Picked, PickedRows
 from engine.editing.lost_picks import LostPicks, lost_picks
 from engine.editing.picks import pack_rows
 

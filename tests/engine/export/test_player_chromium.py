@@ -103,7 +103,7 @@ def expected(frame: int, view: int, *, ratio: int = 1) -> np.ndarray:
         torch.tensor(matrix[None], dtype=torch.float32),
         torch.tensor(K[None], dtype=torch.float32),
         *size,
-        backend=backend_called(),
+        backend=backend_called("cpu"),
         near_plane=NEAR,
         background=torch.tensor(BACKGROUND),
     )

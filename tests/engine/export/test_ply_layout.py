@@ -34,6 +34,32 @@ def test_names_order_and_values_are_those_of_3d_gaussian_splatting():
     np.testing.assert_allclose(values, expected, rtol=1e-6, atol=1e-6)
 
 
+def test_full_rows_are_those_of_the_reference_code():
+    splats = chance_splats(70_000)  # more than are made at a time
+    file = io.BytesIO()
+    ply.write_full(splats, file)
+    head, _, body = file.getvalue().partition(b"end_header\n")
+    names = [line.rpartition(" ")[2] for line in head.decode("ascii").split("\n") if line.startswith("property float")]
+    rest = [f"f_rest_{index}" for index in range(45)]
+    assert names == [
+        *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", *rest, "opacity"),
+        *("scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"),
+    ]
+    assert len(body) == 248 * len(splats)
+    rows = np.frombuffer(body, "<f4").reshape(-1, 62)
+    assert not rows[:, 3:6].any()
+    assert not rows[:, 9:54].any()
+    usual = io.BytesIO()
+    ply.write(splats, usual)
+    few = np.frombuffer(usual.getvalue().partition(b"end_header\n")[2], "<f4").reshape(-1, 14)
+    np.testing.assert_array_equal(np.delete(rows, [*range(3, 6), *range(9, 54)], axis=1), few)
+    file.seek(0)
+    usual.seek(0)
+    found, same = ply.read(file), ply.read(usual)
+    for name in ("means", "quats", "scales", "opacities", "colors"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(same, name))
+
+
 def test_opacities_are_held_where_their_logit_is_finite():
     splats = chance_splats(2)
     splats.opacities[:] = (0.0, 1.0)

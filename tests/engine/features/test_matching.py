@@ -7,7 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from engine.features.child import ChildFailed, run_child
+from engine.children.kind import ChildFailed
+from engine.features.child import arrays_kind, work_on_arrays
 from engine.features.matching import match_pairs
 from tests.engine.cloud.stereo.test_sparse import wall_views
 
@@ -26,8 +27,9 @@ def test_places_of_a_wall_are_matched_where_they_are() -> None:
 
 
 def test_what_a_child_cannot_do_is_a_reason_not_a_traceback() -> None:
-    with pytest.raises(ChildFailed, match="the broken process ended with code"):
-        run_child("engine.features.no_such_module", {"x": np.zeros(1)}, what="the broken process")
+    broken = arrays_kind("engine.features.no_such_module:KIND", "engine.features.none:main", "the broken process")
+    with pytest.raises(ChildFailed, match=r"the broken process ended with code 1 .*no_such_module"):
+        work_on_arrays(broken, {"x": np.zeros(1)})
 
 
 def test_cancelling_ends_the_child() -> None:

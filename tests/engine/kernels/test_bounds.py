@@ -195,17 +195,17 @@ def adam_cases(memory: GuardedMemory) -> Iterator[str]:
     adam = backend_called("cpu").adam(parameters)
     for kept in (parameters, dict.fromkeys(("1", "65"))):
         gradients = {name: memory.tensor(torch.rand(int(name))) for name in kept}
-        adam.norm(gradients)
-        adam.update(gradients, dict.fromkeys(parameters, 0.1), 0.5)
+        rates = dict.fromkeys(parameters, 0.1)
+        adam.step(gradients, rates, max_norm=0.5, is_sound=torch.tensor(True))
     for name, arrays in adam.state().items():
         adam.restore(name, arrays)
 
 
 def _run_beside_forbidden_pages(say: Say) -> None:
     from engine.backends.cpu.decode import decode as backend
-    from engine.kernels.compile_ahead import warm_up_all
+    from engine.backends.table import backend_called
 
-    warm_up_all()
+    backend_called("cpu").warm_up(is_training=True)
     for is_behind in (True, False):
         memory = GuardedMemory(is_behind=is_behind)
         memory.take_over([import_module(name) for name in MODULES], FUNCTIONS)

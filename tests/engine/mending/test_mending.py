@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.backends.table import backend_called
 from engine.clip_files.array_names import LOG_DRIFT
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.compact import compact_clip
@@ -57,15 +58,14 @@ class Case:
             tiny.reference,
             holdout=tiny.holdout,
             make_training=self.make,
+            backend=backend_called("cpu"),
             threads=Threads(1),
         )
 
     def shown(self) -> dict[int, TrainedClip]:
         found = {}
         for index, state in self.states.items():
-            from engine.backends.table import backend_called
-
-            model = load_clip_model(state, self.tiny.reference, backend=backend_called())
+            model = load_clip_model(state, self.tiny.reference, backend=backend_called("cpu"))
             trained = TrainedClip.of_state(self.tiny.clips[index], model, state, self.tiny.reference)
             assert trained is not None
             found[index] = trained
@@ -100,6 +100,7 @@ def test_wrong_exposure_of_some_cameras_is_measured_again(tiny: Tiny, trained: C
     header = mended.clips[1].state.header
     assert (header.step, header.config) == (trained.header.step, trained.header.config), "it was not trained anew"
     assert header.reference_fingerprint == tiny.reference.header.fingerprint
+    assert header.figures.held_out_whole == (header.figures.held_out_psnr is not None), "over every frame"
     assert header.origin == case.states[1].header.fingerprint, "what was picked in it stays picked"
 
 

@@ -1,8 +1,6 @@
 """Figures of one picture against independent implementations, hand values and what must hold for any picture."""
 
 import math
-import sys
-from types import ModuleType
 
 import hypothesis.extra.numpy as hnp
 import numpy as np
@@ -19,7 +17,6 @@ from torchmetrics.functional.image import (
 from engine.backends.reference.loss import ssim_map
 from engine.images.psnr import MAX_PSNR_DB, psnr
 from engine.metrics.columns import COLUMNS
-from engine.metrics.pictures import lpips
 from engine.metrics.pictures.colors import as_shown, fit_colors
 from engine.metrics.pictures.flip import flip
 from engine.metrics.pictures.picture import measure_picture
@@ -249,54 +246,3 @@ def test_a_picture_with_a_nan_has_no_figures_and_says_so():
     found = measure_picture(image, (truth * 255).astype(np.uint8), truth[..., 0] > 0.6)
     assert set(found.figures.values()) == {None}
     assert "not finite" in found.missing["psnr"]
-
-
-# ---------------------------------------------------------------- LPIPS
-
-
-class FakeNetwork:
-    """Stands in for lpips.LPIPS: the mean difference of what the network would see."""
-
-    def __init__(self, *, net: str, version: str, verbose: bool) -> None:
-        assert (net, version, verbose) == ("vgg", "0.1", False)
-
-    def eval(self) -> "FakeNetwork":
-        return self
-
-    def __call__(self, a: torch.Tensor, b: torch.Tensor, *, normalize: bool) -> torch.Tensor:
-        assert a.shape == b.shape == (1, 3, 60, 80)
-        return (a - b).abs().mean().reshape(1, 1, 1, 1) * (2 if normalize else 1)
-
-
-@pytest.fixture
-def fake_lpips(monkeypatch: pytest.MonkeyPatch, tmp_path):
-    """Both packages are there; weights in the folder that is given back, once a file is put there."""
-    module = ModuleType("lpips")
-    module.LPIPS = FakeNetwork  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "lpips", module)
-    monkeypatch.setattr(lpips.importlib.util, "find_spec", lambda name: object())
-    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
-    lpips._network.cache_clear()
-    yield tmp_path / "checkpoints"
-    lpips._network.cache_clear()
-
-
-def test_lpips_is_empty_with_a_reason_where_it_cannot_be_had(fake_lpips, monkeypatch):
-    image, truth = pair((60, 80))
-    assert lpips.lpips(image, truth) is None
-    assert lpips.WEIGHTS_FILE in (lpips.why_missing() or "")
-    monkeypatch.setattr(lpips.importlib.util, "find_spec", lambda name: None)
-    assert lpips.why_missing() == "the package lpips is not installed"
-    pixels, is_moving = (truth * 255).astype(np.uint8), truth[..., 0] > 0.6
-    assert measure_picture(image, pixels, is_moving).missing["lpips_fit"] == "the package lpips is not installed"
-
-
-def test_lpips_feeds_the_network_the_range_it_names(fake_lpips):
-    fake_lpips.mkdir()
-    (fake_lpips / lpips.WEIGHTS_FILE).touch()
-    image, truth = pair((60, 80))
-    expected = np.abs(image - truth).mean()
-    assert lpips.lpips_unscaled(image, truth) == pytest.approx(expected, rel=1e-5)
-    assert lpips.lpips(image, truth) == pytest.approx(2 * expected, rel=1e-5)
-    figures = measure_picture(image, (truth * 255).astype(np.uint8), truth[..., 0] > 0.6).figures
-    assert all(figures[name] is not None for name in ("lpips", "lpips_fit", "lpips_unscaled"))

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import socket
 import time
 
 import pytest
@@ -14,6 +15,7 @@ from engine.storage.files import (
     disk_error,
     is_left_over,
     open_regular,
+    open_to_append,
     read_bytes,
     replace_file,
 )
@@ -24,6 +26,23 @@ def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path):
     for read in (open_regular, check_regular):
         with pytest.raises(OSError, match="a pipe or a device"):
             read(tmp_path / "pipe")
+
+
+def test_lines_go_to_a_regular_file_under_the_name_itself(tmp_path):
+    for line in ("one", "two"):
+        with open(open_to_append(tmp_path / "log"), "a") as file:
+            file.write(f"{line}\n")
+    assert (tmp_path / "log").read_text() == "one\ntwo\n"
+    (tmp_path / "link").symlink_to(tmp_path / "log")
+    os.mkfifo(tmp_path / "pipe")
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(tmp_path / "socket"))
+    for name, said in (("link", "a symbolic link"), ("pipe", "a pipe or a device"), ("socket", "a pipe or a device")):
+        with pytest.raises(OSError, match=said):
+            open_to_append(tmp_path / name)
+    with pytest.raises(OSError, match="a pipe or a device"):
+        open_to_append("/dev/null")
+    assert (tmp_path / "log").read_text() == "one\ntwo\n"
 
 
 @pytest.mark.parametrize("read", [open_regular, check_regular])
@@ -60,8 +79,9 @@ def test_a_file_is_read_up_to_its_bound(tmp_path):
         (f"{PARTIAL_PREFIX}77-a", True, 0, False),
         (f"{PARTIAL_PREFIX}77-a", False, 0, True),
         (f"{PARTIAL_PREFIX}77-a", True, STALE_AFTER_S + 60, True),
-        (f"{PARTIAL_PREFIX}seven-a", True, 0, True),
-        (f"{PARTIAL_PREFIX}{'9' * 30}-a", True, 0, True),
+        (f"{PARTIAL_PREFIX}seven-a", False, 0, False),
+        (f"{PARTIAL_PREFIX}77", False, 0, False),
+        (f"{PARTIAL_PREFIX}{'9' * 30}-a", False, 0, False),
     ],
 )
 def test_a_half_written_file_is_left_over_where_nobody_writes_it_any_more(tmp_path, name, is_alive, age_s, expected):

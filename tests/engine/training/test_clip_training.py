@@ -20,12 +20,11 @@ from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_view import reaches_of
+from engine.model.clip_view import REACH_SPACINGS, reaches_of
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.preparation.method import Method
-from engine.training.step.nonfinite import loss_not_finite
 from engine.training.variants.variant_method import method_of
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
@@ -193,6 +192,41 @@ def test_resuming_continues_exactly_where_it_stopped(source, tmp_path):
     assert resumed.state().fingerprint == straight.state().fingerprint
 
 
+def test_steps_at_once_are_the_same_steps(source, tmp_path):
+    one_by_one, at_once = source(), source()
+    for training in (one_by_one, at_once):
+        training.prepare()
+    parts = [one_by_one.step() for _ in range(7)]
+    stats = at_once.step(7)
+    assert at_once.state().fingerprint == one_by_one.state().fingerprint
+    assert stats.gradient_norms == tuple(part.gradient_norms[0] for part in parts)
+    assert stats.loss == pytest.approx(sum(part.loss for part in parts) / 7)
+    assert (stats.step, stats.train_psnr, stats.n_gaussians) == (7, parts[-1].train_psnr, parts[-1].n_gaussians)
+    n_left = at_once.n_steps - 7
+    assert len(at_once.step(n_left + 100).gradient_norms) == n_left  # a phase ends where it ends
+    assert at_once.is_finished
+
+
+def test_a_fault_among_many_steps_leaves_what_was_before_it(source, tmp_path):
+    """As if it had been alone: parameters, moments, counts, and the order of what comes next."""
+    alone, among = source(), source()
+    for training in (alone, among):
+        training.prepare()
+        calls = iter(range(100))
+        spoilt = lambda gradient, calls=calls: gradient * (float("nan") if next(calls) > 2 else 1.0)  # noqa: E731
+        training.model.anchor_set("residual").features.register_hook(spoilt)
+    alone.step(3)
+    for training, n in ((alone, 1), (among, 9)):
+        with pytest.raises(NonFiniteLoss, match=r"residual\.features.* at step 4, camera cam"):
+            training.step(n)
+    kept = []
+    for training in (alone, among):
+        assert training.steps_done == 3
+        training.write_checkpoint(tmp_path / "kept.safetensors")
+        kept.append((tmp_path / "kept.safetensors").read_bytes())
+    assert kept[0] == kept[1]
+
+
 def test_resuming_in_the_static_phase_goes_through_the_change_of_phase(setting, tmp_path):
     config = TrainConfig(static_steps=4, joint_steps=4, max_static_points=800, max_moving_points=300)
     stopped = start(setting.capture, 0, tmp_path, config=config)
@@ -276,12 +310,12 @@ def test_a_loss_that_is_no_number_names_its_term_step_and_camera_and_changes_not
     training.prepare()
     training.step()
     spoil(training)
-    before = training.state().fingerprint, {k: v.tobytes() for k, v in training._optimizer.arrays().items()}
+    before = training.state().fingerprint, {k: v.tobytes() for k, v in training._phase.arrays().items()}
     with pytest.raises(NonFiniteLoss, match=said) as caught:
         training.step()
     assert "--set table_lr=0.02" in caught.value.hint
     assert training.steps_done == 1
-    assert (training.state().fingerprint, {k: v.tobytes() for k, v in training._optimizer.arrays().items()}) == before
+    assert (training.state().fingerprint, {k: v.tobytes() for k, v in training._phase.arrays().items()}) == before
 
 
 def test_a_step_after_a_loss_that_is_no_number_goes_on_as_if_nothing_had_been(source):
@@ -294,14 +328,6 @@ def test_a_step_after_a_loss_that_is_no_number_goes_on_as_if_nothing_had_been(so
     with torch.no_grad():
         training.gains[:] = good
     assert np.isfinite(training.step().loss)
-
-
-def test_rendered_values_that_are_no_numbers_are_counted():
-    image = torch.zeros(2, 3, 3)
-    image[0, 1] = float("inf")
-    values = {"photometric": float("nan"), "volume": 0.0}
-    said = str(loss_not_finite(image=image, **values, where="step 9, camera a", config=TrainConfig()))
-    assert said.startswith("The photometric loss became nan at step 9, camera a; 3 of 18 rendered values are not")
 
 
 def test_holding_out_almost_everything_is_refused(setting, tmp_path):
@@ -325,13 +351,13 @@ def test_what_cameras_can_see_stays_as_it_was_when_the_phase_began(source, tmp_p
     """Sizes of anchors are learned: asked again after a restart, a camera would see others."""
     training = source()
     training.prepare()
-    before = {role: reach.clone() for role, reach in training._sight.reaches.items()}
+    before = {role: reach.clone() for role, reach in training._phase.reaches.items()}
     role = max(before, key=lambda role: len(before[role]))
     with torch.no_grad():
         training.model.anchor_set(role).log_offset_scales += 2.0
     training.write_checkpoint(tmp_path / "kept.safetensors")
     resumed = source()
     resumed.restore_checkpoint(tmp_path / "kept.safetensors")
-    assert resumed._sight.reaches.keys() == before.keys()
-    assert all(torch.equal(resumed._sight.reaches[role], before[role]) for role in before)
-    assert not torch.equal(reaches_of(training.model.anchor_set(role), training._reach), before[role])
+    assert resumed._phase.reaches.keys() == before.keys()
+    assert all(torch.equal(resumed._phase.reaches[role], before[role]) for role in before)
+    assert not torch.equal(reaches_of(training.model.anchor_set(role), REACH_SPACINGS * training.spacing), before[role])

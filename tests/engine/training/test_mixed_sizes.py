@@ -87,7 +87,7 @@ def test_a_source_clip_learns_the_same_with_active_tiles(mixed: Tiny) -> None:
 def test_the_black_of_padding_is_not_learned(mixed: Tiny) -> None:
     """Below what a camera sees, the scene goes on, as others know."""
     trained = TrainedClip(
-        mixed.clips[0], load_clip_model(mixed.reference, None, backend=backend_called()), mixed.reference, None
+        mixed.clips[0], load_clip_model(mixed.reference, None, backend=backend_called("cpu")), mixed.reference, None
     )
     for camera in (0, 4):
         valid = mixed.capture.valid(camera)
@@ -99,7 +99,9 @@ def test_the_black_of_padding_is_not_learned(mixed: Tiny) -> None:
 
 def test_it_is_measured_where_cameras_see(mixed: Tiny) -> None:
     capture, clip = mixed.capture, mixed.clips[0]
-    trained = TrainedClip(clip, load_clip_model(mixed.reference, None, backend=backend_called()), mixed.reference, None)
+    trained = TrainedClip(
+        clip, load_clip_model(mixed.reference, None, backend=backend_called("cpu")), mixed.reference, None
+    )
     evaluation = Evaluation(capture, cameras=range(8), holdout=mixed.holdout, metrics="quick")
     pairs: list = []
     rows = evaluation.measure(trained, frames=[clip.start, clip.start + 1], on_pair=pairs.append)

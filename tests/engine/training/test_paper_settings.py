@@ -15,7 +15,7 @@ from engine.training.clip_training import seed_of
 from engine.training.config import TrainConfig
 from engine.training.preparation.kept_clouds import CLOUD_FILES
 from engine.training.presets import preset
-from tests.engine.training.tiny_training import finish, same_arrays, take_steps
+from tests.engine.training.tiny_training import finish, same_arrays, stepwise, take_steps
 
 pytestmark = pytest.mark.slow
 PAPER = preset("paper") | {
@@ -207,4 +207,4 @@ def _scales_of_first_step(training) -> torch.Tensor:
     order = type(training._order)(len(training._items), seed=training.seed + training._phase_index)
     camera_row, frame = divmod(training._items[order.draw()], training.clip.n_frames)
     view, clip_time = training._cameras.view(camera_row), frame / training.clip.clip_length
-    return training._active_picture(camera_row, view, clip_time).learning.scales.detach()
+    return stepwise(training).active_picture(camera_row, view, clip_time).learning.scales.detach()

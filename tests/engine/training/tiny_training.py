@@ -18,6 +18,7 @@ from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.step.stepwise_phase import StepwisePhase
 from engine.training.variants.variant_method import method_of
 from tests.built_once import BuiltOnce
 
@@ -70,7 +71,7 @@ class Tiny:
 
 def make_training(capture: Capture, holdout: list[int], *, clip: Clip, **arguments: Any) -> ClipTraining:
     """A training with the sizes of this module; settings of TrainConfig by name."""
-    given: dict[str, Any] = {"seed": 0, "report": lambda _: None, "previous": None, "backend": backend_called()}
+    given: dict[str, Any] = {"seed": 0, "report": lambda _: None, "previous": None, "backend": backend_called("cpu")}
     for name in ("reference", "previous", "prep_dir", "seed", "report", "regions", "backend"):
         if name in arguments:
             given[name] = arguments.pop(name)
@@ -105,6 +106,12 @@ def finish(training: ClipTraining) -> ClipState:
     while not training.is_finished:
         training.step()
     return training.state()
+
+
+def stepwise(training: ClipTraining) -> StepwisePhase:
+    """The phase that a training is in, as it is done by single operations."""
+    assert isinstance(training._phase, StepwisePhase)
+    return training._phase
 
 
 def take_steps(training: ClipTraining, n: int) -> ClipTraining:

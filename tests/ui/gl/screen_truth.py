@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from app.playback.arrays import BACKGROUND, GaussianArrays
+from app.playback.modes.arrays import BACKGROUND, GaussianArrays
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, rasterize
 from tests.ui.gl.scenes import FIELDS, Camera
@@ -68,7 +68,7 @@ def compared(
             camera.height,
             near_plane=near,
             background=torch.tensor(background),
-            backend=backend_called(),
+            backend=backend_called("cpu"),
         )
     expected = (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
     error = drawn.astype(np.float64) - expected
@@ -79,7 +79,7 @@ def compared(
 def main(folder: Path) -> None:
     """Every clip of a project, from twenty random views each."""
     from app.evaluation.headless import open_trained
-    from app.project.project import open_project
+    from app.project.project_access import open_project
     from ui.gl import make_headless_context
 
     size = (960, 600)

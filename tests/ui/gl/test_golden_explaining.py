@@ -8,8 +8,8 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.playback.coverage import Coverage
-from app.playback.trails import Trails, trail_lines
+from app.playback.modes.coverage import Coverage
+from app.playback.modes.trails import Trails, trail_lines
 from app.status import Overlays
 from tests.golden_images import assert_matches_golden
 from tests.ui.gl.keep import Keep

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 
-from app.playback.arrays import BACKGROUND, AnchorArrays, GaussianArrays
 from app.playback.frame_decoder import ShownFrame
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import BACKGROUND, AnchorArrays, GaussianArrays
 from app.playback.render import Look, RenderRequest, render
+from app.playback.views.orbit_view import OrbitView
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, rasterize
 from tests.ui.fake_session import make_rig
@@ -73,7 +73,9 @@ def test_the_rasterizer_s_picture_is_that_of_a_true_orthographic_camera(view: Or
     arrays = made_up(view)
     anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="none")
     look = Look.of(view, WIDTH, HEIGHT)
-    image = render(RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(arrays, anchors))).image
+    image = render(
+        RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(arrays, anchors)), backend_called("cpu")
+    ).image
     assert psnr(image / 255.0, from_infinitely_far(view, arrays)) > 55.0
 
 

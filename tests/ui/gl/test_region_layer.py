@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.playback.arrays import AnchorArrays
+from app.playback.modes.arrays import AnchorArrays
 from engine.clip_files.roles import ROLES
 from engine.gate.regions import sphere_region
 from tests.ui.gl.keep import Keep

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.playback.arrays import BACKGROUND
+from app.playback.modes.arrays import BACKGROUND
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.scenes import Camera, Splats, joined, make_splats
 from tests.ui.gl.screen_truth import LEAST_PSNR_DB, MOST_PIXELS_OFF, compared, random_cameras

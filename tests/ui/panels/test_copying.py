@@ -11,10 +11,11 @@ from imgui_bundle import imgui
 from pyglet.window import key, mouse
 
 from app.cli.cli import main
-from app.project.project import open_project
+from app.project.project_access import open_project
 from app.session.commands import AskExport, CloseQuestion, OpenProject
 from app.session.editing.edit_commands import AddEdit, PutMarker
-from engine.editing.edit import Delete, Sphere
+from engine.editing.actions import Delete
+from engine.editing.edit import Sphere
 from tests.app.residuals.conftest import make_project
 from tests.ui.pilot import Pilot
 from tests.ui.real_session import draw_until, make_session

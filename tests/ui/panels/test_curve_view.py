@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui.panels.curve_view import MAX_CHOSEN, MIN_SPAN, CurveView, value_at, value_range
+from ui.panels.training.curve_view import MAX_CHOSEN, MIN_SPAN, CurveView, value_at, value_range
 
 
 @given(

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from app.session import commands
-from app.session.doctor_status import DoctorStatus
+from app.session.captures.doctor_status import DoctorStatus
 from app.session.questions import CorrectionQuestion
+from app.status import JobStatus
 from engine.capture.writers.capture_json import Corrections
 from engine.cloud.background.exposure_survey import ExposureSurvey
 from engine.doctor.doctor import Diagnosis
@@ -18,7 +19,7 @@ from ui.panels.doctor.camera_map import camera_plan
 from ui.panels.doctor.evidence import picture_width
 from ui.panels.doctor.words import SEVERITY_ICONS, certainty_text, fix_words, summary_text
 from ui.panels.state import DOCTOR
-from ui.shell.questions import correction_texts
+from ui.shell.dialogs.questions import correction_texts
 
 
 def findings(names: tuple[str, ...]) -> tuple[Finding, ...]:
@@ -54,7 +55,9 @@ def test_a_capture_is_examined_from_the_panel_and_stopped(pilot: Pilot) -> None:
     open_panel(pilot, DoctorStatus())
     pilot.click("doctor.examine")
     assert pilot.session.commands[-1] == commands.ExamineCapture()
-    open_panel(pilot, DoctorStatus("running", (), None, 0.4, "looking at pictures of 100 %s", 30.0, 2))
+    open_panel(
+        pilot, DoctorStatus("running", (), None, JobStatus("Doctor", 0.4, "looking at pictures of 100 %s", 1.0), 2)
+    )
     pilot.click("doctor.stop")
     assert pilot.session.commands[-1] == commands.StopExamining()
     assert not [notice for notice in pilot.session.notices if notice.kind == "error"]
@@ -63,7 +66,7 @@ def test_a_capture_is_examined_from_the_panel_and_stopped(pilot: Pilot) -> None:
 @pytest.mark.gl
 def test_findings_offer_what_corrects_them(pilot: Pilot) -> None:
     found = diagnosis(pilot.session.rig.names)
-    open_panel(pilot, DoctorStatus("done", found.findings, found, 1.0, revision=3))
+    open_panel(pilot, DoctorStatus("done", found.findings, found, revision=3))
     rects = pilot.studio.frame.ui.rects
     assert {"doctor.finding0", "doctor.picture0", "doctor.picture1", "doctor.map", "doctor.bars"} <= rects.keys()
     pilot.click("doctor.fix")
@@ -86,7 +89,7 @@ def test_findings_offer_what_corrects_them(pilot: Pilot) -> None:
 def test_cameras_out_of_step_lead_to_the_dialog_that_measures_them(pilot: Pilot) -> None:
     name = pilot.session.rig.names[2]
     late = Finding("synchronisation", "warning", (name,), (), f"{name} is late.", 0.9, "Shift it.", None)
-    open_panel(pilot, DoctorStatus("done", (late,), None, 1.0, revision=4))
+    open_panel(pilot, DoctorStatus("done", (late,), None, revision=4))
     pilot.click("doctor.synchronise")
     assert pilot.session.commands[-1] == commands.SynchroniseCameras()
     assert "doctor.calibrate" not in pilot.studio.frame.ui.rects

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
@@ -23,8 +24,14 @@ from app.session.editing.edit_commands import (
     SetScale,
     SetUp,
 )
-from engine.editing.edit import Box, Delete, Expose, Hide, Scope, Smooth, Sphere
+from app.session.editing.selection import Selection
+from app.session.editing.selection_status import SelectionStatus
+from engine.editing.actions import Delete, Expose, Hide, Smooth
+from engine.editing.edit import Box, Scope, Sphere
+from engine.editing.gaussian_rows import RowSet
+from engine.editing.reach import ClipAnchors
 from tests.ui.pilot import CTRL, SHIFT, Pilot
+from ui.panels.editing import details
 from ui.panels.state import EDITS, HISTORY
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -72,6 +79,53 @@ def test_a_drawn_volume_is_cropped_to_and_its_handles_become_those_of_the_edit(p
     assert "handle.face +x" not in panel.rects
 
 
+def test_the_details_of_a_new_edit_come_into_sight_and_stay_while_numbers_are_typed(open_pilot, monkeypatch) -> None:
+    pilot = open_pilot(size=(1280, 720))
+    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot.draw(4)
+    pilot.click("edits.make recolor")
+    pilot.draw(3)
+    opacity = pilot.rects["edits.opacity"]
+    assert opacity.y1 < pilot.rects["timeline.track"].y0 - 60, "the last field is in sight"
+    drawn: list[list[str]] = []
+    real = details.numbers
+
+    def numbers(ui, name, *arguments, **options):
+        drawn[-1].append(name)
+        return real(ui, name, *arguments, **options)
+
+    def action_fields(*arguments, real=details._draw_action):
+        drawn.append([])
+        return real(*arguments)
+
+    monkeypatch.setattr(details, "numbers", numbers)
+    monkeypatch.setattr(details, "_draw_action", action_fields)
+    x, y = pilot.rects["edits.tint_share"].center
+    pilot.drag((x, y), (x + 40, y))
+    assert pilot.session.edits.edits[0].action.tint_share > 0.0
+    assert {tuple(names) for names in drawn} == {("tint_share", "saturation", "gains", "opacity")}
+    assert pilot.rects["edits.opacity"] == opacity
+
+
+def test_an_edit_that_cannot_act_is_not_offered_and_says_why(panel: Pilot) -> None:
+    clips = (ClipAnchors(0, 0, 10, "a"), ClipAnchors(1, 10, 20, "b", "a"))
+    panel.session.edits = dataclasses.replace(panel.session.edits, clips=clips)
+    own = RowSet("b", 1, "residual")
+    panel.session.selecting.selection = Selection(((own, np.arange(3)),))
+    panel.session.selection = SelectionStatus(n_gaussians=3, n_shown=3, words="3 Gaussians", can_select=True)
+    panel.draw(2)
+    assert "edits.note" in panel.rects, "it ends at the borders of its clip"
+    panel.session.timeline.seek(12)
+    panel.click("edits.scope clip")
+    panel.draw(2)
+    assert "edits.note" not in panel.rects
+    panel.session.timeline.seek(3)
+    panel.draw(2)
+    assert "edits.note" in panel.rects
+    panel.click("edits.make delete")
+    assert panel.sent(AddEdit) == []
+
+
 def test_what_was_drawn_is_marked_as_moving(panel: Pilot) -> None:
     ui = panel.studio.frame.ui
     ui.selecting.kind, ui.selecting.volume = "box", BOX
@@ -103,7 +157,7 @@ def test_details_change_name_scope_and_numbers(panel: Pilot) -> None:
     panel.draw(3)
     assert session.edits.edits[0].scope == Scope(4)
     n_sent = len(panel.sent(ChangeEdit))
-    field = panel.rects["edits.sigma"]
+    field = panel.rects["edits.sigma_frames"]
     panel.drag((field.x0 + 30, field.center[1]), (field.x0 + 120, field.center[1]), steps=6)
     changes = panel.sent(ChangeEdit)[n_sent:]
     assert session.edits.edits[0].action.sigma_frames > 2.5

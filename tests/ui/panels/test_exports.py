@@ -13,9 +13,8 @@ from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_plan import ExportPlan
 from app.export.export_progress import ExportProgress, ExportResult
 from app.export.export_status import ExportStatus
-from app.export.forms.table import answers_to
-from app.export.forms.video_form import VIDEO
-from app.export.video.job import Turntable
+from app.export.jobs.answers import Answers
+from app.export.jobs.video import Turntable
 from app.session import commands
 from app.session.exporting import ExportPage
 from tests.ui.pilot import CTRL, Pilot
@@ -37,7 +36,24 @@ CONTEXT = ExportContext(
     fps=30.0,
     paths=(f"path {ODD}",),
 )
+CONTEXT_WITH_EDITS = msgspec.structs.replace(CONTEXT, has_edits=True)
 STATUS = ExportStatus(1, "Gaussians, PLY", Path("/out") / ODD)
+
+
+def test_edits_go_along_or_are_left_out(open_pilot) -> None:
+    pilot = open_pilot()
+    for kind, takes_edits in (("gaussians", True), ("video", True), ("player", True), ("cameras", False)):
+        ask(pilot, ExportChoices(kind=kind), CONTEXT_WITH_EDITS)
+        assert ("export.has_edits.false" in pilot.rects) is takes_edits
+        if takes_edits:
+            pilot.click("export.has_edits.false")
+            pilot.click("export.start")
+            [started] = pilot.sent(commands.StartExport)[-1:]
+            assert Answers(CONTEXT_WITH_EDITS, started.choices)["has_edits"] == "false"
+        pilot.session.exporting.page = None
+        pilot.draw(4)
+    ask(pilot, ExportChoices(kind="gaussians"))
+    assert "export.has_edits.false" not in pilot.rects, "the project has none"
 
 
 def errors(pilot: Pilot) -> list[str]:
@@ -111,7 +127,7 @@ def test_every_kind_is_asked_for_and_gets_a_name_unless_one_was_typed(pilot: Pil
     pilot.click("export.format.json")
     pilot.click("export.frames.range")
     pilot.draw(2)
-    assert asked(pilot) == ExportChoices("metrics", (("metrics.format", "json"),), "range", 1, "/mine")
+    assert asked(pilot) == ExportChoices("metrics", (("metrics.format", "json"),), "range", "/mine")
     assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
     assert not errors(pilot)
 
@@ -148,10 +164,10 @@ def test_names_are_shown_as_they_are_where_they_are_few(pilot: Pilot) -> None:
 @pytest.mark.gl
 def test_a_turntable_has_turns(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(kind="video", out="/out/v").with_answer("from", "turntable"))
-    pilot.click("export.turns.2")
+    pilot.click("export.n_turns.2")
     pilot.draw(2)
-    assert asked(pilot).answer("turns") == "2"
-    job = VIDEO.make_job(answers_to(CONTEXT, asked(pilot)))
+    assert asked(pilot).answer("n_turns") == "2"
+    job = Answers(CONTEXT, asked(pilot)).make_job()
     assert job.turntable == Turntable(2.0)  # type: ignore[attr-defined]
 
 
@@ -225,6 +241,8 @@ def test_the_panel_lists_exports_and_its_buttons_act(pilot: Pilot) -> None:
 @pytest.mark.gl
 def test_the_panel_is_reached_and_used_by_keyboard(pilot: Pilot) -> None:
     pilot.session.exporting.statuses = (replace(STATUS, state="failed", message="x"),)
+    pilot.studio.frame.ui.wanted_panel = EXPORTS
+    pilot.draw(3)
     for _ in range(20):
         if pilot.studio.frame.ui.keyed_panel == EXPORTS:
             break

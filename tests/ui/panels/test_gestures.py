@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
-from app.playback.orbit_view import OrbitView
-from app.playback.view_motion import EASE_S
+from app.playback.views.orbit_view import OrbitView
+from app.playback.views.view_motion import EASE_S
 from app.session import commands
-from app.session.window_memory import WindowMemory, read_window_memory
+from app.session.projects.window_memory import WindowMemory, read_window_memory
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.panels.actions.key import parse_key
 from ui.panels.actions.table import ACTIONS
-from ui.panels.gestures import FLY_KEYS, GESTURE_WORDS, PRESETS, Navigation, gesture_rows, mouse_help
-from ui.panels.gizmo import gizmo_tips, tip_under
-from ui.panels.pointer import PX_PER_STEP
+from ui.panels.picture.gestures import FLY_KEYS, GESTURE_WORDS, PRESETS, Navigation, gesture_rows, mouse_help
+from ui.panels.picture.gizmo import gizmo_tips, tip_under
+from ui.panels.picture.pointer import PX_PER_STEP
 from ui.panels.state import Rect
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]

@@ -75,6 +75,26 @@ def test_a_key_means_the_seam_that_is_played_around(pilot: Pilot) -> None:
     assert pilot.sent(AskMend) == [AskMend(after=2)]
 
 
+def test_escape_closes_what_lies_on_top_and_leaves_the_tool_after_that(pilot: Pilot) -> None:
+    tool = pilot.studio.frame.ui.selecting
+    tool.choose("lasso")
+    show(pilot, ASKING)
+    pilot.key(key.ESCAPE)
+    assert pilot.sent(CloseMend) == [CloseMend()]
+    assert tool.kind == "lasso"
+    show(pilot, None)
+    pilot.key(key.ESCAPE)
+    assert tool.kind is None
+    show(pilot, DONE)  # which is kept or taken back by its buttons
+    pilot.key(key.ESCAPE)
+    assert pilot.sent(CloseMend) == [CloseMend()]
+
+
+def test_it_leaves_room_for_what_a_tool_says(pilot: Pilot) -> None:
+    show(pilot, ASKING)
+    assert pilot.rects["mend"].y0 >= pilot.rects["viewport.free"].y0 + 60
+
+
 def test_what_runs_shows_how_far_it_is_and_can_be_stopped(pilot: Pilot) -> None:
     pilot.session.mending.progress = JobStatus("Mending", 0.4, "Fading - clip 1, step 10 of 480")
     show(pilot, MendPage(ASKING.request, ASKING.words, 20, (1, 2), "running"))

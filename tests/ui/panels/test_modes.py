@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 from pyglet.window import key
 
-import ui.panels.comparison as comparison
-from app.playback.view_modes import CONTENTS, MODES
-from app.session.commands import LookThrough, SetCompare, SetCompareWith, SetContent, SetMode
+import ui.panels.picture.comparison as comparison
+from app.playback.modes.view_modes import CONTENTS, MODES
+from app.session.commands import LookThrough, SetCompare, SetCompareWith, SetContent, SetMode, ShowHeat
 from app.status import BLINK_HZ, CAPTURED, ClipStatus, Overlays, VersionStatus, version_name, version_number
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import SHIFT, Pilot
 from ui.panels.actions.table import ACTIONS
-from ui.panels.color_bar import bar_number
-from ui.panels.comparison import covered_share, kind_words, missing_words, other_label
+from ui.panels.picture.color_bar import bar_number
+from ui.panels.picture.comparison import covered_share, kind_words, missing_words, other_label
+from ui.panels.picture.row_fit import RowFit, fit_row
 from ui.panels.state import UiState
+from ui.panels.widgets import box_words
 
 DIGITS = (key._1, key._2, key._3, key._4, key._5, key._6, key._7, key._8, key._9)
 
@@ -61,19 +64,63 @@ def test_the_toolbar_fits(size: tuple[int, int], n_views: int, open_pilot: Calla
     session.views.show(n_views)
     pilot = open_pilot(session, size=size)
     canvas = pilot.rects["viewport.view0" if n_views == 1 else "viewport.view1"]
-    names = ["viewport.camera", "viewport.mode", "viewport.overlays", "viewport.mark"]
-    boxes = [pilot.rects[name] for name in names]
+    names = ["viewport.camera", "viewport.mode", "viewport.compare", "viewport.heat", "viewport.overlays"]
+    names += ["viewport.mark", "viewport.more", "viewport.views1", "viewport.views2", "viewport.views4"]
+    boxes = [pilot.rects[name] for name in names if name in pilot.rects]
     assert boxes[-1].x1 <= canvas.x1 + 1
+    assert {"viewport.camera", "viewport.mode", "viewport.overlays"} <= pilot.rects.keys()
+    hidden = [name for name in names if name not in pilot.rects and name != "viewport.more"]
+    assert bool(hidden) == ("viewport.more" in pilot.rects)
+    if hidden:
+        pilot.click("viewport.more")
+        pilot.draw(3)
+        assert set(names) <= pilot.rects.keys(), "the menu at the end has the rest"
     for left, right in itertools.pairwise(boxes):
         assert left.x1 <= right.x0
-    assert all(box.width >= 28 for box in boxes)
+    assert all(box.width >= 20 for box in boxes)
+
+
+@pytest.mark.parametrize("kind", ["R", "clips"])
+@pytest.mark.parametrize(("size", "scale"), [((1600, 1000), 1.0), ((1600, 1000), 1.5), ((1600, 1000), 2.0)])
+def test_words_of_the_toolbar_are_whole_or_in_the_menu(
+    kind: str, size: tuple[int, int], scale: float, open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cut: list[str] = []
+    plain = box_words
+
+    def watched(words: str, width: float) -> str:
+        shown = plain(words, width)
+        cut.extend([words] if shown != words else [])
+        return shown
+
+    for module in ("toolbar", "mode_box", "compare_box", "heat_box"):
+        monkeypatch.setattr(f"ui.panels.picture.{module}.box_words", watched)
+    pilot = open_pilot(FakeSession(), size=size)
+    pilot.studio.frame.ui.scale.chosen = scale
+    pilot.session.dispatch(LookThrough(2))
+    pilot.session.dispatch(ShowHeat(kind))
+    pilot.session.dispatch(SetCompare("side"))
+    pilot.draw(6)
+    cut.clear()
+    pilot.draw(2)
+    assert cut == []
+
+
+def test_a_row_hides_what_is_missed_least_first() -> None:
+    styles = [{"a": 100.0, "b": 100.0, "c": 50.0}, {"a": 60.0, "b": 60.0, "c": 50.0}]
+    fit = partial(fit_row, styles, gap=10.0, menu=20.0, can_hide=("c", "b"))
+    assert fit(270.0) == RowFit(0, styles[0])
+    assert fit(190.0) == RowFit(1, styles[1])
+    assert fit(189.0) == RowFit(1, {"a": 60.0, "b": 60.0}, ("c",))
+    assert fit(159.0) == RowFit(1, {"a": 60.0}, ("b", "c"))
+    assert fit(10.0) == RowFit(1, {"a": 60.0}, ("b", "c"))
 
 
 def test_a_bar_says_what_colours_mean_and_the_value_under_the_pointer(
     trained: Pilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values: list[float | None] = []
-    monkeypatch.setattr("ui.panels.hud.draw_color_bar", lambda *arguments: values.append(arguments[-1]))
+    monkeypatch.setattr("ui.panels.picture.hud.draw_color_bar", lambda *arguments: values.append(arguments[-1]))
     assert "viewport.color_bar" not in trained.rects
     trained.key(DIGITS[1], modifiers=(SHIFT,))
     pane = trained.rects["viewport.rendered"]
@@ -183,6 +230,10 @@ def test_names_of_the_two_pictures() -> None:
         (100.0, 0.0, 100.0, "100"),
         (37.4, 0.0, 1000.0, "37"),
         (0.00012, 0.0, 0.0005, "0.00012"),
+        (0.4512, 0.0, 25.5, "0.45"),
+        (0.0452, 0.0, 25.5, "0.045"),
+        (-0.22, -25.5, 25.5, "-0.22"),
+        (3.21, 0.0, 25.5, "3.2"),
     ],
 )
 def test_numbers_of_a_bar_are_short_and_tell_steps_apart(value: float, low: float, high: float, text: str) -> None:

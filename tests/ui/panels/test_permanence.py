@@ -11,13 +11,14 @@ from app.session.clips.clip_commands import ApplyDeletions
 from app.session.clips.clip_questions import DeletionsQuestion
 from app.session.commands import CloseQuestion
 from app.session.edit_status import EditsStatus
-from engine.editing.edit import Delete, Edit, Expose, Picked, PickedRows, Sphere
+from engine.editing.actions import Delete, Expose
+from engine.editing.edit import Edit, Picked, PickedRows, Sphere
 from engine.editing.lost_picks import LostPicks
 from engine.editing.picks import pack_rows
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
 from ui.panels.state import EDITS
-from ui.shell.clip_questions import clip_question_texts
+from ui.shell.dialogs.clip_questions import clip_question_texts
 
 pytestmark = pytest.mark.gl
 
@@ -61,7 +62,7 @@ def test_it_is_asked_before_clips_are_written(panel: Pilot, button: str, command
 
 def test_the_question_says_what_stays() -> None:
     whole = " ".join(clip_question_texts(DeletionsQuestion(1234, 3, 0)))
-    assert "3 clips are written again without 1,234 anchors" in whole
+    assert "3 clips will be written again without 1,234 anchors" in whole
     assert "not trained" not in whole
     assert "1 clip is not trained" in " ".join(clip_question_texts(DeletionsQuestion(1, 1, 1)))
 

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 from pyglet.window import key
 
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
-from app.status import CELL_RANGES, SeamStatus
+from app.status import CELL_RANGES, ResidualStatus, SeamStatus
+from engine.text import camera_text
 from tests.ui.pilot import Pilot
-from ui.panels.heat_overlay import heat_words
+from ui.panels.picture.heat_overlay import heat_words
 from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, worst_of
-from ui.panels.residuals.matrix import cell_colors, matrix_picture
-from ui.panels.residuals.panel import worst_seams
+from ui.panels.residuals.matrix import NAME_HEIGHT, cell_colors, matrix_picture, named_rows
+from ui.panels.residuals.panel import listed_seams, progress_text
 from ui.panels.state import RESIDUALS
+from ui.panels.timeline.columns import provisional_text
 from ui.viewport.anchor_heat_layer import heat_points
 from ui.viewport.heat_image import value_at
 
@@ -48,6 +54,26 @@ def test_cells_of_pixels_cover_all_cells_in_order() -> None:
     assert set(found) == {0, 1, 2}
 
 
+def test_every_camera_has_a_name_or_a_neighbour_with_one() -> None:
+    assert named_rows(8, 16.0, None) == set(range(8))
+    assert named_rows(31, 250.0 / 31, None) == set(range(0, 31, 2))
+    named = named_rows(31, 250.0 / 31, 13)
+    assert 13 in named
+    assert not {12, 14} & named
+    for shown in range(31):
+        rows = sorted(named_rows(31, 250.0 / 31, shown))
+        assert min(after - row for row, after in itertools.pairwise(rows)) * 250.0 / 31 >= NAME_HEIGHT
+
+
+def test_a_camera_is_called_one() -> None:
+    assert [camera_text(name) for name in ("13", "cam13", "Camera 2", "left")] == [
+        "camera 13",
+        "cam13",
+        "Camera 2",
+        "camera left",
+    ]
+
+
 def test_a_place_outside_of_the_matrix_is_no_cell() -> None:
     assert cell_at(0.999, 0.0, 30, 8) == (29, 0)
     assert cell_at(1.0, 0.5, 30, 8) is None
@@ -63,7 +89,25 @@ def test_bad_is_bright_in_every_column() -> None:
 
 def test_seams_without_a_score_are_left_out() -> None:
     seams = (SeamStatus(1, 10, 0.5, 1.2), SeamStatus(2, 20), SeamStatus(3, 30, 2.5, 2.0), SeamStatus(4, 40, 0.9))
-    assert [seam.clip_index for seam, _ in worst_seams(seams, 5)] == [4, 3, 1]
+    assert [seam.clip_index for seam, _ in listed_seams(seams, 5)] == [4, 3, 1]
+
+
+def test_a_seam_is_neither_ranked_nor_flagged_before_all_cameras_are_in() -> None:
+    early = SeamStatus(1, 10, 0.9, 2.64, 5, 31)
+    seams = (early, SeamStatus(2, 20, 0.2, 1.3, 31, 31), SeamStatus(3, 30, 0.9, 2.5, 31, 31))
+    assert [(seam.clip_index, ratio) for seam, ratio in listed_seams(seams, 5)] == [(3, 2.5), (2, 1.3), (1, None)]
+    assert provisional_text(early) == "~2.6 (5 of 31 cameras)"
+    assert [provisional_text(seam) for seam in (*seams[1:], SeamStatus(4, 40, n_all=31))] == [""] * 3
+
+
+def test_progress_counts_what_the_panel_shows() -> None:
+    measured = {"psnr": (1860, 4650), "flip": (0, 4650), "E": (26, 4619)}
+    status = ResidualStatus(measured=measured, n_all=4650, is_measuring=True)
+    assert progress_text(status, "psnr") == "PSNR of 1,860 of 4,650 pictures measured."
+    assert progress_text(status, "flip") == "FLIP of 0 of 4,650 pictures measured."
+    later = replace(status, eta_s=4500.0)
+    assert progress_text(later, "E") == "Flicker of 26 of 4,619 pictures measured; all figures in about 1 h 15 min."
+    assert progress_text(replace(later, n_done=4650), "E") == "All 4,650 pictures of trained clips are measured."
 
 
 def test_a_value_outside_of_the_map_is_none() -> None:
@@ -77,6 +121,8 @@ def test_words_say_what_is_shown_and_why_not() -> None:
     kind = HEAT_KINDS["E"]
     shown = HeatMap(np.zeros((2, 2), np.float32), "E", 1, 0, 5, 0, mean=1.25)
     assert heat_words(kind, shown) == "E: excess flicker, frame 5, mean 1.2 x 1/255"
+    little = HeatMap(np.zeros((2, 2), np.float32), "E", 1, 0, 5, 0, mean=0.0452)
+    assert heat_words(kind, little) == "E: excess flicker, frame 5, mean 0.045 x 1/255"
     nothing = HeatMap(None, "E", None, 0, 0, 0, note="Frame 0 has no frame before it.")
     assert "no frame before" in heat_words(kind, nothing)
     assert "being measured" in heat_words(kind, None)
@@ -189,3 +235,29 @@ def test_anchors_that_nobody_saw_are_left_out_and_the_hottest_come_last() -> Non
     assert np.array_equal(positions, np.eye(3)[[2, 0]])
     assert colors[1, 3] == 1.0
     assert colors[0, 3] < 0.5
+
+
+def test_words_of_a_heat_map_lie_over_the_wipe_and_fit_into_the_picture(
+    pilot: Pilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[str] = []
+    note = "Clip 0 ends before this frame: its last one stands in, which shows no more than R"
+    plain = pilot.session.heat
+    monkeypatch.setattr(pilot.session, "heat", lambda kind: replace(plain(kind), note=f"{note}; {note}"))
+    monkeypatch.setattr(
+        "ui.panels.picture.heat_overlay.chip",
+        lambda draw, x, y, text, **_: drawn.append(f"{text}|{x - imgui.calc_text_size(text).x}"),
+    )
+    monkeypatch.setattr("ui.panels.picture.picture_pane._draw_handle", lambda *_: drawn.append("wipe"))
+    pilot.session.dispatch(commands.LookThrough(2))
+    pilot.session.dispatch(commands.SetFrame(10))
+    pilot.session.dispatch(commands.ShowHeat("clips"))
+    pilot.session.dispatch(commands.SetCompare("wipe"))
+    pilot.draw(3)
+    drawn.clear()
+    pilot.draw(1)
+    assert drawn[0] == "wipe"
+    lines = [line.split("|") for line in drawn[1:]]
+    assert len(lines) > 1
+    assert " ".join(text for text, _ in reversed(lines)).endswith(f"({note}; {note})")
+    assert all(float(left) >= pilot.rects["viewport.rendered"].x0 for _, left in lines)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.playback.arrays import AnchorArrays
+from app.playback.modes.arrays import AnchorArrays
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
@@ -94,6 +94,12 @@ def test_tools_modes_and_options(panel: Pilot) -> None:
     for name in ("is_visible_only", "is_by_extent", "is_whole_anchors"):
         panel.click(f"selection.{name}")
         assert getattr(tool(panel), name)
+
+
+def test_what_moves_is_selected_by_a_button(panel: Pilot) -> None:
+    panel.click("selection.subtract")
+    panel.click("selection.what moves")
+    assert panel.sent(SelectByAttribute) == [SelectByAttribute("motion", 1.0, 1.0, How("subtract"))]
 
 
 def test_a_range_by_its_handles_and_by_numbers(panel: Pilot) -> None:

@@ -111,8 +111,7 @@ def test_a_waiting_clip_is_dragged_to_another_place(busy: Pilot) -> None:
 
 def test_keys_choose_move_and_remove_waiting_clips(busy: Pilot) -> None:
     busy.key(key.DOWN, modifiers=(CTRL, SHIFT))
-    assert busy.sent(MoveInQueue) == [], "nothing is chosen"
-    busy.key(key.N, modifiers=(SHIFT,))
+    assert busy.sent(MoveInQueue) == [], "nothing was chosen: now the first one is"
     busy.key(key.N, modifiers=(SHIFT,))
     busy.key(key.DOWN, modifiers=(CTRL, SHIFT))
     busy.key(key.UP, modifiers=(CTRL, SHIFT))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.playback.views import Views
+from app.playback.views.views import Views
 from app.session import commands
 from tests.ui.fake_session import make_rig
 from tests.ui.pilot import Pilot
-from ui.panels.panes import VIEW_GAP, view_areas
+from ui.panels.picture.panes import VIEW_GAP, view_areas
 from ui.panels.state import Rect
 
 
@@ -104,3 +106,31 @@ def test_each_view_looks_through_its_own_camera_and_they_share_time(pilot: Pilot
     first, last = pilot.rects["viewport.view0"], pilot.rects["viewport.view3"]
     assert last.x0 > first.x1
     assert last.y0 > first.y1
+
+
+def test_words_over_small_views_stay_in_their_view_and_parts_stay_whole(pilot: Pilot) -> None:
+    from ui.panels.picture.hud import wrapped
+    from ui.viewport.hud_text import PARTS
+
+    label = PARTS.join(["clip 0", "frame 0", "0.00 s", "cam04", "156 x 117"])
+    assert wrapped(label, 24, len, between=PARTS) == [
+        PARTS.join(["clip 0", "frame 0"]),
+        PARTS.join(["0.00 s", "cam04"]),
+        "156 x 117",
+    ]
+    pilot.studio.window.set_size(900, 600)
+    pilot.session.dispatch(commands.LookThrough(2))
+    pilot.session.dispatch(commands.SetCompare("wipe"))
+    pilot.session.dispatch(commands.ShowViews(4))
+    pilot.draw(4)
+    before = pilot.picture()
+    view, other = pilot.rects["viewport.view3"], pilot.rects["viewport.view1"]
+    hud = pilot.studio.frame.viewport.active.hud
+    drawn = hud.text
+    assert drawn is not None
+    words = " ".join(["as much as nobody would like to read in a picture as small as this one"] * 4)
+    hud._text = lambda *_: replace(drawn, note=words, failure=words)
+    pilot.draw(3)
+    after = pilot.picture()
+    outside = np.s_[int(other.y0) : int(view.y0) - 6, int(other.x0) : int(other.x1)]
+    assert np.array_equal(before[outside], after[outside])

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from pyglet.window import key
 
-from app.document.recovery import Recovery
+from app.document.storing.recovery import Recovery
 from app.project.project_choices import ProjectChoices
 from app.session.commands import CloseQuestion, OpenCapture, OpenProject
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, SaveProjectAs, ShowProjectFolder
@@ -25,7 +25,7 @@ from app.status import JobStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
 from ui.panels.state import EDITS
-from ui.shell.dialogs import RELOCATE
+from ui.shell.dialogs.dialogs import RELOCATE
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
@@ -93,7 +93,7 @@ def test_escape_leaves_a_damaged_project_alone(pilot: Pilot) -> None:
 def test_a_lost_capture_is_asked_for_with_the_dialog_for_folders(
     pilot: Pilot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
     dialog = pilot.studio.frame.dialog
     dialog._start, dialog._text = tmp_path, str(tmp_path)
     asked(pilot, RelocationQuestion(FOLDER, Path("/captures/dance")))
@@ -138,7 +138,7 @@ def test_saving_shows_how_far_it_is_and_escape_ends_it(pilot: Pilot) -> None:
 def test_opening_for_reading_only_is_in_the_menu(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
     pilot = open_pilot(FakeSession(has_capture=False))
     pilot.studio.frame.dialog._text = str(tmp_path)
     pilot.studio.frame.ui.wishes.is_read_only = True

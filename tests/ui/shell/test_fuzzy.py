@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ui.panels.actions.table import ACTIONS
-from ui.shell.fuzzy import MAX_TYPED, folded, match
+from ui.shell.finding.fuzzy import MAX_TYPED, folded, match
 
 
 def best(typed: str, *texts: str) -> list[str]:

@@ -11,7 +11,7 @@ import pytest
 from imgui_bundle import imgui
 from pyglet.window import key
 
-from app.session.window_memory import WindowMemory
+from app.session.projects.window_memory import WindowMemory
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot

@@ -9,10 +9,10 @@ import pytest
 from pyglet.window import key
 
 from app.session.commands import SetFrame, TogglePlay
-from app.session.preferences import PreferencesFile
+from app.session.projects.preferences import PreferencesFile
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.panels.state import PANELS
+from ui.panels.state import EDITS, PANELS, TIMELINE
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
@@ -44,7 +44,7 @@ def test_a_layout_is_kept_by_name_shown_again_and_removed(open_pilot: Callable[.
     pilot.rest()
     wide = pilot.rects["viewport.canvas"].x0
     assert wide > canvas.x0 + 50
-    run(pilot, "save layout as")
+    run(pilot, "keep the layout")
     pilot.type("100 % ##mine")
     pilot.key(key.ENTER)
     pilot.rest()
@@ -70,7 +70,7 @@ def test_a_layout_of_other_panels_changes_nothing(open_pilot: Callable[..., Pilo
 
 
 def test_names_of_the_program_s_layouts_are_taken(pilot: Pilot) -> None:
-    run(pilot, "save layout as")
+    run(pilot, "keep the layout")
     pilot.type("Standard")
     pilot.key(key.ENTER)
     pilot.draw(2)
@@ -99,12 +99,19 @@ def test_the_picture_alone_and_back(pilot: Pilot) -> None:
 
 def test_f6_goes_from_panel_to_panel_and_escape_gives_the_keys_back(pilot: Pilot) -> None:
     ui = pilot.studio.frame.ui
+    ui.wanted_panel = EDITS
+    pilot.draw(3)
+    seen = set(pilot.studio.frame._visible_panels)
+    in_order = [title for title in PANELS if title in seen]
+    assert EDITS in in_order
+    assert len(in_order) < len(PANELS), "some lie behind others"
     visited = []
-    for _ in (*PANELS, None):
+    for _ in (*in_order, None):
         pilot.key(key.F6)
         pilot.draw(2)
         visited.append(ui.keyed_panel)
-    assert visited == [*PANELS, None]
+        assert pilot.studio.frame._visible_panels == seen, "tabs stay as they are"
+    assert visited == [*in_order, None]
     pilot.key(key.F6)
     pilot.draw(3)
     frame_index = pilot.session.timeline.frame_index
@@ -124,7 +131,7 @@ def test_f6_goes_from_panel_to_panel_and_escape_gives_the_keys_back(pilot: Pilot
 def test_a_click_gives_the_keys_back(pilot: Pilot) -> None:
     pilot.key(key.F6, modifiers=(SHIFT,))
     pilot.draw(2)
-    assert pilot.studio.frame.ui.keyed_panel == PANELS[-1]
+    assert pilot.studio.frame.ui.keyed_panel == TIMELINE
     pilot.click("capture.free")
     assert pilot.studio.frame.ui.keyed_panel is None
 

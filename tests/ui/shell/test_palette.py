@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from imgui_bundle import imgui
 from pyglet.window import key
 
 from app.playback.timeline import Timeline
@@ -15,9 +17,10 @@ from app.session.commands import LookThrough, OpenProject, SetFrame, TrainNextCl
 from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot
+from ui.panels.actions.action import Action
 from ui.panels.actions.menus import MOST_ITEMS, Menu, menus
 from ui.panels.actions.table import ACTIONS
-from ui.shell.palette_entries import MOST_SHOWN, entries, found
+from ui.shell.finding.palette_entries import MOST_SHOWN, entries, found
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
@@ -45,6 +48,38 @@ def test_every_action_is_reached_by_the_palette_and_by_key_or_listed_as_having_n
     assert sorted(in_menus) == sorted(action.id for action in ACTIONS), "each stands in one menu"
     too_long = {menu.title: len(menu.items) for menu in _all(menus()) if len(menu.items) > MOST_ITEMS}
     assert not too_long, "these do not fit into the smallest window"
+
+
+def test_menus_begin_with_what_people_look_for_there() -> None:
+    tops = {menu.title: [item.id for item in menu.items if isinstance(item, Action)] for menu in menus()}
+    assert tops["File"][0] == "window.open"
+    assert tops["File"][-1] == "window.quit"
+    assert tops["Edit"][:2] == ["mark.undo", "mark.redo"]
+    assert tops["Train"][:2] == ["train.next", "train.all"]
+    assert list(tops)[-1] == "Help"
+    assert {"window.help", "window.palette", "window.documents", "window.log", "window.about"} == set(tops["Help"])
+    for menu in _all(menus()):
+        lines = [index for index, item in enumerate(menu.items) if item is None]
+        assert not {0, len(menu.items) - 1} & set(lines), menu.title
+        assert all(after - before > 1 for before, after in pairwise(lines)), menu.title
+
+
+def test_to_save_as_means_the_project(pilot: Pilot) -> None:
+    assert open_palette(pilot, "save as")[0] == "window.save_as"
+
+
+def test_about_says_where_documents_and_log_are(pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
+    copied: list[str] = []
+    monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)  # a window without a screen has no clipboard
+    open_palette(pilot, "about the program")
+    pilot.key(key.ENTER)
+    pilot.draw(4)
+    pilot.click("about.log")
+    pilot.click("about.documents")
+    assert [Path(path).name for path in copied] == ["clipgstream.log", "docs"]
+    pilot.click("about.close")
+    pilot.rest()
+    assert "about.log" not in pilot.rects
 
 
 def _all(some: list[Menu]) -> list[Menu]:

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
+from app.project.projects_folder import VARIABLE
 from app.session.commands import SetFrameMemory, TogglePlay, TrainNextClip
-from app.session.preferences import PreferencesFile
-from app.session.window_memory import WindowMemory
+from app.session.projects.preferences import PreferencesFile
+from app.session.projects.window_memory import WindowMemory
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot
 from ui.panels.actions.table import ACTIONS
+from ui.shell.preferences import projects_words
 from ui.style import theme
 from ui.style.palette import DARK
 
@@ -200,14 +202,25 @@ def test_every_page_fits(open_pilot: Callable[..., Pilot], tmp_path: Path, size:
                 assert 0 <= rect.x0 <= rect.x1 <= units.x, name
 
 
-def test_the_help_sheet_lists_every_action(pilot: Pilot) -> None:
+def test_the_help_sheet_lists_every_key_and_nothing_without_one(pilot: Pilot) -> None:
     from ui.panels.actions.action import WINDOW
-    from ui.shell.dialogs import NO_KEY, _rows
+    from ui.shell.dialogs.dialogs import _rows
 
     ui = pilot.studio.frame.ui
     groups = dict.fromkeys(action.group for action in ACTIONS)
-    listed = [action for action in ACTIONS if action.is_in_help or not action.keys]
-    assert sum(len(_rows(group, ui)) for group in groups) == len(listed)
-    rows = _rows(WINDOW, ui)
-    assert (NO_KEY, "Change keys") in rows
-    assert [label == NO_KEY for label, _ in rows] == sorted(label == NO_KEY for label, _ in rows), "they come last"
+    rows = [row for group in groups for row in _rows(group, ui)]
+    assert len(rows) == sum(action.is_in_help and bool(action.keys) for action in ACTIONS)
+    assert all(label for label, _ in rows)
+    ui.keys.clear(next(action for action in ACTIONS if action.id == "window.help"))
+    assert "Keys and mouse" not in [text for _, text in _rows(WINDOW, ui)]
+
+
+def test_the_folder_of_projects_is_named_again_only_where_the_box_does_not_show_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    assert projects_words("").startswith("New projects go here. ")
+    assert projects_words("/films").startswith("New projects go here. ")
+    assert projects_words("films").startswith(f"New projects go to {Path('films').absolute()}. ")
+    monkeypatch.setenv(VARIABLE, "/named")
+    assert projects_words("/films").startswith(f"New projects go to /named. {VARIABLE} names it. ")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.session.window_memory import read_window_memory
+from app.session.projects.window_memory import read_window_memory
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot
 

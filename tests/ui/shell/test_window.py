@@ -14,7 +14,7 @@ import pytest
 from imgui_bundle import imgui
 from pyglet.window import key, mouse
 
-from app.playback.arrays import AnchorArrays
+from app.playback.modes.arrays import AnchorArrays
 from app.session.commands import (
     DismissNotice,
     LookThrough,
@@ -29,8 +29,8 @@ from app.session.commands import (
     TogglePlay,
     TrainNextClip,
 )
+from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.session.settings import Settings
 from app.status import ClipStatus
 from engine.clip_files.roles import ROLES
 from engine.gate.reasons import USER_DYNAMIC
@@ -280,7 +280,7 @@ def listen_to_tooltips(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         said.append(text)
         show(text)
 
-    monkeypatch.setattr("ui.panels.picture_pane.imgui.set_tooltip", listen)
+    monkeypatch.setattr("ui.panels.picture.picture_pane.imgui.set_tooltip", listen)
     return said
 
 
@@ -413,7 +413,7 @@ def test_dropped_folder_and_dropped_file_open_the_capture(open_pilot: Callable[.
 def test_path_box_opens_a_typed_folder(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
     pilot = open_pilot(FakeSession(has_capture=False))
     pilot.key(key.O, modifiers=(CTRL,))
     pilot.draw(3)
@@ -428,7 +428,7 @@ def test_path_box_opens_a_typed_folder(
 def test_path_box_takes_any_text(
     open_pilot: Callable[..., Pilot], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
     pilot = open_pilot(FakeSession(has_capture=False))
     pilot.studio.frame.dialog.open(tmp_path)
     pilot.draw(3)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.playback.arrays import BACKGROUND
+from app.playback.modes.arrays import BACKGROUND
 from ui.style import theme
 from ui.style.palette import DARK, LIGHT, VOID, Palette, contrast
 

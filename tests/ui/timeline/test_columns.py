@@ -77,9 +77,11 @@ def test_ratios_belong_to_the_boundary_before_their_clip():
         SeamStatus(0, 0, 0.9, 3.0),
         SeamStatus(4, 40, 0.9),  # nothing changes inside, and much at the boundary
         SeamStatus(5, 50, 0.01),
+        SeamStatus(6, 60, 0.9, 2.6, 5, 31),  # most cameras are missing
     ]
     nan = np.nan
-    np.testing.assert_array_equal(seam_ratios(seams, 6), np.array([nan, nan, 1.4, nan, HIGHEST, LOWEST], np.float32))
+    expected = np.array([nan, nan, 1.4, nan, HIGHEST, LOWEST, nan], np.float32)
+    np.testing.assert_array_equal(seam_ratios(seams, 7), expected)
 
 
 def test_a_ratio_has_the_same_colour_everywhere_and_brighter_is_worse():

@@ -10,7 +10,7 @@ import pytest
 from pyglet.window import key, mouse
 
 from app.session.commands import FollowTraining, SetFrame, TrainAll, TrainClip, TrainClips
-from app.session.window_memory import WindowMemory, read_window_memory
+from app.session.projects.window_memory import WindowMemory, read_window_memory
 from app.status import ClipStatus, ResidualStatus, SeamStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.long_capture import MARKERS, long_session
@@ -444,7 +444,7 @@ def test_a_note_tells_the_ratio_of_a_seam_and_the_names_as_they_are(
     pilot.move(*pilot.rects["timeline.seam3"].center)
     pilot.draw(2)
     assert "between clips 2 and 3, at frame 90" in said[-1]
-    assert "2.6! times" in said[-1]
+    assert "relative to inside the clips: 2.6!" in said[-1]
     pilot.move(*pilot.rects["timeline.seam4"].center)
     pilot.draw(2)
     assert "Not measured" in said[-1]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.playback.orbit_view import OrbitView
+from app.playback.views.orbit_view import OrbitView
 from tests.ui.fake_session import make_rig
 from ui.gl.lines import frusta_lines
-from ui.viewport.frusta import camera_under, frustum_size
+from ui.viewport.frusta import camera_under, cameras_around, frustum_size
 
 WIDTH, HEIGHT = 640, 480
 
@@ -38,6 +38,16 @@ def test_a_point_on_a_line_of_a_pyramid_is_that_camera(camera: int) -> None:
     lines = frusta_lines(rig, frustum_size(rig))[0].reshape(len(rig), -1, 2, 3)
     start, end = lines[camera, 5].astype(np.float64)  # an edge of its picture
     assert under(view, *pixel_of(view, 0.5 * (start + end))) == camera
+
+
+def test_the_pyramid_around_a_view_is_not_drawn_across_its_picture() -> None:
+    view = view_from_outside()
+    rig = view.rig
+    assert rig is not None
+    size = frustum_size(rig)
+    assert not cameras_around(rig, view.world_to_camera(), size).any()
+    around = cameras_around(rig, rig.world_to_camera[3], size)
+    assert around.tolist() == [index == 3 for index in range(len(rig))]
 
 
 def test_away_from_all_lines_there_is_none() -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from engine.camera.rotations import matrices_of
-from engine.editing.edit import Box, Sphere, Transform
+from engine.editing.actions import Transform
+from engine.editing.edit import Box, Sphere
 from ui.viewport.editing.handles import (
     Handle,
     Lens,

@@ -19,6 +19,7 @@ from ui.viewport.hud_text import (
     captured_words,
     count_text,
     hud_text,
+    loading_text,
     pane_text,
     rate_text,
 )
@@ -101,9 +102,7 @@ def test_what_failed_is_not_on_its_way():
 def test_a_cloud_that_stands_in_for_a_clip_that_loads_says_what_is_missing():
     text = text_of(ShownPicture(kind=CLOUD, size=(800, 500), full_size=(800, 500)), replace(WANTED, is_loaded=False))
     assert text.pending == "loading clip 0"
-    assert text.note == (
-        "point cloud of what stands still, not the trained result: moving objects are missing until then"
-    )
+    assert text.note == "point cloud of what stands still, not the trained result"
 
 
 @pytest.mark.parametrize(
@@ -150,6 +149,7 @@ def test_rates():
     assert rate_text(ShownRate(None)) == "– of 30 fps"
     assert rate_text(ShownRate(29.5, wanted_per_s=29.97)) == "29.5 of 29.97 fps"
     assert rate_text(ShownRate(4.0, is_every_frame=True)) == "4.0 of 30 fps, every frame"
+    assert loading_text(5, 24) == "loading 5 of 24 frames"
     assert rate_text(ShownRate(28.0, has_skipped=True)) == "28.0 of 30 fps, some frames skipped"
     assert rate_text(ShownRate(5.0, has_skipped=True, every_nth=6)) == "5.0 of 30 fps, every 6th frame"
     assert rate_text(ShownRate(10.0, has_skipped=True, every_nth=3)) == "10.0 of 30 fps, every 3rd frame"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
 from ui.viewport.occlusion import OcclusionMap
 
 WIDTH, HEIGHT = 640, 480

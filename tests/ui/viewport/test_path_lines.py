@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.session.path_commands import PlaceCameraKey
+from app.session.paths.path_commands import PlaceCameraKey
 from engine.camera.camera_path import CameraPath
 from engine.camera.path_presets import turntable
 from engine.camera.projection import to_camera, to_pixels

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.playback.course import Course
+from app.playback.prefetch_order import Course
 from ui.viewport.picture_rate import PictureRate, ShownRate
 
 COURSE = Course(first=0, last=29)

@@ -50,3 +50,6 @@ def test_a_frame_that_changed_a_moment_ago_is_wanted_quickly() -> None:
     assert size.is_hurried(4, 10.2 + 0.9 * HURRY_S, is_playing=False)
     assert not size.is_hurried(4, 10.2 + 1.1 * HURRY_S, is_playing=False)
     assert size.is_hurried(4, 99.0, is_playing=True)
+    assert not size.is_hurried(5, 99.1, is_playing=True, is_loaded_first=True), (
+        "around a seam pictures are of full size"
+    )

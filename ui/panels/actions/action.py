@@ -4,22 +4,22 @@ rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.playback.arrays import AnchorArrays, GaussianArrays
-from app.playback.bookmarks import Bookmarks
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays, GaussianArrays
 from app.playback.timeline import Timeline
-from app.playback.views import Views
+from app.playback.views.bookmarks import Bookmarks
+from app.playback.views.orbit_view import OrbitView
+from app.playback.views.views import Views
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.selection_status import SelectionStatus
-from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
+from app.status import ClipStatus, Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from engine.capture.exclusions import Exclusions
 from ui.panels.editing.edit_subject import Selects
-from ui.panels.editing.mend_panel import HasMending
+from ui.panels.editing.mend_panel import HasMending, is_asking_to_mend
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
@@ -60,6 +60,9 @@ class ActionNeeds(RegionsNeeds, HasMending, Protocol):
     def training(self) -> TrainingStatus: ...
 
     @property
+    def clip_states(self) -> Sequence[ClipStatus]: ...
+
+    @property
     def queue(self) -> QueueStatus: ...
 
     @property
@@ -98,9 +101,11 @@ class Action:
             Empty where it has none.
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
-        leaves_tool: Not ignored either while a tool that selects is in use, or an edit stands out.
+        leaves_tool: Not ignored either while a tool that selects is in use, an edit stands out, or the window of
+            mending asks.
         moves_keys: Not ignored either where a key of the camera path is chosen.
         repeats: Holding the key repeats the action.
+        needs_edit: Ignored unless an edit is chosen.
         is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
         is_on: Of what can be on or off, whether it is; menus show a tick.
         lacks: What it needs and is not there at present, as a sentence; empty when it can be run.
@@ -117,6 +122,7 @@ class Action:
     leaves_tool: bool = False
     moves_keys: bool = False
     repeats: bool = False
+    needs_edit: bool = False
     is_on: Callable[[ActionNeeds], bool] | None = None
     lacks: Callable[[ActionNeeds], str] | None = None
     menu: str = ""
@@ -130,10 +136,13 @@ class Action:
         """Why it cannot be run now, as a sentence; empty when it can."""
         if self.needs_capture and session.capture is None:
             return "Open a capture or a project first."
-        is_tool_used = ui.selecting.is_active or ui.editing.is_active
+        is_tool_used = ui.selecting.is_active or ui.editing.is_active or is_asking_to_mend(session)
         if self.needs_choosing and not (ui.regions.is_active or (self.leaves_tool and is_tool_used)):
             if not self.moves_keys:
                 return "Only while a region is being chosen."
             if session.paths.key is None:
                 return "Only while a region is being chosen, or a key of the camera path."
-        return "" if self.lacks is None else self.lacks(session)
+        lacks = "" if self.lacks is None else self.lacks(session)
+        if not lacks and self.needs_edit and session.edits.edit(ui.editing.chosen) is None:
+            return "Choose an edit first."
+        return lacks

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from app.playback.bookmarks import NUMBERS, Bookmark
-from app.playback.view_place import ViewPlace
+from collections.abc import Callable
+
+from app.playback.views.bookmarks import NUMBERS, Bookmark
+from app.playback.views.view_place import ViewPlace
 from app.session.commands import SetFrame
 from ui.panels.actions.action import BOOKMARKS, Action, ActionNeeds, Run
 from ui.panels.state import Dispatch, UiState
@@ -23,6 +25,11 @@ def _go(number: int) -> Run:
             go_to_bookmark(session, dispatch, bookmark)
 
     return go
+
+
+def _no_bookmark(number: int) -> Callable[[ActionNeeds], str]:
+    why_not = f"There is no bookmark {number} yet."
+    return lambda session: "" if session.bookmarks.numbered(number) is not None else why_not
 
 
 def _keep(number: int) -> Run:
@@ -46,6 +53,7 @@ def _numbered(number: int) -> tuple[Action, Action]:
             BOOKMARKS,
             _go(number),
             keys=(f"Ctrl+{number}",),
+            lacks=_no_bookmark(number),
             is_in_help=is_first,
         ),
         Action(

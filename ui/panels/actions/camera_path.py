@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.session.path_commands import (
+from app.session.paths.path_commands import (
     AimCameraKey,
     ChooseCameraPath,
     CloseCameraPath,
@@ -19,10 +19,10 @@ from app.session.path_commands import (
     SetCameraKey,
     TimeCameraKey,
 )
-from app.session.path_edits import key_at
+from app.session.paths.path_edits import key_at
 from engine.camera.camera_path import CameraPath
 from ui.panels.actions.action import PATH, Action, ActionNeeds, Run
-from ui.panels.key_grip import choose_key
+from ui.panels.picture.key_grip import choose_key
 from ui.panels.state import PATHS, Dispatch, UiState
 from ui.viewport.path_tool import nudged
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from app.playback.view_modes import MODES
+from app.playback.modes.view_modes import MODES
 from app.session.commands import LookThrough, SetCompare, SetCompareWith, ToggleOverlay
 from app.status import CAPTURED, COMPARE_MODES
 from ui.panels.actions.action import COMPARE, Action, ActionNeeds, Run
 from ui.panels.actions.view import nearest_camera
-from ui.panels.comparison import shown_compare
+from ui.panels.picture.comparison import shown_compare
 from ui.panels.state import Dispatch, UiState
 
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side", "blink": "Blink"}

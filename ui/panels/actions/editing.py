@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 from app.session.editing.edit_commands import DuplicateEdit, GoToStep, MoveEdit, RemoveEdit, SetUp, ToggleEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, ScopeChoice
-from engine.editing.edit import Edit, Hide
+from engine.editing.actions import Hide
+from engine.editing.edit import Edit
 from ui.panels.actions.action import EDIT, Action, ActionNeeds, Run
 from ui.panels.editing.edit_subject import drawn_volume, invert_selection
 from ui.panels.editing.making import MAKINGS, Making, make_edit, mark_moving
@@ -141,6 +142,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(_moved_by(1)),
         keys=("Alt+Shift+Up",),
+        needs_edit=True,
         menu=STACK,
         lacks=_no_edits,
     ),
@@ -150,6 +152,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(_moved_by(-1)),
         keys=("Alt+Shift+Down",),
+        needs_edit=True,
         menu=STACK,
         lacks=_no_edits,
     ),
@@ -159,6 +162,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(lambda session, edit: ToggleEdit(edit.edit_id)),
         keys=("Ctrl+H",),
+        needs_edit=True,
         menu=STACK,
         lacks=_no_edits,
     ),
@@ -168,6 +172,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(lambda session, edit: DuplicateEdit(edit.edit_id)),
         keys=("Ctrl+D",),
+        needs_edit=True,
         menu=STACK,
         lacks=_no_edits,
     ),
@@ -177,6 +182,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(lambda session, edit: RemoveEdit(edit.edit_id)),
         keys=("Shift+Delete",),
+        needs_edit=True,
         menu=STACK,
         lacks=_no_edits,
     ),

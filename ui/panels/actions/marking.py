@@ -6,11 +6,13 @@ from typing import Any
 
 from app.session.commands import Redo, RemoveRegion, Undo
 from app.session.editing.edit_commands import RemoveEdit
-from app.session.path_commands import DeleteCameraKey
+from app.session.mending.mend_commands import CloseMend
+from app.session.paths.path_commands import DeleteCameraKey
 from ui.panels.actions.action import MARK, Action, ActionNeeds, Run
 from ui.panels.actions.camera_path import nudge_key
 from ui.panels.editing.edit_subject import meant
 from ui.panels.editing.making import DELETE, make_edit
+from ui.panels.editing.mend_panel import is_asking_to_mend
 from ui.panels.regions import begin_choosing
 from ui.panels.state import REGIONS, Dispatch, UiState
 from ui.viewport.region_tool import GROWTH
@@ -26,6 +28,9 @@ def _mark_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 def _leave_choosing(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if ui.editing.held is not None:  # the drag of a handle is given back, and nothing else
+        return
+    if is_asking_to_mend(session):  # that window lies on top
+        dispatch(CloseMend())
         return
     if ui.editing.asking is None and (ui.selecting.is_active or ui.regions.is_active):
         ui.selecting.leave()

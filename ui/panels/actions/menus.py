@@ -28,8 +28,21 @@ from ui.panels.actions.table import ACTIONS
 
 MOST_ITEMS = 24
 """As many fit into the smallest window."""
-MENUS = ("File", "Edit", "View", "Time", "Train", "Select", "Mark", "Camera", "Window")
+MENUS = ("File", "Edit", "View", "Time", "Train", "Select", "Mark", "Camera", "Window", "Help")
 """From left to right; others follow before the last."""
+OTHERS = "others"
+_ORDER: dict[str, tuple[str | None, ...]] = {
+    "File": (
+        *("window.open", "window.new_project", "window.open_read_only", None),
+        *("window.save_as", "window.start_over", OTHERS, None),
+        *("export.ask", None, "window.calibrate", "window.synchronise", "doctor.examine", None),
+        *("window.preferences", "window.keys", None, "window.quit"),
+    ),
+    "Edit": ("mark.undo", "mark.redo", None, OTHERS),
+    "Train": ("train.next", "train.all", "train.from_here", "train.settings", "train.stop", None, OTHERS),
+    "Help": ("window.help", "window.palette", None, OTHERS, None, "window.about"),
+}
+"""What people look for first, by the title of its menu: ids of actions, lines, and where the rest stands."""
 _MENU_OF_GROUP = {
     TIME: "Time",
     VIEW: "View",
@@ -43,6 +56,7 @@ _MENU_OF_GROUP = {
 }
 _MENU_OF_GROUP |= {NAVIGATE: "View/Navigate", BOOKMARKS: "View/Bookmarks", MODE: "View/Mode", PLAY: "Time/Play"}
 _MENU_OF_TOPIC = {
+    "clips": "Train/Clips",
     "compare": "View/Compare",
     "content": "View/Draw only",
     "heat": "View/Residuals",
@@ -51,6 +65,7 @@ _MENU_OF_TOPIC = {
     "mode": "View/Mode",
     "navigation": "View/Navigate/Mouse",
     "play": "Time/Play",
+    "queue": "Train/Queue",
     "show": "View/Show",
     "timeline": "Time/Timeline",
 }
@@ -98,5 +113,18 @@ def menus(actions: tuple[Action, ...] = ACTIONS) -> list[Menu]:
             menu.items.append(None)
             groups[where] = action.group
         menu.items.append(action)
+    for title, order in _ORDER.items():
+        top[title].items = _ordered(top[title].items, order)
     last = top.pop(MENUS[-1])
     return [menu for menu in (*top.values(), last) if menu.items]
+
+
+def _ordered(items: list[Action | Menu | None], order: tuple[str | None, ...]) -> list[Action | Menu | None]:
+    """The same items as an order of `_ORDER` has them; without lines at the ends or one after the other."""
+    named = {item.id: item for item in items if isinstance(item, Action) and item.id in order}
+    others = [item for item in items if not (isinstance(item, Action) and item.id in named)]
+    placed: list[Action | Menu | None] = []
+    for name in order:
+        placed += others if name == OTHERS else [named[name]] if name in named else [None] if name is None else []
+    lined = [item for item, before in zip(placed, [None, *placed], strict=False) if not (item is None is before)]
+    return lined[:-1] if lined and lined[-1] is None else lined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from app.playback.view_modes import CONTENTS, MODES
+from app.playback.modes.view_modes import CONTENTS, MODES
 from app.session.commands import SetContent, SetMode
 from ui.panels.actions.action import MODE, Action, ActionNeeds, Run
 from ui.panels.state import Dispatch, UiState

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from app.playback.scene_axes import AXIS_VIEWS, UP_AXES
+from app.playback.views.scene_axes import AXIS_VIEWS, UP_AXES
 from app.session.commands import LookThrough
 from ui.panels.actions.action import NAVIGATE, Action, ActionNeeds, Run
-from ui.panels.gestures import PRESETS
+from ui.panels.picture.gestures import PRESETS
 from ui.panels.state import Dispatch, UiState
 
 LEAN_STEP = math.radians(5.0)

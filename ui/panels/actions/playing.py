@@ -17,7 +17,7 @@ def _on_timeline(act: Callable[[Timeline], object]) -> Run:
 
 
 def _toggle_every_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    session.timeline.is_every_frame = not session.timeline.is_every_frame
+    session.timeline.toggle_every_frame()
 
 
 def _toggle_loop(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -75,7 +75,7 @@ ACTIONS = (
         PLAY,
         _toggle_every_frame,
         keys=("Shift+Space",),
-        is_on=lambda session: session.timeline.is_every_frame,
+        is_on=lambda session: session.timeline.plays_every_frame,
     ),
     Action("play.in", "Play from this frame on", PLAY, _on_timeline(Timeline.set_in), keys=("I",)),
     Action("play.out", "Play up to this frame", PLAY, _on_timeline(Timeline.set_out), keys=("O",)),

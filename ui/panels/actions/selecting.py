@@ -10,12 +10,11 @@ from app.session.editing.selection_commands import (
     GrowSelection,
     Reselect,
     SelectAll,
-    SelectByAttribute,
     ShrinkSelection,
 )
 from ui.panels.actions.action import SELECT, Action, ActionNeeds, Run
 from ui.panels.editing.edit_subject import invert_selection
-from ui.panels.editing.select_panel import near_distance
+from ui.panels.editing.select_panel import near_distance, select_moving
 from ui.panels.state import SELECTION, Dispatch, UiState
 from ui.viewport.editing.select_tool import TOOL_WORDS, ToolKind
 
@@ -50,7 +49,7 @@ def _by_distance(make: Callable[[float], Any]) -> Run:
 
 
 def _moving(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    dispatch(SelectByAttribute("motion", 1.0, 1.0, ui.selecting.how()))
+    select_moving(dispatch, ui)
 
 
 def _toggle(name: str) -> Run:

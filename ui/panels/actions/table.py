@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from imgui_bundle import imgui
 
+from app.session.notices import Notices
 from ui.panels.actions import (
     bookmarks,
     camera_path,
@@ -54,8 +57,15 @@ ACTIONS: tuple[Action, ...] = (
 )
 
 
-def handle_keys(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Run the actions of keys pressed since the last frame. Text fields keep their keys."""
+class KeyNeeds(ActionNeeds, Protocol):
+    """What actions act on, and where it is said why one cannot."""
+
+    @property
+    def notices(self) -> Notices: ...
+
+
+def handle_keys(session: KeyNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Run the actions of keys pressed since the last frame, or say why not. Text fields keep their keys."""
     io = imgui.get_io()
     if ui.is_help_open and imgui.is_key_pressed(imgui.Key.escape, False):
         ui.is_help_open = False
@@ -64,5 +74,16 @@ def handle_keys(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         return
     for action in ACTIONS:
         keys = (key for key in ui.keys.keys(action) if not belongs_to_panel(key, ui))
-        if any(key.is_pressed(repeats=action.repeats) for key in keys) and action.is_offered(session, ui):
+        if not any(key.is_pressed(repeats=action.repeats) for key in keys):
+            continue
+        why_not = action.why_not(session, ui)
+        if not why_not:
             action.run(session, dispatch, ui)
+        elif not action.needs_choosing:  # Escape, Enter and the like, which end nothing at other times
+            _say(session.notices, why_not, action.text)
+
+
+def _say(notices: Notices, why_not: str, what: str) -> None:
+    """Tell once why a key does nothing, however often it is pressed."""
+    if all((notice.title, notice.detail) != (why_not, what) for notice in notices):
+        notices.add("info", why_not, what)

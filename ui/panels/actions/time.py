@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from app.playback.timeline import Timeline
@@ -70,6 +72,21 @@ def _marker_by(direction: int) -> Run:
     return jump
 
 
+def _no_marker(direction: int) -> Callable[[ActionNeeds], str]:
+    def why_not(session: ActionNeeds) -> str:
+        markers = session.timeline.markers
+        find = markers.after if direction > 0 else markers.before
+        is_there = find(session.timeline.frame_index) is not None
+        return "" if is_there else f"There is no marker {'after' if direction > 0 else 'before'} this frame."
+
+    return why_not
+
+
+def _no_marker_here(session: ActionNeeds) -> str:
+    is_there = session.timeline.markers.at(session.timeline.frame_index) is not None
+    return "" if is_there else "This frame has no marker."
+
+
 def _jump(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.timeline.is_jump_wanted = True
     ui.wanted_panel = TIMELINE
@@ -106,7 +123,19 @@ ACTIONS = (
     Action("time.next_clip", "Start of the next clip", TIME, _next_clip, keys=("Down",), repeats=True),
     Action("time.jump", "Go to a frame, time or clip", TIME, _jump, keys=("Ctrl+G",)),
     Action("time.mark", "Mark this frame, or name its marker", TIME, _mark, keys=("Ctrl+M",)),
-    Action("time.unmark", "Remove the marker of this frame", TIME, _unmark, keys=("Ctrl+Shift+M",)),
-    Action("time.previous_marker", "Previous marker", TIME, _marker_by(-1), keys=("Shift+Up",), repeats=True),
-    Action("time.next_marker", "Next marker", TIME, _marker_by(1), keys=("Shift+Down",), repeats=True),
+    Action(
+        "time.unmark",
+        "Remove the marker of this frame",
+        TIME,
+        _unmark,
+        keys=("Ctrl+Shift+M",),
+        lacks=_no_marker_here,
+    ),
+    *(
+        Action(f"time.{name}_marker", words, TIME, _marker_by(step), keys=(key,), repeats=True, lacks=_no_marker(step))
+        for name, words, step, key in (
+            ("previous", "Previous marker", -1, "Shift+Up"),
+            ("next", "Next marker", 1, "Shift+Down"),
+        )
+    ),
 )

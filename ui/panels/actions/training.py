@@ -42,6 +42,22 @@ def _stop_training(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> Non
         dispatch(StopTraining())
 
 
+def _cannot_train(session: ActionNeeds) -> str:
+    status = session.training
+    if status.state in ("starting", "preparing", "running", "paused") or status.can_train_next:
+        return ""
+    is_all = all(clip.state == "trained" for clip in session.clip_states)
+    return "Every clip is trained." if is_all else "No clip can be trained next."
+
+
+def _nothing_waits(session: ActionNeeds) -> str:
+    return "" if session.queue.waiting else "No clip is waiting."
+
+
+def _nothing_failed(session: ActionNeeds) -> str:
+    return "" if session.queue.failed else "No clip has failed."
+
+
 def _nothing_trains(session: ActionNeeds) -> str:
     return "Nothing is being trained." if session.training.state in ("idle", "failed", "stopping") else ""
 
@@ -83,7 +99,9 @@ def _next_waiting(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None
 def _move_waiting(by: int) -> Run:
     def move(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         waiting = [clip.clip_index for clip in session.queue.waiting]
-        if ui.queue_chosen in waiting:
+        if ui.queue_chosen not in waiting:
+            _next_waiting(session, dispatch, ui)
+        else:
             dispatch(MoveInQueue(ui.queue_chosen, max(waiting.index(ui.queue_chosen) + by, 0)))
 
     return move
@@ -120,8 +138,7 @@ def _toggle_log_loss(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> N
 
 
 ACTIONS = (
-    Action("train.quality", "Quality over clips, in the training panel", TRAIN, _toggle_quality, keys=("6",)),
-    Action("train.next", "Train the next clip, pause or resume", TRAIN, _train, keys=("T",)),
+    Action("train.next", "Train the next clip, pause or resume", TRAIN, _train, keys=("T",), lacks=_cannot_train),
     Action("train.all", "Train every clip that is not finished", TRAIN, _train_all, keys=("Shift+T",)),
     Action("train.from_here", "Train this clip and those after it", TRAIN, _train_from_here),
     Action("train.settings", "Train this clip with other settings", TRAIN, _ask_settings),
@@ -133,12 +150,25 @@ ACTIONS = (
         keys=("Ctrl+T",),
         lacks=_nothing_trains,
     ),
-    Action("train.hold_after", "Hold the queue after this clip, or not", TRAIN, _hold_after, keys=("Ctrl+Shift+T",)),
-    Action("queue.next", "Choose the next waiting clip", TRAIN, _next_waiting, keys=("Shift+N",)),
-    Action("queue.earlier", "Chosen waiting clip earlier", TRAIN, _move_waiting(-1), keys=("Ctrl+Shift+Up",)),
-    Action("queue.later", "Chosen waiting clip later", TRAIN, _move_waiting(1), keys=("Ctrl+Shift+Down",)),
-    Action("queue.remove", "Take the chosen clip out of the queue", TRAIN, _remove_waiting, keys=("Ctrl+Delete",)),
-    Action("queue.retry", "Try failed clips again", TRAIN, _retry_failed),
+    Action(
+        "train.hold_after",
+        "Hold the queue after this clip, or not",
+        TRAIN,
+        _hold_after,
+        keys=("Ctrl+Shift+T",),
+        lacks=_nothing_trains,
+    ),
+    *(
+        Action(f"queue.{name}", words, TRAIN, run, keys=(key,), lacks=_nothing_waits)
+        for name, words, run, key in (
+            ("next", "Choose the next waiting clip", _next_waiting, "Shift+N"),
+            ("earlier", "Chosen waiting clip earlier", _move_waiting(-1), "Ctrl+Shift+Up"),
+            ("later", "Chosen waiting clip later", _move_waiting(1), "Ctrl+Shift+Down"),
+            ("remove", "Take the chosen clip out of the queue", _remove_waiting, "Ctrl+Delete"),
+        )
+    ),
+    Action("queue.retry", "Try failed clips again", TRAIN, _retry_failed, lacks=_nothing_failed),
+    Action("train.quality", "Quality over clips, in the training panel", TRAIN, _toggle_quality, keys=("6",)),
     Action("live.off", "Live view off", TRAIN, _live_view("off"), is_on=_is_live_view("off")),
     Action("live.low", "Live view low: about every 10 s", TRAIN, _live_view("low"), is_on=_is_live_view("low")),
     Action("live.live", "Live view", TRAIN, _live_view("live"), is_on=_is_live_view("live")),
@@ -149,5 +179,5 @@ ACTIONS = (
         _toggle_log_loss,
         needs_capture=False,
     ),
-    Action("window.log", "Show the log", WINDOW, _show_log, keys=("Shift+L",), needs_capture=False),
+    Action("window.log", "Show the log", WINDOW, _show_log, keys=("Shift+L",), needs_capture=False, menu="Help"),
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.playback.views import COUNTS
+from app.playback.views.views import COUNTS
 from app.session.commands import ActivateView, HomeView, LookThrough, ShowViews
 from ui.panels.actions.action import VIEW, Action, ActionNeeds, Run
 from ui.panels.state import Dispatch, UiState
@@ -61,6 +61,10 @@ def _next_view(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(ActivateView((session.views.active_index + 1) % session.views.n_shown))
 
 
+def _one_view(session: ActionNeeds) -> str:
+    return "There is one view." if session.views.n_shown == 1 else ""
+
+
 ACTIONS = (
     Action("view.home", "Frame the whole scene", VIEW, _home, keys=("F",)),
     Action(
@@ -83,5 +87,5 @@ ACTIONS = (
     Action("view.two", "Two views side by side", VIEW, _show_views(2), is_on=_shows(2)),
     Action("view.four", "Four views", VIEW, _show_views(4), is_on=_shows(4)),
     Action("view.next_layout", "One, two or four views", VIEW, next_layout, keys=("V",)),
-    Action("view.next_view", "Let keys act on the next view", VIEW, _next_view, keys=("Shift+V",)),
+    Action("view.next_view", "Let keys act on the next view", VIEW, _next_view, keys=("Shift+V",), lacks=_one_view),
 )

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from app.session.commands import SynchroniseCameras
-from app.session.files.file_commands import AskSaveAs
+from app.session.commands import AskStartOver, NewProject, SynchroniseCameras
+from app.session.files.file_commands import AskSaveAs, ShowProjectFolder
+from engine.assets import asset_path
 from ui.panels.actions.action import WINDOW, Action, ActionNeeds, Run
 from ui.panels.state import LAYOUT_WORDS, LAYOUTS, PANELS, Dispatch, UiState
 from ui.style.palette import THEMES
 from ui.style.ui_scale import next_choice
+
+DOCUMENTS = asset_path().parent / "docs"
+"""In an installation without them, that is said where they are asked for."""
 
 
 def choose_scale(ui: UiState, scale: float | None) -> None:
@@ -37,12 +41,28 @@ def _help(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_help_open = not ui.is_help_open
 
 
+def _documents(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(ShowProjectFolder(DOCUMENTS))
+
+
+def _about(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_about = True
+
+
 def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_open_requested = True
 
 
 def _open_read_only(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_read_only = True
+
+
+def _new_project(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(NewProject())
+
+
+def _start_over(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(AskStartOver())
 
 
 def _save_as(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -117,6 +137,7 @@ def _quit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 _ALWAYS: dict[str, Any] = {"needs_capture": False}
 
 _FILE: dict[str, Any] = _ALWAYS | {"menu": "File"}
+_HELP: dict[str, Any] = _ALWAYS | {"menu": "Help"}
 _PANELS: dict[str, Any] = _ALWAYS | {"menu": "Window/Panels"}
 _LAYOUTS: dict[str, Any] = _ALWAYS | {"menu": "Window/Layouts"}
 _THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
@@ -124,10 +145,12 @@ _THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
 ACTIONS = (
     Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_FILE),
     Action("window.open_read_only", "Open a project for reading only ...", WINDOW, _open_read_only, **_FILE),
+    Action("window.new_project", "New project of this capture ...", WINDOW, _new_project, menu="File"),
+    Action("window.start_over", "Start over with other settings ...", WINDOW, _start_over, menu="File"),
     Action("window.save_as", "Save the project as ...", WINDOW, _save_as, keys=("Ctrl+Shift+S",), menu="File"),
     Action("window.calibrate", "Calibrate plain videos ...", WINDOW, _calibrate, **_FILE),
     Action("window.synchronise", "Synchronise cameras ...", WINDOW, _synchronise, menu="File"),
-    Action("window.palette", "Find an action by its name", WINDOW, _palette, keys=("Ctrl+K", "Ctrl+P"), **_ALWAYS),
+    Action("window.palette", "Find an action by its name", WINDOW, _palette, keys=("Ctrl+K", "Ctrl+P"), **_HELP),
     Action("window.preferences", "Preferences", WINDOW, _preferences(), keys=("Ctrl+,",), **_FILE),
     Action("window.keys", "Change keys", WINDOW, _preferences("Keys"), **_FILE),
     Action("window.larger", "Larger interface", WINDOW, _scale_by(1), keys=("Ctrl++",), **_ALWAYS),
@@ -171,12 +194,14 @@ ACTIONS = (
         )
         for name in LAYOUTS
     ),
-    Action("window.save_layout", "Save the layout as ...", WINDOW, _save_layout, **_LAYOUTS),
+    Action("window.save_layout", "Keep the layout ...", WINDOW, _save_layout, **_LAYOUTS),
     *(
         Action(f"window.theme.{name}", f"Theme: {words}", WINDOW, _theme(name), **_THEMES)
         for name, words in THEMES.items()
     ),
     Action("window.menu", "Menus (also Alt); arrow keys work in them", WINDOW, _menu, keys=("F10",), **_ALWAYS),
-    Action("window.help", "Keys and mouse", WINDOW, _help, keys=("F1",), **_ALWAYS),
+    Action("window.help", "Keys and mouse", WINDOW, _help, keys=("F1",), **_HELP),
+    Action("window.documents", "Show the folder with the documents", WINDOW, _documents, **_HELP),
+    Action("window.about", "About the program", WINDOW, _about, **_HELP),
     Action("window.quit", "Quit; what was learned is kept", WINDOW, _quit, keys=("Ctrl+Q",), **_FILE),
 )

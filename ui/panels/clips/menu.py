@@ -6,8 +6,8 @@ from imgui_bundle import imgui
 
 from app.session.clips.clip_commands import MergeClips, SetReferenceClip, SplitClip
 from engine.capture.clip import Clip
-from ui.panels.clip_training_menu import ClipMenuNeeds
 from ui.panels.state import Dispatch, UiState
+from ui.panels.training.clip_training_menu import ClipMenuNeeds
 from ui.style.theme import Icon
 
 

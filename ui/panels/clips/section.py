@@ -14,15 +14,15 @@ from app.session.commands import RemoveVersion, RestoreVersion
 from app.status import ClipStatus, DependencyStatus, Overlays, QueueStatus, TrainingStatus, VersionStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text, size_text
-from ui.panels.clip_versions import VersionNeeds, difference_lines, version_text
 from ui.panels.clips.comparing import compared_version
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title
+from ui.panels.training.clip_versions import VersionNeeds, difference_lines, version_text
 from ui.panels.widgets import text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import Icon
 
-STALE_TOOLTIP = "Clips that were trained on something that is not there any more, hatched in the timeline (Alt+T)"
+STALE_TOOLTIP = "Clips whose reference has changed since, hatched in the timeline (Alt+T)"
 MAX_LISTED = 8
 """Clips named in a row."""
 
@@ -96,7 +96,7 @@ def use_lines(use: DiskUse) -> list[tuple[str, int]]:
         (f"Earlier versions ({use.n_versions})", use.versions),
         ("Trainings that were stopped", sum(clip.checkpoint for clip in use.clips)),
         ("Not in use (other cuts, damaged files)", use.unused),
-        ("Preparation, made again where it is missing", use.preparation),
+        ("Preparation, made again when needed", use.preparation),
         ("Everything else", use.other),
     ]
     return [row for row in rows if row[1]]
@@ -154,7 +154,7 @@ def draw_clip_section(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState
 def _draw_versions(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState, clip: Clip) -> None:
     versions = session.clip_versions(clip.clip_index)
     if not versions:
-        text_wrapped_dim("No earlier versions. Training a clip again keeps what it was.")
+        text_wrapped_dim("No earlier versions. Training a clip again keeps the one before.")
     for version in versions:
         imgui.push_id(version.number)
         text_wrapped_dim(f"Version {version.number}: {version_text(version)}")

@@ -117,8 +117,8 @@ def _draw_sign(draw: imgui.ImDrawList, x: float, y: float, severity: str | None,
         draw.add_circle_filled(ImVec2(x, y), 3.5, color)
 
 
-def legend_text(*, is_short: bool) -> str:
-    """What the signs of the map mean."""
-    if is_short:
-        return "Square: error"
-    return f"Square: {SEVERITY_WORDS['error'].lower()}   Triangle: {SEVERITY_WORDS['warning'].lower()}   Dot: fine"
+def draw_legend(width: float) -> None:
+    """What the signs of the map mean, as much as there is room for, and everything as a tooltip."""
+    words = f"Square: {SEVERITY_WORDS['error'].lower()}   Triangle: {SEVERITY_WORDS['warning'].lower()}   Dot: fine"
+    imgui.text_disabled(elided(words, width))
+    imgui.set_item_tooltip(words)

@@ -11,7 +11,7 @@ from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding, PairEvidence, Point
 from ui.gl import ImageTexture
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.welcome.thumbnails import ThumbnailNeeds, Thumbnails
 from ui.panels.widgets import elided, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import ON_PICTURE

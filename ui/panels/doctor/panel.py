@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
 from app.project.project import Project
+from app.session.captures.doctor_status import DoctorStatus
 from app.session.commands import ExamineCapture, LookThrough, StopExamining
-from app.session.doctor_status import DoctorStatus
 from app.status import ProjectStatus
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding
-from engine.text import duration_text
 from ui.gl import ImageTexture
 from ui.panels.capture import CaptureFacts
-from ui.panels.doctor.camera_map import CameraPlan, camera_plan, draw_bars, draw_map, legend_text
+from ui.panels.doctor.camera_map import CameraPlan, camera_plan, draw_bars, draw_legend, draw_map
 from ui.panels.doctor.evidence import Evidence
 from ui.panels.doctor.findings import draw_findings
 from ui.panels.doctor.words import summary_text
 from ui.panels.state import Dispatch, UiState
-from ui.panels.thumbnails import ThumbnailNeeds
-from ui.panels.widgets import primary_button, text_wrapped_dim
+from ui.panels.welcome.thumbnails import ThumbnailNeeds
+from ui.panels.widgets import draw_job_bar, primary_button, text_wrapped_dim
+from ui.style.progress_words import job_words
 from ui.style.theme import Icon
 
 WIDE = 720.0
 """In a panel at least so wide the list, the pictures and the map stand side by side."""
-REFRESH_S = 0.25
 PROGRESS = 180.0
 """Width of the bar."""
 SHARES = (0.34, 0.38)
@@ -107,17 +107,15 @@ class DoctorPanel:
 
     def _draw_head(self, status: DoctorStatus, dispatch: Dispatch, ui: UiState) -> None:
         if status.state == "running":
-            ui.redraw_within(REFRESH_S)
             if imgui.button(f"{Icon.STOP}  Stop"):
                 dispatch(StopExamining())
             ui.mark("doctor.stop")
             imgui.same_line()
-            left = "" if status.eta_s is None else f", {duration_text(status.eta_s)} left"
-            words = f"{100 * status.done:.0f} %, {status.message}{left}"
-            imgui.progress_bar(status.done, ImVec2(PROGRESS, 0), "")
+            draw_job_bar(status.progress, ui, PROGRESS, 0.0)
             imgui.same_line()
             imgui.align_text_to_frame_padding()
-            imgui.text(words)
+            imgui.text(job_words(status.progress, time.monotonic()))
+            ui.mark("doctor.progress")
             return
         label = f"{Icon.EYE}  Examine" if status.diagnosis is None else f"{Icon.EYE}  Examine again"
         if primary_button(label, ImVec2(160, 0), ui):
@@ -127,7 +125,8 @@ class DoctorPanel:
         imgui.align_text_to_frame_padding()
         found = summary_text(status.findings)
         if status.diagnosis is None:
-            words = f"{found} in the numbers. Examining looks at the pictures too: usually less than a minute."
+            memory = f" and up to {status.memory_bytes / 2**30:.1f} GB of memory" if status.memory_bytes else ""
+            words = f"{found} in the numbers. Examining looks at the pictures too: usually less than a minute{memory}."
         else:
             words = f"{found}. {status.diagnosis.n_pictures} pictures looked at in {status.diagnosis.seconds:.0f} s."
         imgui.push_text_wrap_pos(0.0)
@@ -143,7 +142,7 @@ class DoctorPanel:
             return
         project, capture = session.project, session.capture
         assert capture is not None
-        can_hold_out = project is not None and not project.has_progress
+        can_hold_out = project is not None and not project.has_finished_clips
         self._chosen = draw_findings(
             status.findings, self._chosen, rig, capture.path, dispatch, ui, can_hold_out=can_hold_out
         )
@@ -173,7 +172,7 @@ class DoctorPanel:
         assert self._plan is not None
         imgui.begin_group()
         clicked = draw_map(rig, self._plan, worst, names, ImVec2(width, max(height, 60.0)), ui)
-        imgui.text_disabled(legend_text(is_short=is_low))
+        draw_legend(width)
         imgui.end_group()
         if clicked is not None:
             dispatch(LookThrough(rig.names.index(clicked)))
@@ -184,5 +183,5 @@ class DoctorPanel:
         imgui.begin_group()
         bars = imgui.get_content_region_avail().y - WORDS
         draw_bars(rig, status.diagnosis.camera_px, names, max(bars, 40.0), ui)
-        imgui.text_disabled("Miss of features, px")
+        imgui.text_disabled("Matching error, px")
         imgui.end_group()

@@ -2,36 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from imgui_bundle import imgui
 from msgspec import structs
 
-from app.document.edit_words import edit_title, scope_text, target_text
+from app.document.changes.edit_words import edit_title, scope_text, target_text
+from app.document.changes.reach_words import reach_note
 from app.session.editing.edit_commands import ChangeEdit, RenameEdit
-from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_of, chosen_scope, reach_text
+from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_of, chosen_scope, extent_text
 from engine.camera.rotations import quats_of_turns, turns_of_quats
-from engine.editing.edit import (
-    MAX_NAME_CHARACTERS,
-    MAX_STOPS,
-    Action,
-    Box,
-    Edit,
-    Expose,
-    Hold,
-    Quat,
-    Recolor,
-    Scope,
-    Smooth,
-    Sphere,
-    Target,
-    Transform,
-    Vector,
-)
+from engine.editing.actions import Action, Quat, Transform, Vector
+from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Scope, Sphere, Target
+from engine.setting import Setting, settings_of
 from engine.text import one_line
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
 from ui.panels.editing.making import MakingNeeds
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import segment, text_wrapped_dim
+from ui.panels.widgets import segment, text_warning, text_wrapped_dim
 
 FAR = 1e6
 """Largest coordinate that fields take, scene units."""
@@ -85,14 +74,18 @@ def _draw_scope(session: MakingNeeds, dispatch: Dispatch, ui: UiState, edit: Edi
         present = choice_of(scope, timeline)
         for choice in SCOPE_CHOICES:
             wanted = chosen_scope(choice, timeline)
-            words = f"{SCOPE_WORDS[choice]}: {scope_text(wanted, timeline.clips)}"
+            words, frames = SCOPE_WORDS[choice], scope_text(wanted, timeline.clips)
+            words = words if frames == words else f"{words}: {frames}"
             if imgui.selectable(words, choice == present)[0] and wanted != scope:
                 dispatch(ChangeEdit(structs.replace(edit, scope=wanted), verb="scope"))
             ui.mark(f"edits.choose {choice}")
         imgui.end_combo()
     else:
         ui.mark("edits.scope")
-        imgui.set_item_tooltip(reach_text(scope, timeline))
+        imgui.set_item_tooltip(extent_text(scope, timeline))
+    if note := reach_note(session.edits.reach(edit.edit_id), scope):
+        text_warning(note)
+        ui.mark("edits.reach")
     if scope.stop is not None:
         frames = (scope.first, scope.stop - 1)
         found = whole_numbers(ui, "frames", "Frames", frames, low=0, high=timeline.last_frame)
@@ -102,95 +95,91 @@ def _draw_scope(session: MakingNeeds, dispatch: Dispatch, ui: UiState, edit: Edi
             dispatch(ChangeEdit(structs.replace(edit, scope=wanted), ui.editing.gesture, "scope"))
 
 
+# Every field is drawn, whichever was changed: with fewer the panel would be lower for a moment, and scroll.
+
+
 def _draw_target(ui: UiState, target: Target) -> Target | None:
     """Numbers of what an edit acts on; what they were changed to."""
+    changed = target
     match target:
         case Box(center=center, half_sizes=half_sizes, quat=quat):
             speed = SPEED_SHARE * max(half_sizes)
             found = numbers(ui, "center", "Centre", center, speed=speed, low=-FAR, high=FAR)
             if found is not None:
-                return structs.replace(target, center=_vector(found))
+                changed = structs.replace(changed, center=_vector(found))
             sizes = tuple(2.0 * half for half in half_sizes)
             found = numbers(ui, "size", "Size", sizes, speed=speed, low=LEAST_SIZE, high=FAR)
             if found is not None:
-                return structs.replace(target, half_sizes=_vector([value / 2.0 for value in found]))
+                changed = structs.replace(changed, half_sizes=_vector([value / 2.0 for value in found]))
             turned = _turn_fields(ui, "box turn", quat)
-            return None if turned is None else structs.replace(target, quat=turned)
+            if turned is not None:
+                changed = structs.replace(changed, quat=turned)
         case Sphere(center=center, radius=radius):
             speed = SPEED_SHARE * radius
             found = numbers(ui, "center", "Centre", center, speed=speed, low=-FAR, high=FAR)
             if found is not None:
-                return structs.replace(target, center=_vector(found))
+                changed = structs.replace(changed, center=_vector(found))
             found = numbers(ui, "radius", "Radius", [radius], speed=speed, low=LEAST_SIZE, high=FAR)
-            return None if found is None else structs.replace(target, radius=found[0])
-    text_wrapped_dim(f"Acts on {target_text(target)}.")
-    return None
+            if found is not None:
+                changed = structs.replace(changed, radius=found[0])
+        case _:
+            text_wrapped_dim(f"Acts on {target_text(target)}.")
+    return None if changed is target else changed
 
 
 def _draw_action(session: MakingNeeds, ui: UiState, action: Action) -> Action | None:
-    """Numbers of what an edit does; what they were changed to."""
-    match action:
-        case Transform():
-            return _draw_transform(ui, action)
-        case Recolor():
-            return _draw_recolor(ui, action)
-        case Expose(stops=stops):
-            found = numbers(
-                ui, "stops", "Exposure", [stops], speed=0.01, low=-MAX_STOPS, high=MAX_STOPS, text_format="%+.2f EV"
-            )
-            return None if found is None else Expose(found[0])
-        case Hold(frame_index=frame_index):
-            last = session.timeline.last_frame
-            whole = whole_numbers(ui, "hold", "As in frame", [frame_index], low=0, high=last)
-            return None if whole is None else Hold(whole[0])
-        case Smooth(sigma_frames=sigma_frames):
-            found = numbers(
-                ui, "sigma", "Over", [sigma_frames], speed=0.02, low=0.1, high=100.0, text_format="%.2f frames"
-            )
-            return None if found is None else Smooth(found[0])
-    return None
+    """Fields of what an edit does; what it was changed to."""
+    changed = action
+    for one in settings_of(type(action)).values():
+        found = _field(ui, one, getattr(action, one.name), session.timeline.last_frame)
+        imgui.set_item_tooltip(one.meaning)
+        if found is not None:
+            changed = changed.changed(one.name, found)
+    return None if changed is action else changed
 
 
-def _draw_transform(ui: UiState, action: Transform) -> Transform | None:
-    speed = 2e-3
-    found = numbers(ui, "translation", "Moved by", action.translation, speed=speed, low=-FAR, high=FAR)
-    if found is not None:
-        return structs.replace(action, translation=_vector(found))
-    turned = _turn_fields(ui, "turn", action.quat)
-    if turned is not None:
-        return structs.replace(action, quat=turned)
-    found = numbers(ui, "scale", "Scaled by", [action.scale], speed=0.005, low=0.01, high=100.0)
-    if found is not None:
-        return structs.replace(action, scale=found[0])
-    found = numbers(ui, "pivot", "About", action.pivot, speed=speed, low=-FAR, high=FAR)
-    return None if found is None else structs.replace(action, pivot=_vector(found))
+def _field(ui: UiState, one: Setting, value: Any, last_frame: int) -> Any:
+    """A field as its type and range want it; its value once it was changed, else None."""
+    if one.choices:
+        return _choice_field(ui, one, value)
+    if one.kind is tuple and len(value) == 4:
+        return _turn_fields(ui, one.name, value, one.label)
+    low, high = one.offered or one.bounds or (-FAR, FAR)
+    if one.kind is tuple and (low, high) == (0, 1):
+        return _color_field(ui, one, value)
+    if one.kind is int:
+        last = last_frame if one.names == "frames" else int(high)
+        whole = whole_numbers(ui, one.name, one.label, [value], low=int(low), high=last)
+        return None if whole is None else whole[0]
+    text_format = f"%{'+' if low < 0 else ''}.2f {one.unit}" if one.unit else "%.3f"
+    parts = value if one.kind is tuple else [value]
+    found = numbers(ui, one.name, one.label, parts, speed=one.step, low=low, high=high, text_format=text_format)
+    return found[0] if found is not None and one.kind is not tuple else found
 
 
-def _draw_recolor(ui: UiState, action: Recolor) -> Recolor | None:
-    label_before("Tint")
-    is_changed, tint = imgui.color_edit3("##tint", list(action.tint))
-    ui.mark("edits.tint")
+def _choice_field(ui: UiState, one: Setting, value: str) -> str | None:
+    label_before(one.label)
+    names = list(one.choices)
+    is_changed, place = imgui.combo(f"##{one.name}", names.index(value), [one.titles.get(name, name) for name in names])
+    ui.mark(f"edits.{one.name}")
+    if is_changed:
+        ui.editing.begin_gesture()
+    return names[place] if is_changed else None
+
+
+def _color_field(ui: UiState, one: Setting, value: Vector) -> Vector | None:
+    label_before(one.label)
+    is_changed, color = imgui.color_edit3(f"##{one.name}", list(value))
+    ui.mark(f"edits.{one.name}")
     if imgui.is_item_activated():
         ui.editing.begin_gesture()
-    if is_changed:
-        share = action.tint_share or 0.5  # else nothing would be seen of it
-        return structs.replace(action, tint=_vector([min(max(value, 0.0), 1.0) for value in tint]), tint_share=share)
-    for name, label, high in (
-        ("tint_share", "Tint share", 1.0),
-        ("saturation", "Saturation", 4.0),
-        ("opacity", "Opacity", 4.0),
-    ):
-        found = numbers(ui, name, label, [getattr(action, name)], speed=0.005, low=0.0, high=high)
-        if found is not None:
-            return structs.replace(action, **{name: found[0]})
-    found = numbers(ui, "gains", "Gains", action.gains, speed=0.005, low=0.0, high=10.0)
-    return None if found is None else structs.replace(action, gains=_vector(found))
+    return _vector([min(max(part, 0.0), 1.0) for part in color]) if is_changed else None
 
 
-def _turn_fields(ui: UiState, name: str, quat: Quat) -> Quat | None:
+def _turn_fields(ui: UiState, name: str, quat: Quat, label: str = "Turned by") -> Quat | None:
     """A rotation as degrees about the axes of the scene."""
     degrees = tuple(float(value) for value in np.degrees(turns_of_quats(np.array(quat))))
-    found = numbers(ui, name, "Turned by", degrees, speed=0.25, low=-180.0, high=180.0, text_format="%.1f°")
+    found = numbers(ui, name, label, degrees, speed=0.25, low=-180.0, high=180.0, text_format="%.1f°")
     if found is None:
         return None
     w, x, y, z = (float(value) for value in quats_of_turns(np.radians(found)))

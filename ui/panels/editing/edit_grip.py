@@ -12,14 +12,14 @@ from collections.abc import Callable
 import numpy as np
 from imgui_bundle import imgui
 
-from app.playback.scene_axes import rig_radius
+from app.playback.views.scene_axes import rig_radius
 from app.session.commands import Undo
 from app.session.editing.edit_commands import SetScaleByLength, SetUpByGround
 from app.session.editing.selection_commands import InvertSelection, SelectVolume
-from engine.editing.edit import Transform, Vector
+from engine.editing.actions import Transform, Vector
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.editing.edit_subject import Subject, subject_of
-from ui.panels.pointer import Pointer
+from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.viewport.editing.edit_tool import N_ASKED, EditTool
 from ui.viewport.editing.handles import Lens, dragged, handle_under, snap_step

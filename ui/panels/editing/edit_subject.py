@@ -8,13 +8,14 @@ from typing import Protocol
 import numpy as np
 from msgspec import structs
 
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
 from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import ChangeEdit
 from app.session.editing.selection import Selection
 from app.session.editing.selection_commands import InvertSelection
 from app.session.editing.selection_status import SelectionStatus
-from engine.editing.edit import Box, Edit, Sphere, Transform, Vector
+from engine.editing.actions import Transform, Vector
+from engine.editing.edit import Box, Edit, Sphere
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, axes_of, middle_of
 

@@ -6,12 +6,14 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.document.edit_words import edit_title, scope_text, target_text
-from app.playback.orbit_view import OrbitView
+from app.document.changes.edit_words import edit_title, target_text
+from app.document.changes.reach_words import acting_text, reach_note
+from app.playback.views.orbit_view import OrbitView
 from app.session.clips.clip_commands import ApplyDeletions
 from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import DuplicateEdit, MoveEdit, RemoveEdit, ToggleEdit
-from engine.editing.edit import Delete, Edit
+from engine.editing.actions import Delete
+from engine.editing.edit import Edit
 from engine.text import one_line
 from ui.panels.copying import CopyNeeds, draw_copy_entries
 from ui.panels.editing.details import draw_details
@@ -59,6 +61,9 @@ def draw_edits(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> Non
         imgui.separator()
         imgui.push_id(edit.edit_id)
         draw_details(session, dispatch, ui, edit)
+        if ui.editing.is_new and imgui.get_cursor_pos_y() > imgui.get_scroll_y() + imgui.get_window_height():
+            imgui.set_scroll_here_y(1.0)  # the last field, which else would be below the panel
+        ui.editing.is_new = False
         imgui.pop_id()
     imgui.end_disabled()
     imgui.separator()
@@ -114,16 +119,19 @@ def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: E
     title = one_line(edit_title(edit))
     shown = elided(title, room)
     draw.add_text(ImVec2(x, low.y + 3), theme.u32(color), shown)
-    words = scope_text(edit.scope, session.timeline.clips)
+    reach = session.edits.reach(edit.edit_id)
+    words = acting_text(edit.scope, reach, session.timeline.clips)
     if edit.name:
         words = f"{target_text(edit.target, is_inverted=edit.is_inverted)}, {words}"
     words = words if edit.is_on else f"off, {words}"
     lost = next((one for one in session.edits.lost if one.edit_id == edit.edit_id), None)
     if lost is not None:
-        words = f"{Icon.WARNING}  {'all' if lost.is_all else 'some'} of what was picked is gone, {words}"
-    draw.add_text(
-        ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM if lost is None else theme.ORANGE), elided(words, room)
-    )
+        left = "nothing of the selection is left" if lost.is_all else "part of the selection is gone"
+        words = f"{Icon.WARNING}  {left}, {words}"
+    elif reach_note(reach, edit.scope):
+        words = f"{Icon.WARNING}  {words}"
+    is_calm = lost is None and not reach_note(reach, edit.scope)
+    draw.add_text(ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM if is_calm else theme.ORANGE), elided(words, room))
     imgui.set_cursor_screen_pos(ImVec2(low.x + 2, low.y + 8))
     imgui.begin_disabled(not session.edits.can_edit)
     if imgui.button(f"{Icon.EYE if edit.is_on else ' – '}##on", ImVec2(BUTTON_WIDTH, 26)):

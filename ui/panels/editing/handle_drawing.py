@@ -13,7 +13,7 @@ from engine.editing.edit import Box, Sphere
 from ui.panels.editing.edit_grip import lens_of
 from ui.panels.editing.edit_subject import Subject
 from ui.panels.editing.select_drawing import draw_volume
-from ui.panels.gizmo import COLORS, LETTERS
+from ui.panels.picture.gizmo import COLORS, LETTERS
 from ui.panels.state import Rect, UiState
 from ui.panels.widgets import chip
 from ui.style import theme

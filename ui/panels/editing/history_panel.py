@@ -39,7 +39,7 @@ class HistoryPanel:
             return
         history = session.history
         draw_history(history, dispatch, ui, "history")
-        names, present = ("as it was before", *history.past, *history.future), len(history.past)
+        names, present = ("Start", *history.past, *history.future), len(history.past)
         if imgui.begin_child("steps"):
             line = imgui.get_text_line_height_with_spacing()
             clipper = imgui.ListClipper()

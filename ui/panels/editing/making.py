@@ -4,32 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.document.changes.reach_words import reach_note
 from app.playback.timeline import Timeline
 from app.session.commands import MarkBox, MarkRegion
 from app.session.editing.edit_commands import AddEdit
-from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_scope, reach_text
+from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_scope, extent_text
 from app.session.editing.selection_commands import ClearSelection
-from engine.editing.edit import (
-    Action,
-    Box,
-    Delete,
-    Everything,
-    Expose,
-    Hide,
-    Hold,
-    Recolor,
-    Smooth,
-    Sphere,
-    Target,
-    Transform,
-)
+from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
+from engine.editing.edit import Box, Everything, Scope, Sphere, Target
+from engine.editing.reach import Reach, reach_of
 from ui.panels.editing.edit_subject import SubjectNeeds, bounds_of, invert_selection, meant, pivot_of
 from ui.panels.state import EDITS, Dispatch, UiState
-from ui.panels.widgets import segment, text_wrapped_dim
+from ui.panels.widgets import segment, text_warning, text_wrapped_dim
 
 FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """What new edits begin with."""
@@ -40,6 +30,9 @@ class MakingNeeds(SubjectNeeds, Protocol):
 
     @property
     def timeline(self) -> Timeline: ...
+
+
+First = Callable[[MakingNeeds, Box | Sphere | None], Action]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,66 +46,46 @@ class Making:
         action: Made where it is wanted; None has no use of its own for the frame and the pivot.
         keys: See ui.panels.actions.action.Action.
         is_inverted: Whether it acts on everything else.
-        is_for_everything: Whether it makes sense where nothing is selected: it then acts on everything.
+        is_for_everything: Whether it is of use where nothing is selected: it then acts on everything.
     """
 
     name: str
     label: str
     words: str
-    action: Callable[[MakingNeeds, Box | Sphere | None], Action]
+    action: First
     keys: tuple[str, ...] = ()
     is_inverted: bool = False
     is_for_everything: bool = False
 
 
-DELETE = Making("delete", "Delete", "Delete what is selected", lambda session, volume: Delete())
+def _making(kind: type[Action], first: First, *, name: str = "", **said: Any) -> Making:
+    """As the action is declared."""
+    return Making(name or kind.called(), kind.label, kind.tip or f"{kind.label} what is selected", first, **said)
+
+
+DELETE = _making(Delete, lambda *where: Delete())
 MAKINGS = (
-    Making("hide", "Hide", "Hide what is selected", lambda session, volume: Hide(), ("H",)),
+    _making(Hide, lambda *where: Hide(), keys=("H",)),
     Making(
         "isolate",
         "Isolate",
         "Isolate: hide everything but what is selected",
-        lambda session, volume: Hide(),
+        lambda *where: Hide(),
         ("Shift+H",),
         is_inverted=True,
     ),
     DELETE,
-    Making(
-        "move",
-        "Move",
-        "Move, rotate and scale what is selected",
-        lambda session, volume: Transform(pivot=pivot_of(session, volume)),
-        ("Alt+G",),
-    ),
-    Making(
-        "recolor", "Recolour", "Recolour what is selected", lambda session, volume: Recolor(), is_for_everything=True
-    ),
-    Making(
-        "expose",
-        "Exposure",
-        "Change the exposure of what is selected",
-        lambda session, volume: Expose(FIRST_STOPS),
-        is_for_everything=True,
-    ),
+    _making(Transform, lambda *where: Transform(pivot=pivot_of(*where)), name="move", keys=("Alt+G",)),
+    _making(Recolor, lambda *where: Recolor(), is_for_everything=True),
+    _making(Expose, lambda *where: Expose(FIRST_STOPS), is_for_everything=True),
     Making(
         "opacity",
         "Opacity",
         "Change the opacity of what is selected",
-        lambda session, volume: Recolor(opacity=FIRST_OPACITY),
+        lambda *where: Recolor(opacity=FIRST_OPACITY),
     ),
-    Making(
-        "hold",
-        "Set static",
-        "Set static: what is selected stands still, as at this frame",
-        lambda session, volume: Hold(session.timeline.frame_index),
-    ),
-    Making(
-        "smooth",
-        "Smooth",
-        "Smooth what is selected over time",
-        lambda session, volume: Smooth(FIRST_SIGMA_FRAMES),
-        is_for_everything=True,
-    ),
+    _making(Hold, lambda session, volume: Hold(session.timeline.frame_index)),
+    _making(Smooth, lambda *where: Smooth(FIRST_SIGMA_FRAMES), is_for_everything=True),
 )
 PER_ROW = 3
 
@@ -131,6 +104,7 @@ def make_edit(session: MakingNeeds, dispatch: Dispatch, ui: UiState, making: Mak
     added = [edit.edit_id for edit in session.edits.edits if edit.edit_id not in before]
     if added:
         ui.editing.choose(added[-1])
+        ui.editing.is_new = True
         if volume is not None:  # its handles are those of the edit now
             ui.selecting.leave()
             ui.editing.is_outside = False
@@ -146,6 +120,12 @@ def mark_moving(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(MarkRegion("dynamic", volume.center, volume.radius))
     elif bounds is not None:
         dispatch(MarkBox("dynamic", *bounds))
+
+
+def _reach(session: MakingNeeds, volume: Box | Sphere | None, scope: Scope, *, is_inverted: bool = False) -> Reach:
+    """Where a new edit would act."""
+    picked = () if volume is not None else session.selecting.selection.counts
+    return reach_of(picked, scope, session.edits.clips, is_inverted=is_inverted)
 
 
 def draw_making(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -170,19 +150,25 @@ def draw_making(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
         if segment(SCOPE_WORDS[choice], ui.editing.scope == choice, width):
             ui.editing.scope = choice
         ui.mark(f"edits.scope {choice}")
-    text_wrapped_dim(reach_text(chosen_scope(ui.editing.scope, session.timeline), session.timeline))
+    scope = chosen_scope(ui.editing.scope, session.timeline)
+    text_wrapped_dim(extent_text(scope, session.timeline))
+    reach = _reach(session, volume, scope)
+    if note := reach_note(reach, scope):
+        text_warning(note)
+        ui.mark("edits.note")
     imgui.begin_disabled(not session.edits.can_edit)
     for place, making in enumerate(MAKINGS):
         if place % PER_ROW:
             imgui.same_line()
-        imgui.begin_disabled(not (words or making.is_for_everything))
+        imgui.begin_disabled(reach.is_nowhere or not (words or making.is_for_everything))
         label = "Crop" if making.name == "isolate" and volume is not None else making.label
         if imgui.button(f"{label}##{making.name}", ImVec2(width, 0)):
             make_edit(session, dispatch, ui, making)
         ui.mark(f"edits.make {making.name}")
         imgui.end_disabled()
         key = f" ({making.keys[0]})" if making.keys else ""
-        imgui.set_item_tooltip(f"{making.words}{key}")
+        note = reach_note(_reach(session, volume, scope, is_inverted=True), scope) if making.is_inverted else ""
+        imgui.set_item_tooltip("\n".join(filter(None, (f"{making.words}{key}", note))))
     imgui.begin_disabled(volume is None and not session.selection.n_shown)
     if imgui.button("Set moving", ImVec2(width, 0)):
         mark_moving(session, dispatch, ui)

@@ -6,11 +6,13 @@ while it is up.
 
 from __future__ import annotations
 
+import time
 from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.project.mends.record import MendRecord
+from app.psnr_words import psnr_note
 from app.session.commands import TrainClip
 from app.session.mending.mend_commands import CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
@@ -19,18 +21,22 @@ from engine.mending.figures import METHODS, StretchFigures
 from engine.text import duration_text
 from ui.panels.copying import CopyNeeds, draw_copy_entries
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.widgets import primary_button, text_warning, text_wrapped, text_wrapped_dim
+from ui.panels.widgets import draw_job_bar, primary_button, text_warning, text_wrapped, text_wrapped_dim
 from ui.style import theme
+from ui.style.progress_words import job_words
 from ui.style.theme import Icon
 
 TITLE = "Mend###mend"
 WIDTH = 372.0
 MARGIN = 12.0
+BELOW_HINT = 72.0
+"""Below two lines of what a tool in use does."""
+HELD_OUT = "Held-out PSNR"
 METHOD_WORDS = {
-    "auto": "Whatever suffices",
+    "auto": "Automatic",
     "light": "Exposure and light",
     "fade": "Fade",
-    "joint": "Train towards each other",
+    "joint": "Joint training",
 }
 AUTO_HINT = "One after the other, the cheapest first, until half of the excess flicker is gone"
 
@@ -52,6 +58,12 @@ class HasMending(CopyNeeds, Protocol):
     def mending(self) -> MendingNeeds: ...
 
 
+def is_asking_to_mend(session: HasMending) -> bool:
+    """Whether the window asks how to mend: then Escape closes it."""
+    page = session.mending.page
+    return page is not None and page.state == "asking"
+
+
 def draw_mending(session: HasMending, dispatch: Dispatch, ui: UiState) -> None:
     """Draw the window while something is mended."""
     page = session.mending.page
@@ -60,7 +72,7 @@ def draw_mending(session: HasMending, dispatch: Dispatch, ui: UiState) -> None:
     view = imgui.get_main_viewport()
     whole = Rect(0.0, 0.0, view.size.x, view.size.y)
     free = ui.rects.get("viewport.free", whole)
-    imgui.set_next_window_pos(ImVec2(free.x0 + MARGIN, free.y0 + MARGIN), imgui.Cond_.appearing)
+    imgui.set_next_window_pos(ImVec2(free.x0 + MARGIN, free.y0 + BELOW_HINT), imgui.Cond_.appearing)
     imgui.set_next_window_size_constraints(ImVec2(WIDTH, 0), ImVec2(WIDTH, max(view.size.y - 40, 200)))
     flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.always_auto_resize
     flags |= imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.no_docking
@@ -99,14 +111,14 @@ def _draw_choice(session: HasMending, page: MendPage, dispatch: Dispatch, ui: Ui
     else:
         text_wrapped_dim(
             "Each attempt is measured on the training cameras, and kept only if the flicker falls and no clip loses "
-            "more than 0.05 dB. What the clips were is kept as a version."
+            "more than 0.05 dB. The clips as they are now are kept as versions."
         )
         if page.estimate_s is not None:
-            text_wrapped_dim(f"About {duration_text(page.estimate_s)}, or less where little suffices")
+            text_wrapped_dim(f"About {duration_text(page.estimate_s)}, or less if little is needed")
     imgui.begin_disabled(bool(page.why_not))
     for method in ("auto", *METHODS):
         if method == "auto":
-            is_clicked = primary_button(f"{Icon.PLAY}  Mend: {METHOD_WORDS[method].lower()}", ImVec2(-1, 30), ui)
+            is_clicked = primary_button(f"{Icon.PLAY}  Mend", ImVec2(-1, 30), ui)
         else:
             is_clicked = imgui.button(f"{METHOD_WORDS[method]} only", ImVec2(-1, 0))
         ui.mark(f"mend.{method}")
@@ -120,13 +132,11 @@ def _draw_choice(session: HasMending, page: MendPage, dispatch: Dispatch, ui: Ui
 
 
 def _draw_progress(progress: JobStatus | None, dispatch: Dispatch, ui: UiState) -> None:
-    share, message = (0.0, "") if progress is None else (progress.done, progress.message)
-    text_wrapped(message or "Starting")
-    imgui.progress_bar(share, ImVec2(-1, 20), f"{100 * share:.0f} %")
+    text_wrapped(job_words(progress, time.monotonic()))
+    draw_job_bar(progress, ui, -1.0, 12.0)
     if imgui.button("Stop", ImVec2(-1, 0)):
         dispatch(StopMend())
     ui.mark("mend.stop")
-    ui.redraw_within(0.2)
 
 
 def _draw_result(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: UiState) -> None:
@@ -134,12 +144,12 @@ def _draw_result(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: UiS
         _draw_buttons(page, record, dispatch, ui)
         return
     if page.state == "reverted":
-        _line(Icon.UNDO, theme.SKY, "Taken back: the clips are as they were before.")
+        _line(Icon.UNDO, theme.SKY, "Taken back: the clips are as before.")
     elif record.has_helped:
         fall = _fall(record.before.excess, record.after.excess)
         _line(Icon.CHECK, theme.GREEN, f"Mended{fall}, in {duration_text(record.seconds)}")
     else:
-        _line(Icon.INFO, theme.SKY, "Nothing helped; the clips are as they were.")
+        _line(Icon.INFO, theme.SKY, "Nothing helped; the clips are unchanged.")
     text_wrapped_dim(record.diagnosis)
     _draw_figures(record)
     _draw_attempts(record)
@@ -161,7 +171,7 @@ def _draw_buttons(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: Ui
         if imgui.button(label, ImVec2(width, 30)):
             dispatch(CompareMended())
         ui.mark("mend.compare")
-        imgui.set_item_tooltip("What the clip was, beside what it is now; wipe or blink with G")
+        imgui.set_item_tooltip("The clip before next to the clip now; wipe or blink with G")
         imgui.same_line()
         if imgui.button("Revert", ImVec2(width, 30)):
             dispatch(RevertMend())
@@ -195,7 +205,7 @@ def _draw_figures(record: MendRecord) -> None:
     if record.before.held_out_excess is not None:
         held_out = record.before.held_out_excess, record.after.held_out_excess
         rows.append(("Held out: flicker", _figure(held_out[0]), _figure(held_out[1])))
-        rows += _psnr_rows("Held out: PSNR", record.before.held_out_psnr, record.after.held_out_psnr)
+        rows += _psnr_rows(HELD_OUT, record.before.held_out_psnr, record.after.held_out_psnr)
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
     if not imgui.begin_table("figures", 3, flags):
         return
@@ -207,6 +217,8 @@ def _draw_figures(record: MendRecord) -> None:
         for cell in row:
             imgui.table_next_column()
             imgui.text(cell)
+            if row[0].startswith(HELD_OUT):
+                imgui.set_item_tooltip(psnr_note(is_whole=True))
     imgui.end_table()
 
 

@@ -13,6 +13,7 @@ from engine.editing.selection.ranges import Spread
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import primary_button, text_wrapped_dim
 from ui.style import theme
+from ui.style.numbers import number_format
 from ui.viewport.editing.select_tool import SelectTool
 
 HEIGHT = 72.0
@@ -119,7 +120,7 @@ def _draw_numbers(spread: Spread, chosen: Attribute, tool: SelectTool, ui: UiSta
         if name == "high":
             imgui.same_line(0, 4)
         imgui.set_next_item_width(max(room, 40.0))
-        is_changed, typed = imgui.input_float(f"##{name}", value, 0.0, 0.0, "%.4g")
+        is_changed, typed = imgui.input_float(f"##{name}", value, 0.0, 0.0, number_format(value))
         ui.mark(f"selection.{name}")
         changed.append((is_changed, typed))
     if unit:

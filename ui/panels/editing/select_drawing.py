@@ -18,7 +18,6 @@ from ui.viewport.scene import SceneView
 
 N_SEGMENTS = 48
 WIDTH, RIM_WIDTH = 1.6, 3.6
-GIZMO_ROOM = 110.0
 """What the axes in the upper right corner take."""
 LEAST_SHARE = 0.02
 """Of the distance of what is drawn: lines nearer to the eye than this are cut off."""
@@ -47,14 +46,17 @@ def draw_tool(
 
 
 def draw_hint(draw: imgui.ImDrawList, tool: SelectTool, area: Rect) -> None:
-    """In the upper left corner of an area: what the tool does."""
+    """In the upper left corner of an area: what the tool does, and below where there is no room beside."""
     if tool.kind is None:
         return
     mode = tool.held_mode if tool.is_dragging else tool.mode
     x = chip(draw, area.x0, area.y0, f"{TOOL_WORDS[tool.kind]}: {MODE_WORDS[mode].lower()}", color=ON_PICTURE.yellow)
     keys = f"{TOOL_HINTS[tool.kind]}   Shift adds   Ctrl subtracts   Esc leaves"
-    if imgui.calc_text_size(keys).x + 26 < area.x1 - x - GIZMO_ROOM:
+    width = imgui.calc_text_size(keys).x + 26
+    if width < area.x1 - x:
         chip(draw, x + 4, area.y0, keys, color=ON_PICTURE.text_dim)
+    elif width < area.width:
+        chip(draw, area.x0, area.y0 + 28, keys, color=ON_PICTURE.text_dim)
 
 
 def _draw_shape(draw: imgui.ImDrawList, tool: SelectTool, pane: Rect, density: float) -> None:

@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from app.session.editing.selection_commands import SelectAnchor, SelectVolume
 from engine.editing.selection.set_algebra import SelectMode
 from ui.panels.actions.action import ActionNeeds
-from ui.panels.pointer import Pointer
+from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.viewport.editing.select_tool import SelectTool
 from ui.viewport.scene import SceneView

@@ -7,14 +7,15 @@ from typing import Any, Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.arrays import AnchorArrays
-from app.playback.orbit_view import OrbitView
+from app.playback.modes.arrays import AnchorArrays
+from app.playback.views.orbit_view import OrbitView
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
     InvertSelection,
     Reselect,
     SelectAll,
+    SelectByAttribute,
     ShrinkSelection,
 )
 from app.session.editing.selection_status import SelectionStatus
@@ -23,6 +24,7 @@ from engine.editing.selection.set_algebra import SELECT_MODES
 from ui.panels.editing.edit_subject import invert_selection
 from ui.panels.editing.select_attribute import draw_attribute
 from ui.panels.editing.select_volume import draw_volume_numbers
+from ui.panels.slider import slider, slider_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import segment, text_wrapped, text_wrapped_dim
 from ui.viewport.editing.select_tool import MODE_WORDS, TOOL_HINTS, TOOL_WORDS, TOOLS, SelectTool
@@ -60,6 +62,11 @@ def near_distance(session: HasAnchors, tool: SelectTool) -> float:
     return 0.0 if anchors is None else tool.near_share * anchors.spacing
 
 
+def select_moving(dispatch: Dispatch, ui: UiState) -> None:
+    """Select what moves, in the way in which tools select."""
+    dispatch(SelectByAttribute("motion", 1.0, 1.0, ui.selecting.how()))
+
+
 def draw_selection(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """Everything of it, from top to bottom."""
     status, tool = session.selection, ui.selecting
@@ -67,11 +74,15 @@ def draw_selection(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState
         text_wrapped_dim("What you select in the picture is counted here when a capture is open.")
         return
     if not status.can_select:
-        text_wrapped_dim("There are no Gaussians to select in this frame: it is not trained.")
+        text_wrapped_dim("There are no Gaussians to select in this frame yet.")
     _draw_counts(status, ui)
     imgui.begin_disabled(not status.can_select)
     imgui.separator_text("Tool")
     _draw_tools(tool, ui)
+    if imgui.button("Select what moves", ImVec2(-1, 0)):
+        select_moving(dispatch, ui)
+    ui.mark("selection.what moves")
+    imgui.set_item_tooltip("Everything that moves in this clip: people and things rather than the room")
     _draw_options(tool, ui)
     imgui.separator_text("Change")
     _draw_changes(session, dispatch, ui)
@@ -166,9 +177,9 @@ def _draw_changes(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState)
 def _slider(
     label: str, value: float, low: float, high: float, words: str, ui: UiState, *, is_log: bool = False
 ) -> float:
-    imgui.set_next_item_width(-imgui.calc_text_size("Tolerance  ").x)
+    imgui.set_next_item_width(-imgui.calc_text_size(f"{slider_text(label, high, words)}  ").x)
     flags = CLAMPED | imgui.SliderFlags_.logarithmic if is_log else CLAMPED
-    moved = imgui.slider_float(label, value, low, high, words, flags)[1]
+    moved = slider(label, value, low, high, words, flags)[1]
     ui.mark(f"selection.{label.lower()}")
     return moved
 

@@ -7,9 +7,10 @@ from typing import Protocol
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.orbit_view import OrbitView
+from app.playback.views.orbit_view import OrbitView
 from app.session.editing.selection_commands import SelectVolume
-from engine.editing.edit import Box, Sphere, Vector
+from engine.editing.actions import Vector
+from engine.editing.edit import Box, Sphere
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import primary_button
 from ui.viewport.editing.select_tool import standing_quat

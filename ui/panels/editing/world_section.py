@@ -7,11 +7,11 @@ from typing import Protocol
 
 from imgui_bundle import imgui
 
-from app.playback.orbit_view import OrbitView
-from app.playback.scene_axes import UP_AXES
+from app.playback.views.orbit_view import OrbitView
+from app.playback.views.scene_axes import UP_AXES
 from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import SetScale, SetUp
-from engine.editing.edit import Vector
+from engine.editing.actions import Vector
 from ui.panels.editing.fields import label_before
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import text_wrapped_dim

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
+from app.playback.views.orbit_view import OrbitView
 from engine.camera.rig import CameraRig
 from engine.capture.exclusions import Exclusions, Stroke
 from ui.panels.state import Rect, UiState

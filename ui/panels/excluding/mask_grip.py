@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from ui.panels.actions.action import ActionNeeds
-from ui.panels.pointer import Pointer
+from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 
 DRAG = "mask"

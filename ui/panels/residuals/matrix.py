@@ -7,13 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.color_maps import mapped
+from app.playback.modes.color_maps import mapped
 from app.status import CELL_RANGES, LOW_IS_BAD, ResidualStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
 from ui.gl import ImageTexture
 from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, worst_of
 from ui.panels.state import Rect, UiState
+from ui.panels.timeline.stage import SMALL_TEXT, small_text
 from ui.panels.widgets import elided
 from ui.style import theme
 
@@ -24,7 +25,7 @@ ROW_HEIGHTS = (3.0, 16.0)
 HEIGHT = 250.0
 """What the matrix takes where there are many cameras, units."""
 NAME_HEIGHT = 12.0
-"""Rows lower than this have no room for a name; held-out ones still have their mark."""
+"""A name takes as much, units; where rows are lower, some are left out."""
 NOTHING = (0.17, 0.19, 0.23)
 """Of a cell that is not measured."""
 
@@ -115,6 +116,15 @@ class Matrix:
             draw.add_line_v(area.x0 + area.width * clip.start / max(n_frames, 1), area.y0, area.y1, line, 1)
 
 
+def named_rows(n_rows: int, row_height: float, shown: int | None) -> set[int]:
+    """Rows whose names do not lie over each other: every one, or every n-th; in any case that of the camera shown."""
+    step = max(int(np.ceil(NAME_HEIGHT / row_height)), 1)
+    named = range(0, n_rows, step)
+    if shown is None:
+        return set(named)
+    return {row for row in named if abs(row - shown) >= step} | {shown}
+
+
 def _draw_names(
     draw: imgui.ImDrawList,
     area: Rect,
@@ -123,16 +133,15 @@ def _draw_names(
     row_height: float,
     shown: int | None,
 ) -> None:
-    """Names where rows are high enough; a bar of their colour beside held-out cameras in any case."""
-    size = imgui.get_font_size()
+    """As many names as there is room for; a bar of their colour beside held-out cameras in any case."""
+    named = named_rows(len(rig.names), row_height, shown)
     for index, name in enumerate(rig.names):
         y = area.y0 + index * row_height
         color = theme.HELD_OUT if is_held_out[index] else theme.TEXT if index == shown else theme.TEXT_DIM
         if is_held_out[index]:
             draw.add_rect_filled(ImVec2(area.x1 - 5, y), ImVec2(area.x1 - 2, y + row_height), theme.u32(color))
-        if row_height >= NAME_HEIGHT:
-            text = elided(name, area.width - 12)
-            draw.add_text(ImVec2(area.x0, y + (row_height - size) / 2), theme.u32(color), text)
+        if index in named:
+            small_text(draw, area.x0, y + (row_height - SMALL_TEXT) / 2, elided(name, area.width - 12), color)
 
 
 def _draw_playhead(

@@ -9,23 +9,25 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
+from app.playback.views.orbit_view import OrbitView
 from app.session.commands import LookThrough, SetFrame
 from app.session.mending.mend_commands import AskMend
 from app.status import CELL_COLUMNS, CELL_RANGES, LOW_IS_BAD, ResidualStatus, SeamStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
-from engine.text import duration_text
+from engine.text import camera_text, duration_text
 from ui.gl import ImageTexture
-from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.excluding.excluded_drawing import ExcludedNeeds, exclusion_of
 from ui.panels.excluding.menu import draw_exclusion_menu
+from ui.panels.picture.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.residuals.matrix import Matrix
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
-from ui.panels.timeline.columns import shown_ratio
+from ui.panels.timeline.columns import provisional_text, shown_ratio
+from ui.panels.timeline.gutter import NOTES
+from ui.panels.timeline.rows import SEAMS
 from ui.panels.timeline.seam_lane import ratio_text, seam_color
+from ui.panels.welcome.thumbnails import ThumbnailNeeds, Thumbnails
 from ui.panels.widgets import elided, segment, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -72,10 +74,11 @@ def figure_text(value: float, column: str) -> str:
     return f"{value:.{digits}f} {UNITS[column]}".rstrip()
 
 
-def worst_seams(seams: Sequence[SeamStatus], n: int) -> list[tuple[SeamStatus, float]]:
-    """The highest ratios first."""
+def listed_seams(seams: Sequence[SeamStatus], n: int) -> list[tuple[SeamStatus, float | None]]:
+    """The highest ratios first, then seams whose ratio is provisional, in order and without it."""
     known = [(seam, ratio) for seam in seams if (ratio := shown_ratio(seam)) is not None]
-    return sorted(known, key=lambda pair: -pair[1])[:n]
+    others = [(seam, None) for seam in seams if seam.is_provisional and seam.ratio is not None]
+    return [*sorted(known, key=lambda pair: -pair[1]), *others][:n]
 
 
 def _draw_seam_menu(seam: SeamStatus, dispatch: Dispatch, ui: UiState) -> None:
@@ -92,25 +95,28 @@ def seam_words(seam: SeamStatus, rig: CameraRig) -> str:
     """What is known of a seam, and what a click does."""
     lines = []
     if seam.ratio is not None:
-        lines.append(f"What stands still changes {seam.ratio:.2f} times as much as inside the two clips.")
+        lines.append(f"Change at the seam relative to inside the clips, of what stands still: {seam.ratio:.2f}")
+    if seam.is_provisional:
+        lines.append(f"Provisional: measured in {seam.n_cameras} of {seam.n_all} cameras so far.")
     if seam.score is not None:
         lines.append(f"Excess flicker of it: {seam.score:.2f} x 1/255, mean of {seam.n_cameras} cameras.")
     if seam.worst_camera is not None:
-        lines.append(f"Worst camera: {rig.names[seam.worst_camera]}.")
+        lines.append(f"Worst seen by {camera_text(rig.names[seam.worst_camera])}.")
     return "\n".join([*lines, "Click to look through it and play around the boundary."])
 
 
-def progress_text(status: ResidualStatus) -> str:
-    """How much is measured, in words."""
+def progress_text(status: ResidualStatus, column: str) -> str:
+    """Of how many pictures the column that is shown is measured, and how long everything takes, in words."""
     if status.n_all == 0:
         return "Pictures are measured once a clip is trained."
-    done = f"{format_count(status.n_done)} of {format_count(status.n_all)} pictures measured"
     if status.n_done >= status.n_all:
         return f"All {format_count(status.n_all)} pictures of trained clips are measured."
+    n_done, n_all = status.measured[column]
+    done = f"{COLUMN_WORDS[column]} of {format_count(n_done)} of {format_count(n_all)} pictures measured"
     if status.is_held_back:
         return f"{done}; the rest follows slowly for the moment."
     if status.is_measuring and status.eta_s is not None:
-        return f"{done}, {duration_text(status.eta_s)} left."
+        return f"{done}; all figures in about {duration_text(status.eta_s)}."
     return f"{done}."
 
 
@@ -146,7 +152,7 @@ class ResidualsPanel:
             self._capture = session.capture
         status = session.residual_status
         self._thumbnails.begin()
-        text_wrapped_dim(progress_text(status))
+        text_wrapped_dim(progress_text(status, self.column))
         ui.mark("residuals.progress")
         if status.message:
             imgui.text_colored(ImVec4(*theme.VERMILLION), Icon.WARNING)
@@ -163,7 +169,8 @@ class ResidualsPanel:
         if not status.seams:
             return
         imgui.separator_text("Seams between clips, worst first")
-        found = worst_seams(status.seams, N_SEAMS)
+        imgui.set_item_tooltip(NOTES[SEAMS])
+        found = listed_seams(status.seams, N_SEAMS)
         if not found:
             text_wrapped_dim("No boundary between two trained clips is measured yet.")
         for seam, ratio in found:
@@ -173,11 +180,12 @@ class ResidualsPanel:
             imgui.set_item_tooltip(seam_words(seam, session.rig))
             _draw_seam_menu(seam, dispatch, ui)
             imgui.same_line(0, 0)
-            imgui.text_colored(ImVec4(*seam_color(ratio)), Icon.SQUARE)
+            imgui.text_colored(ImVec4(*(theme.TEXT_DIM if ratio is None else seam_color(ratio))), Icon.SQUARE)
             imgui.same_line(0, 8)
-            imgui.text(
-                f"{ratio_text(ratio)}   clip {seam.clip_index - 1} to {seam.clip_index}, frame {seam.frame_index}"
-            )
+            words = provisional_text(seam) if ratio is None else ratio_text(ratio)
+            where = f"clip {seam.clip_index - 1} to {seam.clip_index}, frame {seam.frame_index}"
+            text = elided(f"{words}   {where}", imgui.get_content_region_avail().x)
+            imgui.text_colored(ImVec4(*(theme.TEXT_DIM if ratio is None else theme.TEXT)), text)
             imgui.pop_id()
             if is_clicked:
                 if seam.worst_camera is not None:
@@ -218,7 +226,7 @@ class ResidualsPanel:
             excluded = exclusion_of(session, camera_index, frame_index)
             words = f"{words}\n{excluded}" if excluded else words
             held_out = " (held out)" if status.is_held_out[camera_index] else ""
-            name = session.rig.names[camera_index]
+            name = camera_text(session.rig.names[camera_index])
             imgui.set_tooltip(f"{name}{held_out}, frame {frame_index}: {words}")
         origin = imgui.get_cursor_screen_pos()
         width = min(imgui.get_content_region_avail().x, COLOR_BAR_SIZE[0])
@@ -249,7 +257,7 @@ class ResidualsPanel:
                 draw, x = imgui.get_window_draw_list(), box.x1 + 10
                 draw.add_text(ImVec2(x, row.y0 + 5), theme.u32(theme.TEXT), figure_text(value, self.column))
                 is_held_out = status.is_held_out[camera_index]
-                name = elided(f"{session.rig.names[camera_index]}, frame {frame_index}", row.x1 - x - 4)
+                name = elided(f"{camera_text(session.rig.names[camera_index])}, frame {frame_index}", row.x1 - x - 4)
                 color = theme.HELD_OUT if is_held_out else theme.TEXT_DIM
                 draw.add_text(ImVec2(x, row.y0 + 24), theme.u32(color), name)
             imgui.pop_id()

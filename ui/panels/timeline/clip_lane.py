@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
+from app.psnr_words import psnr_label
 from app.status import ClipStatus
 from engine.capture.clip import Clip
 from ui.panels.editing.labels import with_label
@@ -141,7 +142,7 @@ def _draw_words(draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip
     titles = (with_label(session, "clip", str(clip.start), plain), plain, str(clip.clip_index))
     words = band_words(status, session.training, clip.clip_index, state_words(state))
     if status.held_out_psnr is not None:
-        words = f"{words}, {status.held_out_psnr:.1f} dB"
+        words = f"{words}, {psnr_label(status.held_out_psnr, is_whole=status.held_out_whole)} dB"
     title = next((title for title in titles if _fits(title, band)), titles[-1])
     line_two = f"{icon}  {words}" if icon else words
     if not _fits(line_two, band):

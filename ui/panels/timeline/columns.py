@@ -38,7 +38,8 @@ def clip_columns(clip_states: Sequence[ClipStatus]) -> ClipColumns:
 
 
 def seam_ratios(seams: Sequence[SeamStatus], n_clips: int) -> np.ndarray:
-    """Ratio of the boundary before each clip, NaN where not measured; the first clip has none. [n_clips] float32"""
+    """Ratio of the boundary before each clip, NaN where not all of it is measured; the first clip has none.
+    [n_clips] float32"""
     ratios = np.full(n_clips, np.nan, np.float32)
     for seam in seams:
         ratio = shown_ratio(seam)
@@ -48,11 +49,20 @@ def seam_ratios(seams: Sequence[SeamStatus], n_clips: int) -> np.ndarray:
 
 
 def shown_ratio(seam: SeamStatus) -> float | None:
-    """The ratio of a seam; where nothing changes inside its clips, so that it has none, an end of the scale by its
-    score. None where it was not measured."""
+    """The ratio of a seam that is measured in all cameras; where nothing changes inside its clips, so that it has none,
+    an end of the scale by its score. None of others: they are neither ranked nor flagged."""
+    if seam.is_provisional:
+        return None
     if seam.ratio is not None or seam.score is None:
         return seam.ratio
     return SEAM_RATIO_RANGE[1] if seam.score > SEAM_FLAGGED else SEAM_RATIO_RANGE[0]
+
+
+def provisional_text(seam: SeamStatus) -> str:
+    """What is known of a seam of which cameras are missing; empty of others."""
+    if not seam.is_provisional or seam.ratio is None:
+        return ""
+    return f"~{seam.ratio:.1f} ({seam.n_cameras} of {seam.n_all} cameras)"
 
 
 def frame_psnr(status: ResidualStatus) -> np.ndarray:

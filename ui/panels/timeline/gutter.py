@@ -16,7 +16,8 @@ WIDTH = 84.0
 LANES_BUTTON = 22.0
 POPUP = "lanes"
 NOTES = {
-    SEAMS: "How much more changes between two clips than inside of them: 1 means no seam, above 2 is worth a look",
+    SEAMS: "Change at the seam relative to inside the clips: 1 means no seam, above 2 is worth a look,"
+    " ~ that not all cameras are measured yet",
     QUALITY: "Held-out PSNR of each clip, and of each frame where it was measured; 20 to 40 dB",
     CACHE: "Frames that are decoded in memory and shown at once",
     CAMERA: "Keys of the camera path: C at the playhead",

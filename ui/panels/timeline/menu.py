@@ -7,7 +7,6 @@ from imgui_bundle import imgui
 from app.session.commands import SetFrame
 from app.session.mending.mend_commands import AskMend
 from engine.capture.clip import Clip
-from ui.panels.clip_training_menu import draw_clip_training
 from ui.panels.clips.menu import draw_cutting
 from ui.panels.editing.labels import draw_label_field
 from ui.panels.state import Dispatch, UiState
@@ -15,6 +14,7 @@ from ui.panels.timeline.clip_words import clip_title, state_words
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.seam_lane import seam_at
 from ui.panels.timeline.stage import Stage
+from ui.panels.training.clip_training_menu import draw_clip_training
 from ui.style.theme import Icon
 
 POPUP = "clip menu"

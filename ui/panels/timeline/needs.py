@@ -9,7 +9,7 @@ from app.playback.timeline import Timeline
 from app.session.edit_status import EditsStatus, PathsStatus
 from app.status import ClipStatus, ResidualStatus, TrainingStatus
 from engine.capture.clip import Clip
-from ui.panels.clip_training_menu import ClipMenuNeeds
+from ui.panels.training.clip_training_menu import ClipMenuNeeds
 
 
 class TimelineNeeds(ClipMenuNeeds, Protocol):

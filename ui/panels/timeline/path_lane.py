@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.session.path_commands import ChooseCameraKey, TimeCameraKey
+from app.session.paths.path_commands import ChooseCameraKey, TimeCameraKey
 from engine.camera.camera_path import CameraPath
 from ui.panels.key_words import key_words
 from ui.panels.state import Dispatch, Rect

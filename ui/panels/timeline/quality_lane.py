@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from imgui_bundle import imgui
 
+from app.psnr_words import psnr_words
 from ui.panels.timeline.clip_lane import clips_in_sight
 from ui.panels.timeline.columns import MIN_GROUP_WIDTH, group_size, means_of_groups, runs_of
 from ui.panels.timeline.needs import TimelineNeeds
@@ -100,9 +101,10 @@ def _draw_note(session: TimelineNeeds, frame_index: int, frames: np.ndarray) -> 
     clip = session.timeline.clip_of(frame_index)
     if clip is None:
         return
-    psnr = session.clip_states[clip.clip_index].held_out_psnr
+    status = session.clip_states[clip.clip_index]
+    psnr = status.held_out_psnr
     imgui.begin_tooltip()
-    words = "not measured" if psnr is None else f"{psnr:.2f} dB on held-out cameras"
+    words = "not measured" if psnr is None else psnr_words(psnr, is_whole=status.held_out_whole)
     imgui.text_unformatted(f"Clip {clip.clip_index}: {words}")
     if frame_index < len(frames) and np.isfinite(frames[frame_index]):
         imgui.text_unformatted(f"Frame {frame_index}: {frames[frame_index]:.2f} dB")

@@ -1,7 +1,7 @@
 """The lane of seams: one mark per boundary between clips, on a fixed scale of 1 to 3. A click plays around it.
 
-Height and colour say the same, from dark violet to light yellow; above SEAM_RATIO_FLAGGED a sign is added. Where a
-boundary was not measured, only its outline is drawn.
+Height and colour say the same, from dark violet to light yellow; above SEAM_RATIO_FLAGGED a sign is added. Where not
+all cameras of a boundary are measured, only its outline is drawn.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from functools import lru_cache
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.color_maps import COLOR_MAPS, N_COLORS
+from app.playback.modes.color_maps import COLOR_MAPS, N_COLORS
 from app.status import SEAM_RATIO_FLAGGED, SEAM_RATIO_RANGE
 from ui.panels.state import Rect
 from ui.panels.timeline.clip_lane import clips_in_sight
-from ui.panels.timeline.columns import group_size, largest_of_groups
+from ui.panels.timeline.columns import group_size, largest_of_groups, provisional_text
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import SEAMS
 from ui.panels.timeline.stage import Stage, small_text
@@ -52,7 +52,7 @@ def ratio_text(ratio: float) -> str:
 
 
 def seams_in_sight(stage: Stage, session: TimelineNeeds) -> list[tuple[int, float]]:
-    """Clip behind the seam and ratio (NaN where not measured) of every mark, from left to right."""
+    """Clip behind the seam and ratio (NaN where not all of it is measured) of every mark, from left to right."""
     first, stop = clips_in_sight(session, stage.scale)
     n_clips = min(len(session.clips), len(session.clip_states))
     first = max(first, 1)
@@ -82,22 +82,29 @@ def draw_seam_lane(stage: Stage, session: TimelineNeeds) -> None:
         room = stage.scale.x1 - x if after is None else stage.scale.left_of(session.clips[after].start) - x
         mark = Rect(x - MARK_WIDTH / 2, row.y0 + 1, x + MARK_WIDTH / 2, row.y1 - 1)
         stage.ui.mark_rect(f"timeline.seam{clip_index}", mark)
-        _draw_mark(stage, mark, ratio, room)
+        text = _provisional(session, clip_index).partition(" ")[0] if np.isnan(ratio) else ratio_text(ratio)
+        _draw_mark(stage, mark, ratio, text, room)
     pointed = seam_at(stage, session)
     if pointed is not None:
         _draw_note(session, *pointed)
 
 
-def _draw_mark(stage: Stage, mark: Rect, ratio: float, room: float) -> None:
+def _provisional(session: TimelineNeeds, clip_index: int) -> str:
+    seams = session.residual_status.seams[clip_index - 1 : clip_index]
+    return "".join(provisional_text(seam) for seam in seams if seam.clip_index == clip_index)
+
+
+def _draw_mark(stage: Stage, mark: Rect, ratio: float, text: str, room: float) -> None:
     draw = stage.draw
     if np.isnan(ratio):
         top = mark.y1 - mark.height / 2
         draw.add_rect(ImVec2(mark.x0, top), mark.high, theme.u32(theme.faded(theme.TEXT_DIM, 0.7)))
-        return
-    share = min(max((ratio - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0)
-    top = mark.y1 - mark.height * (0.3 + 0.7 * share)
-    draw.add_rect_filled(ImVec2(mark.x0, top), mark.high, theme.u32(seam_color(ratio)), 1)
-    text = ratio_text(ratio) if room >= MIN_TEXT_ROOM else ""
+    else:
+        share = min(max((ratio - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0)
+        top = mark.y1 - mark.height * (0.3 + 0.7 * share)
+        draw.add_rect_filled(ImVec2(mark.x0, top), mark.high, theme.u32(seam_color(ratio)), 1)
+    if room < MIN_TEXT_ROOM:
+        text = ""
     if not text and ratio > SEAM_RATIO_FLAGGED and room >= MARK_WIDTH + 6:
         text = "!"
     if text:
@@ -119,11 +126,12 @@ def seam_at(stage: Stage, session: TimelineNeeds) -> tuple[int, float] | None:
 
 def _draw_note(session: TimelineNeeds, clip_index: int, ratio: float) -> None:
     words = f"Seam between clips {clip_index - 1} and {clip_index}, at frame {session.clips[clip_index].start}"
-    if np.isnan(ratio):
-        words += "\nNot measured"
-    else:
-        words += f"\nWhat stands still changes {ratio_text(ratio)} times as much as inside of them"
+    text = _provisional(session, clip_index) if np.isnan(ratio) else ratio_text(ratio)
+    if text:
+        words += f"\nChange at the seam relative to inside the clips: {text}"
         words += f"\n1 means no seam; above {SEAM_RATIO_FLAGGED:g} is worth a look"
+    else:
+        words += "\nNot measured"
     imgui.begin_tooltip()
     imgui.text_unformatted(f"{words}\nClick to play around it (/)")
     imgui.end_tooltip()

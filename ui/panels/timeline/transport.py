@@ -59,8 +59,7 @@ def draw_transport(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> N
         ui.mark("timeline.played")
     clip = timeline.clip
     if clip is not None:
-        label = f"{clip_title(clip.clip_index, session.reference_index)}, frame {timeline.frame_index - clip.start}"
-        text_right(label)
+        text_right(f"{clip_title(clip.clip_index, session.reference_index)}, frames {clip.start} to {clip.stop - 1}")
 
 
 def played_words(timeline: Timeline) -> str:

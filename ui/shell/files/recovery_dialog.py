@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from imgui_bundle import ImVec2, imgui
 
-from app.document.recovery import Recovery
+from app.document.storing.recovery import Recovery
 from app.project.project_choices import ProjectChoices
 from app.session.commands import CloseQuestion, Command, OpenProject
 from app.session.files.file_commands import ShowProjectFolder

@@ -1,4 +1,4 @@
-"""The dialog for a project whose capture is not where it was: choose where it is by now."""
+"""The dialog for a project whose capture is not where it was: choose where it is now."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def relocation_texts(question: RelocationQuestion) -> list[str]:
             f"{question.refused} holds another capture: its pictures or cameras are not those that this project was "
             "made for. Choose another folder, or open that capture as a project of its own."
         )
-    return [*texts, "Choose the folder where it is by now. Nothing that was learned or edited is lost."]
+    return [*texts, "Choose the folder where it is now. Training and edits are kept."]
 
 
 def draw_relocation(question: RelocationQuestion, ui: UiState, is_agreed: bool) -> Command | None:

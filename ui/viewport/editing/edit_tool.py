@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from app.session.editing.scope_choice import ScopeChoice
-from engine.editing.edit import Box, Edit, Sphere, Transform
+from engine.editing.actions import Transform
+from engine.editing.edit import Box, Edit, Sphere
 from ui.viewport.editing.handles import Handle, Thing
 
 TOGETHER_S = 1.0
@@ -36,6 +37,7 @@ class EditTool:
         asking: What points of the scene are being asked for; None while none are.
         points: Those that were given, scene units, [3] each.
         length_m: Known length between two points, m.
+        is_new: Whether the chosen edit was made just now, so that its details are brought into sight.
         renamed: The name that is being written; None while it is that of the edit.
     """
 
@@ -52,6 +54,7 @@ class EditTool:
     asking: Asking | None = None
     points: list[np.ndarray] = field(default_factory=list)
     length_m: float = 1.0
+    is_new: bool = False
     renamed: str | None = None
     _pressed_s: float = -1e9
 

@@ -12,10 +12,11 @@ from typing import Literal
 import numpy as np
 from msgspec import structs
 
-from app.playback.pointing import pixel_ray, point_beside
+from app.playback.views.pointing import pixel_ray, point_beside
 from engine.camera.projection import focal_px, to_camera, to_pixels
 from engine.camera.rotations import matrices_of, quat_product, quats_of_turns
-from engine.editing.edit import Box, Quat, Sphere, Transform, Vector
+from engine.editing.actions import Quat, Transform, Vector
+from engine.editing.edit import Box, Sphere
 
 Thing = Box | Sphere | Transform
 """What has handles: a place that an edit acts on, or the movement that it makes."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.selection.seen_from import SeenFrom
 from ui.gl import PointRenderer, Target

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from engine.capture.excluded_pixels import painted_pixels
 from engine.capture.exclusions import Stroke
+from engine.capture.pixels.excluded_pixels import painted_pixels
 
 COLUMNS = 192
 """The mask is looked at on a grid this wide."""

@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from app.export.video.formats import FORMATS
 from app.export.video.passes import PassPicture
-from engine.capture.sound import SoundReader
+from engine.capture.files.sound import SoundReader
 
 SOUND_RATE = 48_000
 """Samples per second; the only rate that Opus and all players of AAC share."""

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from app.export.video.job import PassName
+from app.export.jobs.video import PassName
 from app.export.video.passes import PassPicture
 from engine.export.exr import write_exr
 from engine.images.srgb import linear_of

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from engine.metrics.columns import COLUMNS
+from app.lab.added import figures as added
+from engine.metrics.columns import COLUMNS as MEASURED
+
+COLUMNS = MEASURED | added.COLUMNS
 
 _KINDS = {
     "psnr": "PSNR",

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from app.lab.flicker import OWN_BORDERS, definition_of, flicker_figures
 from app.lab.report.about import all_settings
 from app.lab.report.comparison import Compared, comparability
 from app.lab.report.page.parts import Figure, Section
 from app.lab.report.page.tables import Table, TableColumn
 from app.lab.report.paper_figures.length_chart import LengthPanel, Series, draw_over_length
 from app.lab.report.paper_figures.pictured import of_main_group
-from engine.metrics.clips.flicker import OWN_BORDERS, definition_of, flicker_figures
 from engine.metrics.clips.summary import mean_of
 
 MAX_ENDS = 40

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from app.evaluation.headless import TrainedProject, open_trained
+from app.lab.pictures import Pictures
 from app.lab.report.comparison import Compared
-from app.lab.report.pictures import Pictures
 from app.project.project_facts import ClipFacts
 
 

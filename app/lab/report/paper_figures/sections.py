@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from app.evaluation.headless import TrainedProject
+from app.lab.pictures import Pictures
 from app.lab.report.comparison import Compared
 from app.lab.report.page.parts import Section
 from app.lab.report.paper_figures.by_hand import Places
@@ -13,7 +14,6 @@ from app.lab.report.paper_figures.crops import crops_section
 from app.lab.report.paper_figures.features import features_section
 from app.lab.report.paper_figures.over_length import clip_length_section, sequence_length_section
 from app.lab.report.paper_figures.pictured import pictured_projects
-from app.lab.report.pictures import Pictures
 
 STEPS = 3
 """How often `tick` is called."""

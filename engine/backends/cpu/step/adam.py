@@ -120,7 +120,7 @@ class CpuAdam:
         if unfit:
             raise TypeError(f"back end 'cpu' needs contiguous float32 parameters on the cpu; {', '.join(unfit)} is not")
         self._parameters = dict(parameters)
-        self._steps = dict.fromkeys(self._parameters, 0)
+        self.steps = dict.fromkeys(self._parameters, 0)
         self._means = {name: np.zeros(p.shape, np.float32) for name, p in self._parameters.items()}
         self._squares = {name: np.zeros(p.shape, np.float32) for name, p in self._parameters.items()}
         self._touched = {name: np.zeros(-(-p.numel() // _BLOCK), np.uint8) for name, p in self._parameters.items()}
@@ -157,22 +157,31 @@ class CpuAdam:
         rows = [self._chunks[name] + (number, 0, 0) for number, name in enumerate(names)]
         return np.concatenate(rows) if rows else np.empty((0, 3), np.int64)
 
-    def norm(self, gradients: Mapping[str, Tensor]) -> float:
-        """See Adam. Also notes which blocks have a gradient, so `update` must follow it."""
+    def step(
+        self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], *, max_norm: float, is_sound: Tensor
+    ) -> Tensor:
+        """See Adam."""
+        norm = self._norm(gradients)
+        for name in gradients:
+            self.steps[name] += 1
+        if math.isfinite(norm) and bool(is_sound):
+            self._update(gradients, rates, max_norm / norm if 0.0 < max_norm < norm else 1.0)
+        return torch.tensor(norm, dtype=torch.float64)
+
+    def _norm(self, gradients: Mapping[str, Tensor]) -> float:
+        """Also notes which blocks have a gradient."""
         sums = np.zeros(sum(len(self._chunks[name]) for name in gradients))
         self._work(gradients, 1.0, None, sums)
         total = float(sums.sum())
         return math.sqrt(total) if total >= 0.0 else total  # NaN stays NaN
 
-    def update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
-        """See Adam. `norm` of the same gradients has to be asked for before."""
+    def _update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
         factors = np.empty((sum(len(self._chunks[name]) for name in gradients), 2), np.float32)
         first = 0
         for name in gradients:
-            self._steps[name] += 1
             end = first + len(self._chunks[name])
-            factors[first:end, 0] = rates[name] / (1.0 - BETA1 ** self._steps[name])
-            factors[first:end, 1] = 1.0 / math.sqrt(1.0 - BETA2 ** self._steps[name])
+            factors[first:end, 0] = rates[name] / (1.0 - BETA1 ** self.steps[name])
+            factors[first:end, 1] = 1.0 / math.sqrt(1.0 - BETA2 ** self.steps[name])
             first = end
         self._work(gradients, scale, factors, None)
 
@@ -184,13 +193,13 @@ class CpuAdam:
                 "exp_avg": torch.from_numpy(self._means[name].copy()),
                 "exp_avg_sq": torch.from_numpy(self._squares[name].copy()),
             }
-            for name, n_steps in self._steps.items()
+            for name, n_steps in self.steps.items()
             if n_steps
         }
 
     def restore(self, name: str, state: Mapping[str, Tensor]) -> None:
         """See Adam."""
-        self._steps[name] = round(state["step"].item())  # a file gives a single number back as [1]
+        self.steps[name] = round(state["step"].item())  # a file gives a single number back as [1]
         for moment, kept in (("exp_avg", self._means[name]), ("exp_avg_sq", self._squares[name])):
             if state[moment].shape != kept.shape:
                 raise ValueError(f"{moment} of {name} is {list(state[moment].shape)}, not {list(kept.shape)}")

@@ -49,7 +49,8 @@ def photometric_loss_cpu(
         return terms, ((1 - ssim_weight) * terms.l1 + ssim_weight * terms.dissimilarity) / n
 
     loss = _Photometric.apply(image, gain, compute)
-    return PhotometricLoss(loss, mean_square)  # pyright: ignore[reportArgumentType] - apply is untyped
+    squares = torch.tensor(mean_square, dtype=torch.float64)
+    return PhotometricLoss(loss, squares)  # pyright: ignore[reportArgumentType] - apply is untyped
 
 
 def _take(height: int, width: int) -> LossWorkspace:

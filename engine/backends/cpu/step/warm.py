@@ -22,5 +22,4 @@ def warm_up() -> None:
     cpu.tile_squares(image, truth, gain)
     gradients = {"image": torch.ones(8, 8, 3)}
     adam = cpu.adam({"image": image.detach()})
-    adam.norm(gradients)
-    adam.update(gradients, {"image": 0.0}, 1.0)
+    adam.step(gradients, {"image": 0.0}, max_norm=0.0, is_sound=torch.tensor(True))

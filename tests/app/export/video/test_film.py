@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from av.codec.codec import UnknownCodecError
 
-from app.export.video import formats
 from app.export.video.formats import MissingCodecError, check_codecs, format_of
 from app.export.video.passes import PassPicture
 from app.export.video.writers.film import FilmWriter
@@ -51,12 +50,12 @@ def test_a_missing_encoder_is_named_with_what_there_is_before_the_work(films: Fi
 
         return codec
 
-    monkeypatch.setattr(formats, "Codec", without("libx264"))
+    monkeypatch.setattr("av.codec.Codec", without("libx264"))
     with pytest.raises(MissingCodecError, match="built without libx264") as error:
         films.render("a.mp4", "mp4")
     assert error.value.hint == "What can be written is webm, png, exr."
     assert films.names == []
-    monkeypatch.setattr(formats, "Codec", without("libopus"))
+    monkeypatch.setattr("av.codec.Codec", without("libopus"))
     check_codecs("webm")
     with pytest.raises(MissingCodecError, match="built without libopus") as error:
         check_codecs("webm", needs_sound=True)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from app.evaluation.headless import TrainedProject
+from app.export.jobs.video import Turntable, VideoJob
 from app.export.scene_frames import SceneFrames
-from app.export.video.job import Turntable, VideoJob
 from app.export.video.plan import plan_video
 from engine.camera.corrections import N_VALUES
 from engine.clip_files.array_names import CORRECTIONS
@@ -24,22 +24,22 @@ from tests.app.export.video.conftest import Films
 @pytest.mark.parametrize(
     ("format_name", "entries", "message"),
     [
-        ("gif", {}, "not a format"),
+        ("gif", {}, "Format is 'gif'; it has to be 'mp4', 'webm'"),
         ("png", {"camera": None}, "give one of these three"),
         ("png", {"turntable": Turntable(), "camera": "1"}, "give one of these three"),
         ("png", {"camera": "nobody"}, "no camera called nobody"),
-        ("png", {"shows": "heat"}, "cannot show 'heat'"),
-        ("png", {"size": (0, 10)}, "at least one pixel"),
+        ("png", {"shows": "heat"}, "Shows is 'heat'; it has to be 'color'"),
+        ("png", {"size": (0, 10)}, "Size is .0, 10.; it has to be WIDTHxHEIGHT"),
         ("png", {"size": (9000, 10), "supersampling": 2}, "18000 x 20 pixels; at most 16384"),
         ("png", {"size": (4000, 4000), "supersampling": 4}, "134 million in all"),
-        ("png", {"supersampling": 0}, "whole number from 1"),
-        ("png", {"fps": 0.0}, "The rate is 0"),
-        ("png", {"fps": float("nan")}, "The rate is nan"),
-        ("png", {"speed": -1.0}, "The speed is -1"),
+        ("png", {"supersampling": 0}, "a whole number between 1 and 8"),
+        ("png", {"fps": 0.0}, "Rate is 0.0; it has to be a number between 0.1 and 1000"),
+        ("png", {"fps": float("nan")}, "Rate is nan"),
+        ("png", {"speed": -1.0}, "Speed is -1"),
         ("png", {"hold": 6.0}, "no frame 6"),
-        ("png", {"frames": (4, 4)}, "does not have all"),
-        ("png", {"frames": (4, 99)}, "does not have all"),
-        ("png", {"background": (0, 0, 256)}, "three numbers from 0 to 255"),
+        ("png", {"frames": range(4, 4)}, "at least one"),
+        ("png", {"frames": range(4, 99)}, "does not have all"),
+        ("png", {"background": (0, 0, 256)}, "#RRGGBB, such as #ffffff, with numbers between 0 and 255"),
         ("png", {"sound": "0"}, "PNG files cannot hold sound"),
         ("mp4", {"sound": "0"}, "its frames are image files"),
         ("mp4", {"is_transparent": True}, "H.264 in mp4 has no transparency"),
@@ -49,15 +49,25 @@ from tests.app.export.video.conftest import Films
         ("png", {"shows": "compare", "turntable": Turntable()}, "only what a camera of the capture took"),
         ("png", {"shows": "compare", "hold": 1.0}, "only what a camera of the capture took"),
         ("png", {"turntable": Turntable(n_turns=0.0)}, "0 turns"),
-        ("png", {"turntable": Turntable(n_turns=float("nan"))}, "nan turns"),
-        ("png", {"turntable": Turntable(elevation_deg=120.0)}, "The elevation is 120"),
-        ("png", {"turntable": Turntable(radius=0.0)}, "The radius is 0"),
     ],
 )
 def test_what_makes_no_sense_is_refused(films: Films, format_name: str, entries: dict[str, Any], message: str):
     with pytest.raises(EngineError, match=message):
         films.render("out", format_name, **entries)
     assert films.names == []
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"n_turns": float("nan")}, "Turns is nan; it has to be a number between -100 and 100"),
+        ({"elevation_deg": 120.0}, "Elevation is 120"),
+        ({"radius": 0.0}, "Distance is 0"),
+    ],
+)
+def test_a_circle_that_cannot_be_is_refused(entries: dict[str, float], message: str):
+    with pytest.raises(EngineError, match=message):
+        Turntable(**entries)
 
 
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(films: Films):

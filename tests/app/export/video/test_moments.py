@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.export.video.moments import Moment, moments_of
-from engine.capture.frame_runs import runs_of
+from engine.capture.files.frame_runs import runs_of
 
 
 @pytest.mark.parametrize(

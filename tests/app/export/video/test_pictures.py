@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from app.document.history import Changed
+from app.export.jobs.video import Turntable
 from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
-from app.export.video.job import Turntable
 from app.export.video.views import camera_view
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.projection import pinhole_K, vertical_fov
@@ -25,7 +25,7 @@ from tests.engine.export.test_exr import read as read_exr
 @pytest.mark.parametrize(("name", "least_db"), [("a.mp4", 35.0), ("a.webm", 35.0)])
 def test_a_video_holds_every_picture_in_its_colours(sample_films: Films, name: str, least_db: float):
     films = sample_films
-    written = films.render(name, name[2:], frames=(0, 6))
+    written = films.render(name, name[2:], frames=range(0, 6))
     assert (written.n_pictures, written.size, written.notes) == (6, (80, 60), ())
     assert written.n_bytes == (films.folder / name).stat().st_size
     pictures = decoded(films.folder / name)
@@ -42,7 +42,7 @@ def test_a_video_holds_every_picture_in_its_colours(sample_films: Films, name: s
 def test_all_that_is_trained_is_rendered_unless_frames_are_chosen(sample_films: Films):
     assert sample_films.render("all", "png", size=(8, 6)).n_pictures == 6
     with pytest.raises(ProjectError, match="Frame 6 lies in clip 2, which is not trained") as error:
-        sample_films.render("more", "png", frames=(4, 8))
+        sample_films.render("more", "png", frames=range(4, 8))
     assert "--frames 0:6" in error.value.hint
     assert sample_films.names == ["all"]
 
@@ -57,7 +57,7 @@ def test_pictures_are_those_of_an_evaluation(sample_films: Films):
 
 def test_side_by_side_has_the_truth_the_render_and_the_error_in_it(sample_films: Films):
     films = sample_films
-    written = films.render("beside", "png", frames=(4, 5), shows="compare")
+    written = films.render("beside", "png", frames=range(4, 5), shows="compare")
     assert written.size == (3 * 80, 60)
     (image,) = images_in(films.folder / "beside")
     truth, render, error = (image[:, 80 * part : 80 * (part + 1)] for part in range(3))
@@ -69,12 +69,12 @@ def test_side_by_side_has_the_truth_the_render_and_the_error_in_it(sample_films:
     assert np.corrcoef(distance.ravel(), brightness.ravel())[0, 1] > 0.95  # the map grows lighter with the error
     for wrong, message in (({"speed": 0.5}, "not moments between"), ({"size": (40, 30)}, "Leave the size out")):
         with pytest.raises(ProjectError, match=message):
-            films.render("wrong", "png", frames=(4, 6), shows="compare", **wrong)
+            films.render("wrong", "png", frames=range(4, 6), shows="compare", **wrong)
 
 
 def test_change_is_what_differs_from_the_moment_before(sample_films: Films):
     films = sample_films
-    films.render("change", "exr", frames=(0, 6), shows="change")
+    films.render("change", "exr", frames=range(0, 6), shows="change")
     changes = [read_exr(path)["Y"] for path in sorted((films.folder / "change").iterdir())]
     assert changes[0].max() == 0.0  # nothing came before it
     scene = SceneFrames(films.opened)
@@ -83,9 +83,9 @@ def test_change_is_what_differs_from_the_moment_before(sample_films: Films):
         now, before = (draw(scene, moment, view).color for moment in (frame, frame - 1))
         assert np.abs(changes[frame] - 255 * np.abs(now - before).mean(axis=2)).max() < 1e-3
         assert changes[frame].max() > 5.0
-    films.render("still", "exr", frames=(0, 2), shows="change", hold=3.0)
+    films.render("still", "exr", frames=range(0, 2), shows="change", hold=3.0)
     assert read_exr(films.folder / "still" / "picture_000001.exr")["Y"].max() == 0.0
-    turning = {"turntable": Turntable(), "shows": "change", "frames": (0, 2)}
+    turning = {"turntable": Turntable(), "shows": "change", "frames": range(0, 2)}
     films.render("turning", "exr", hold=3.0, **turning)  # what the camera does is not a change
     assert read_exr(films.folder / "turning" / "picture_000001.exr")["Y"].max() == 0.0
     films.render("moving", "exr", **turning)
@@ -94,7 +94,7 @@ def test_change_is_what_differs_from_the_moment_before(sample_films: Films):
 
 def test_slow_motion_shows_moments_between_frames_in_order(sample_films: Films):
     films = sample_films
-    assert films.render("slow", "png", frames=(0, 3), speed=0.25).n_pictures == 9
+    assert films.render("slow", "png", frames=range(0, 3), speed=0.25).n_pictures == 9
     names = sorted(path.name for path in (films.folder / "slow").iterdir())
     assert names == [f"picture_{number:06d}.png" for number in range(9)]
     levels = images_in(films.folder / "slow")
@@ -108,8 +108,8 @@ def test_slow_motion_shows_moments_between_frames_in_order(sample_films: Films):
         assert to_second == sorted(to_second, reverse=True)
         assert len(set(from_first)) == 5
     fps = films.opened.capture.fps
-    assert films.render("60.mp4", "mp4", frames=(0, 3), fps=2 * fps).n_pictures == 5
-    assert films.render("fast", "png", frames=(0, 6), speed=2.0).n_pictures == 3
+    assert films.render("60.mp4", "mp4", frames=range(0, 3), fps=2 * fps).n_pictures == 5
+    assert films.render("fast", "png", frames=range(0, 6), speed=2.0).n_pictures == 3
     assert (films.folder / "fast" / "frame_000004.png").is_file()
 
 
@@ -145,7 +145,7 @@ def test_a_clip_fades_into_the_next_one(sample_films: Films, monkeypatch: pytest
     loads: list[int] = []
     load = type(films.opened).load
     monkeypatch.setattr(type(films.opened), "load", lambda self, index: loads.append(index) or load(self, index))
-    films.render("slow", "png", frames=(1, 5), speed=0.25)
+    films.render("slow", "png", frames=range(1, 5), speed=0.25)
     assert loads[:2] == [0, 1]  # looked at before the work
     assert len(loads) <= 2 + 4
     monkeypatch.undo()
@@ -155,8 +155,8 @@ def test_a_clip_fades_into_the_next_one(sample_films: Films, monkeypatch: pytest
 
 def test_supersampling_reduces_what_was_drawn_larger(sample_films: Films):
     films = sample_films
-    films.render("fine", "png", frames=(0, 1), supersampling=3)
-    films.render("large", "png", frames=(0, 1), size=(240, 180))
+    films.render("fine", "png", frames=range(0, 1), supersampling=3)
+    films.render("large", "png", frames=range(0, 1), size=(240, 180))
     (fine,), (large,) = (images_in(films.folder / name) for name in ("fine", "large"))
     assert fine.shape == (60, 80, 3)
     assert 25.0 < psnr_of(fine, films.live(0)) < 60.0
@@ -165,8 +165,8 @@ def test_supersampling_reduces_what_was_drawn_larger(sample_films: Films):
 
 def test_a_turntable_goes_round_and_can_be_looped(sample_films: Films):
     films = sample_films
-    films.render("round", "png", turntable=Turntable(1.0, 10.0), frames=(0, 4), hold=0.0)
-    films.render("twice", "png", turntable=Turntable(2.0, 10.0), frames=(0, 4), hold=0.0)
+    films.render("round", "png", turntable=Turntable(1.0, 10.0), frames=range(0, 4), hold=0.0)
+    films.render("twice", "png", turntable=Turntable(2.0, 10.0), frames=range(0, 4), hold=0.0)
     quarter, half = (images_in(films.folder / name) for name in ("round", "twice"))
     assert psnr_of(half[1], quarter[2]) > 50.0
     assert psnr_of(half[2], quarter[0]) > 50.0
@@ -207,7 +207,7 @@ def test_a_camera_path_is_followed_while_time_runs_or_stands_still(sample_films:
 def test_features_apart_are_drawn_apart(sample_films: Films):
     films = sample_films
     for features in ("both", "static", "dynamic"):
-        films.render(features, "png", features=features, frames=(0, 6))
+        films.render(features, "png", features=features, frames=range(0, 6))
     both, static, dynamic = (images_in(films.folder / name) for name in ("both", "static", "dynamic"))
     assert psnr_of(static[0], dynamic[0]) < 40.0
     assert psnr_of(static[0], both[0]) < 60.0

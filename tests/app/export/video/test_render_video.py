@@ -5,6 +5,7 @@ from __future__ import annotations
 import av
 import numpy as np
 import pytest
+from msgspec import structs
 from PIL import Image
 
 from app.background.jobs import JobCancelled
@@ -21,25 +22,25 @@ from tests.engine.synchronisation.made_recordings import write_sound_video
 
 
 def test_an_mp4_begins_with_its_index_so_that_it_plays_while_it_loads(films: Films):
-    films.render("a.mp4", "mp4", frames=(0, 2))
+    films.render("a.mp4", "mp4", frames=range(0, 2))
     data = (films.folder / "a.mp4").read_bytes()
     assert 0 < data.index(b"moov") < data.index(b"mdat")
 
 
 def test_odd_sizes_are_padded_for_h264_and_kept_elsewhere(films: Films):
-    written = films.render("odd.mp4", "mp4", size=(47, 31), frames=(0, 2))
+    written = films.render("odd.mp4", "mp4", size=(47, 31), frames=range(0, 2))
     assert written.size == (48, 32)
     assert "47 x 31 is written as 48 x 32" in written.notes[0]
     picture = decoded(films.folder / "odd.mp4")[0]
     assert picture.shape == (32, 48, 3)
     assert np.abs(picture[-1].astype(int) - picture[-2]).max() <= 6
     for name, format_name in (("odd.webm", "webm"), ("odd", "png")):
-        assert films.render(name, format_name, size=(47, 31), frames=(0, 2)).size == (47, 31)
+        assert films.render(name, format_name, size=(47, 31), frames=range(0, 2)).size == (47, 31)
     assert decoded(films.folder / "odd.webm")[0].shape == (31, 47, 3)
 
 
 def test_png_files_are_named_by_their_frames_and_hold_the_picture_exactly(films: Films):
-    films.render("pictures", "png", frames=(2, 5))
+    films.render("pictures", "png", frames=range(2, 5))
     assert sorted(path.name for path in (films.folder / "pictures").iterdir()) == [
         f"frame_{frame:06d}.png" for frame in (2, 3, 4)
     ]
@@ -54,13 +55,13 @@ def test_opacity_is_kept_in_png_webm_and_exr(films: Films):
     expected = drawn(films)
     assert expected.alpha.min() < 0.1
     assert expected.alpha.max() > 0.5
-    films.render("png", "png", frames=(0, 1), is_transparent=True)
+    films.render("png", "png", frames=range(0, 1), is_transparent=True)
     image = np.asarray(Image.open(films.folder / "png" / "frame_000000.png"))
     assert np.abs(image[..., 3] / 255.0 - expected.alpha).max() < 0.003
     over_black = image[..., :3] * (image[..., 3:] / 255.0)
     assert psnr_of(over_black, 255.0 * expected.color) > 45.0
 
-    films.render("exr", "exr", frames=(0, 1))
+    films.render("exr", "exr", frames=range(0, 1))
     channels = read_exr(films.folder / "exr" / "frame_000000.exr")
     assert np.abs(channels["A"].astype(np.float32) - expected.alpha).max() < 0.001
     linear = np.stack([channels[name].astype(np.float64) for name in "RGB"], axis=2)
@@ -70,7 +71,7 @@ def test_opacity_is_kept_in_png_webm_and_exr(films: Films):
     )
     assert psnr_of(255 * encoded * alpha, 255 * expected.color) > 55.0
 
-    films.render("clear.webm", "webm", frames=(0, 2), is_transparent=True)
+    films.render("clear.webm", "webm", frames=range(0, 2), is_transparent=True)
     with av.open(str(films.folder / "clear.webm")) as container:
         decoder = av.CodecContext.create("libvpx-vp9", "r")  # the one that knows of opacity
         frames = [frame for packet in container.demux(video=0) for frame in decoder.decode(packet)]
@@ -81,7 +82,7 @@ def test_opacity_is_kept_in_png_webm_and_exr(films: Films):
 
 def test_a_background_is_behind_what_is_not_covered(films: Films):
     expected = drawn(films)
-    films.render("green", "png", frames=(0, 1), background=(0, 255, 0))
+    films.render("green", "png", frames=range(0, 1), background=(0, 255, 0))
     image = np.asarray(Image.open(films.folder / "green" / "frame_000000.png")).astype(float)
     assert psnr_of(image[..., 1], 255 * np.clip(expected.color[..., 1] + 1 - expected.alpha, 0, 1)) > 50.0
     assert psnr_of(image[..., 0], 255 * expected.color[..., 0]) > 50.0
@@ -92,7 +93,7 @@ def test_depth_comes_in_its_unit_as_png_and_as_numbers_in_exr(films: Films):
     is_seen = ~np.isnan(expected)
     assert is_seen.any()
     assert not is_seen.all()
-    unit = films.render("depth", "png", frames=(0, 1), shows="depth").depth_unit
+    unit = films.render("depth", "png", frames=range(0, 1), shows="depth").depth_unit
     assert unit is not None
     with Image.open(films.folder / "depth" / "frame_000000.png") as image:
         assert f"{unit:g} scene units" in image.text["Depth"]  # type: ignore[attr-defined]
@@ -100,7 +101,7 @@ def test_depth_comes_in_its_unit_as_png_and_as_numbers_in_exr(films: Films):
     assert levels.dtype == np.uint16
     assert np.array_equal(levels > 0, is_seen)
     assert np.abs(levels[is_seen] * unit - expected[is_seen]).max() <= 0.51 * unit
-    films.render("z", "exr", frames=(0, 1), shows="opacity")
+    films.render("z", "exr", frames=range(0, 1), shows="opacity")
     assert np.abs(read_exr(films.folder / "z" / "frame_000000.exr")["Y"] - drawn(films).alpha).max() < 1e-6
 
 
@@ -115,7 +116,7 @@ def test_sound_is_as_long_as_the_pictures_and_begins_with_them(films: Films, mon
         "app.export.video.plan.sound_source", lambda capture, camera, frame: (source, 0.3 + frame / fps)
     )
     for name in ("s.mp4", "s.webm"):
-        films.render(name, name[2:], frames=(1, 6), sound=films.opened.capture.rig.names[0])
+        films.render(name, name[2:], frames=range(1, 6), sound=films.opened.capture.rig.names[0])
         with av.open(str(films.folder / name)) as container:
             frames = list(container.decode(audio=0))
         samples = np.concatenate([frame.to_ndarray()[0] for frame in frames])
@@ -123,7 +124,7 @@ def test_sound_is_as_long_as_the_pictures_and_begins_with_them(films: Films, mon
         assert first_s + int(np.argmax(np.abs(samples))) / rate == pytest.approx(2.5 / fps, abs=0.003)
         assert first_s + len(samples) / rate == pytest.approx(5 / fps, abs=0.025)  # in whole packets
         assert len(decoded(films.folder / name)) == 5
-    slow = films.render("slow.mp4", "mp4", frames=(1, 6), sound=films.opened.capture.rig.names[0], speed=0.5)
+    slow = films.render("slow.mp4", "mp4", frames=range(1, 6), sound=films.opened.capture.rig.names[0], speed=0.5)
     assert "The sound is left out" in slow.notes[0]
     with av.open(str(films.folder / "slow.mp4")) as container:
         assert not container.streams.audio
@@ -149,12 +150,8 @@ def test_what_is_cancelled_or_fails_half_way_leaves_nothing(films: Films, name: 
     films.opened.project.clip_path(1).rename(films.opened.project.folder / "kept")  # vanishes after it was checked
     monkeypatch.setattr(SceneFrames, "check", lambda self, frames: None)
     with pytest.raises(ProjectError):
-        render_video(job.__class__(**{**_entries(job), "frames": (0, 6)}), films.opened)
+        render_video(structs.replace(job, frames=range(0, 6)), films.opened)
     assert films.names == []
-
-
-def _entries(job: object) -> dict[str, object]:
-    return {name: getattr(job, name) for name in job.__slots__}  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "png", "exr"])
@@ -172,7 +169,7 @@ def test_a_full_disk_is_said_and_leaves_nothing(films: Films, name: str, monkeyp
 
 def test_a_video_takes_the_place_of_an_older_one_and_a_folder_does_not(films: Films):
     (films.folder / "a.mp4").write_bytes(b"old")
-    films.render("a.mp4", "mp4", frames=(0, 2))
+    films.render("a.mp4", "mp4", frames=range(0, 2))
     assert len(decoded(films.folder / "a.mp4")) == 2
     (films.folder / "full").mkdir()
     (films.folder / "full" / "mine").write_text("x")

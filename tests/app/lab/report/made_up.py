@@ -14,7 +14,7 @@ import numpy as np
 from app.evaluation.evaluation import Frames, Scope
 from app.evaluation.headless import TrainedProject
 from app.lab.report.write import write_report
-from app.project.project import create_project, default_settings
+from app.project.project_access import create_project, default_settings
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from engine.metrics.clips.seams import PairRow, SeamMaps
@@ -48,7 +48,7 @@ class Measure:
             camera = CAMERAS[camera_index]
             is_held_out = camera in opened.project.settings.holdout
             for frame in frames:
-                missing = {name: "no network here" for name in COLUMNS if name.startswith("lpips")}
+                missing = {name: "too small here" for name in COLUMNS if name.startswith("dssim_ms")}
                 if scope.metrics == "quick":
                     missing = {name: "quick choice" for name, c in COLUMNS.items() if not c.is_quick}
                 figures = {

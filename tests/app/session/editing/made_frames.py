@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from app.playback.arrays import GaussianArrays
+from app.playback.modes.arrays import GaussianArrays
 from app.session.editing.attributes import AnchorValues
 from app.session.editing.selecting import Selecting
 from engine.editing.gaussian_rows import GaussianRows, RowSet

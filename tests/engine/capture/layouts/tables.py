@@ -12,10 +12,12 @@ from tests.engine.capture.layouts import (
     written_immersive,
     written_panoptic,
     written_panoptic_studio,
+    written_qualisys,
     written_sample,
     written_technicolor,
     written_toml,
     written_transforms,
+    written_vicon,
 )
 from tests.engine.capture.layouts.scene import Scene, make_scene
 
@@ -80,6 +82,22 @@ TABLES: Mapping[str, Write] = {
             written_panoptic_studio.write, partial(make_scene, lens=lens, names=("00_01", "00_02", "00_10"))
         )
         for lens in written_panoptic_studio.LENSES
+    },
+    **{
+        f"qualisys-{lens}": written_by(
+            written_qualisys.write, partial(make_scene, lens=lens, names=written_qualisys.SERIALS)
+        )
+        for lens in written_qualisys.LENSES
+    },
+    "qualisys-cropped": written_by(
+        partial(written_qualisys.write, left=16, top=8),
+        partial(make_scene, lens="opencv5", names=written_qualisys.SERIALS),
+    ),
+    **{
+        f"vicon-{kind}": written_by(
+            partial(written_vicon.write, kind=kind), partial(written_vicon.make_corrected_scene, kind=kind)
+        )
+        for kind in written_vicon.KINDS
     },
     "technicolor": written_by(
         written_technicolor.write, partial(make_scene, lens="pinhole", names=("00", "01", "02", "03"))

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from engine.camera.rig import CameraRig
-from engine.children import running
+from engine.children import folder as folders
+from engine.children import process
 from engine.cloud.stereo.sparse import triangulate
 from engine.features import child as child_process
 
@@ -58,7 +59,7 @@ def test_a_child_that_stands_still_is_ended_and_tried_again(monkeypatch, scratch
     pictures, rig = wall_views()
     lines: list[str] = []
     started = []
-    monkeypatch.setattr(running.subprocess, "Popen", _sleeping_child(started))
+    monkeypatch.setattr(process.subprocess, "Popen", _sleeping_child(started))
     found = triangulate(pictures, rig, report=lines.append, stall_s=0.5)
     assert len(found.points) == 0
     assert len(started) == child_process.N_ATTEMPTS
@@ -83,7 +84,7 @@ def test_a_slow_child_is_waited_for(scratch) -> None:
 def test_whoever_is_interrupted_leaves_no_child_and_no_folder(monkeypatch, scratch) -> None:
     pictures, rig = wall_views()
     started = []
-    monkeypatch.setattr(running.subprocess, "Popen", _sleeping_child(started))
+    monkeypatch.setattr(process.subprocess, "Popen", _sleeping_child(started))
 
     def stop() -> None:
         raise KeyboardInterrupt
@@ -110,37 +111,14 @@ def test_ctrl_c_in_a_terminal_does_not_reach_a_child_that_starts(monkeypatch, sc
     assert groups != [os.getpgid(0)]
 
 
-def test_an_orphan_ends_by_itself_and_clears_up(scratch) -> None:
-    folder = scratch / "clipgstream-sparse-1-x"
-    folder.mkdir()
-    np.savez(folder / "job.npz", images=np.zeros((1, 8, 8, 3), np.uint8))
-    names = [str(folder / name) for name in ("missing.npz", "result.npz", "beat")]
-    child = subprocess.Popen(
-        [sys.executable, "-c", WAITING_CHILD, *names], stdin=subprocess.PIPE, cwd=Path(__file__).parents[4]
-    )
-    assert child.stdin is not None
-    child.stdin.close()  # as when the process that held it was killed
-    assert child.wait(60) == 1
-    assert not folder.exists()
-
-
 def test_folders_of_killed_processes_are_removed_and_those_of_living_ones_stay(scratch) -> None:
     done = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
     dead, living = (scratch / f"clipgstream-sparse-{pid}-x" for pid in (int(done.stdout), os.getpid()))
     for folder in (dead, living):
         folder.mkdir()
         (folder / "job.npz").touch()
-    running.remove_leftovers(child_process.FOLDER_PREFIX)
+    folders.remove_leftovers(child_process.FOLDER_PREFIX)
     assert [folder.name for folder in scratch.iterdir()] == [living.name]
-
-
-WAITING_CHILD = """
-import shutil, sys, time
-from pathlib import Path
-from engine.kernels.parent import end_with_parent
-end_with_parent(lambda: shutil.rmtree(Path(sys.argv[1]).parent))
-time.sleep(60)
-"""
 
 
 @pytest.fixture

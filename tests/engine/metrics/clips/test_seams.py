@@ -150,7 +150,7 @@ def test_figures_that_do_not_exist_are_none_and_counted():
     assert found["boundaries"][0]["ratio_moving"] is None
     assert found["boundaries"][0]["worst_camera"] is None
     missing = found["means"]["all"]["interior"]["n_missing"]
-    assert missing == {"change_moving": 4, "excess_static": 4, "tof": 4}
+    assert missing == {"change_moving": 4, "excess_static": 4}
     empty = summarize([])
     assert empty["boundaries"] == []
     assert empty["means"]["all"]["interior"]["n_pairs"] == 0

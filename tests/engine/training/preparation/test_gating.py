@@ -20,6 +20,7 @@ from tests.engine.training.tiny_training import (
     live_picture,
     picture,
     same_arrays,
+    stepwise,
     take_steps,
 )
 
@@ -89,7 +90,7 @@ def test_a_source_clip_replaces_anchors_and_leaves_all_others_as_they_are(tiny: 
     replacing = training.model.anchor_set("replacing")
     assert np.array_equal(replacing.positions.numpy(), static_points(tiny.reference)[rows])
     assert np.array_equal(replacing.features.detach().numpy(), tiny.reference.arrays["sets.static.features"][rows])
-    assert (training._tiles is not None) == (not settings)
+    assert (stepwise(training).tiles is not None) == (not settings)
     state = finish(training)
     assert not np.array_equal(
         state.arrays["sets.replacing.features"], tiny.reference.arrays["sets.static.features"][rows]

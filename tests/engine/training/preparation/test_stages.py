@@ -80,6 +80,12 @@ def test_pieces_of_other_settings_are_removed_with_a_word(tmp_path, slow):
     assert stage_files(tmp_path, 0) == []
 
 
+def test_pieces_of_a_setting_that_is_retired_are_taken_over(tmp_path, slow):
+    before, now = {"config": {"backend": "reference", "tiles": "all"}}, {"config": {"tiles": "all"}}
+    _stages(tmp_path, slow, key=before).keep("a", slow.work("a", 1, seconds=9))
+    assert _stages(tmp_path, slow, key=now).keep("a", slow.work("a", 2, seconds=9))["value"][0] == 1
+
+
 def test_the_code_that_made_a_piece_counts(tmp_path, slow, monkeypatch):
     _stages(tmp_path, slow).keep("a", slow.work("a", 1, seconds=9))
     monkeypatch.setattr(stages, "VERSION", stages.VERSION + 1)

@@ -15,7 +15,7 @@ from engine.raster import TILE_PX
 from engine.training.clip_training import ClipTraining
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
 from engine.training.step.order import ShuffledOrder
-from tests.engine.training.tiny_training import Tiny, finish, make_tiny, same_arrays, take_steps
+from tests.engine.training.tiny_training import Tiny, finish, make_tiny, same_arrays, stepwise, take_steps
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +35,7 @@ def pictures_of(training: ClipTraining) -> list[tuple[int, float, ActivePicture]
         for frame in range(training.clip.n_frames):
             clip_time = frame / training.clip.clip_length
             view = training._views[training.camera_indices[camera_row]]
-            found.append((camera_row, clip_time, training._active_picture(camera_row, view, clip_time)))
+            found.append((camera_row, clip_time, stepwise(training).active_picture(camera_row, view, clip_time)))
     return found
 
 
@@ -79,7 +79,7 @@ def test_in_changing_light_pictures_are_those_of_all_tiles(half):
         assert part.rest is not None
         outside = ~pixels_of(part.tile_mask, view.height, view.width)
         with torch.no_grad():
-            whole = training.model.decode(clip_time, training._sight.rows(camera_row, clip_time))
+            whole = training.model.decode(clip_time, stepwise(training).sight.rows(camera_row, clip_time))
             image = render_gaussians(whole, view, backend=backend_called("cpu")).image[0]
             drawn = render_gaussians(part.gaussians, view, tile_mask=part.tile_mask, backend=backend_called("cpu"))
         found = torch.where(outside[..., None], part.rest, drawn.image[0])
@@ -113,7 +113,7 @@ def test_no_touched_tile_is_missed_by_a_trained_clip(half):
             assert (
                 not render_gaussians(part.learning, view, backend=backend_called("cpu")).alpha[0, ..., 0][outside].any()
             )
-            whole = training.model.decode(clip_time, training._sight.rows(camera_row, clip_time))
+            whole = training.model.decode(clip_time, stepwise(training).sight.rows(camera_row, clip_time))
             image = render_gaussians(whole, view, backend=backend_called("cpu")).image[0]
             drawn = render_gaussians(
                 part.gaussians, view, tile_mask=part.tile_mask, backend=backend_called("cpu")
@@ -137,20 +137,20 @@ def test_no_touched_tile_is_missed_by_a_trained_clip(half):
 )
 def test_where_nothing_stays_as_it_is_all_tiles_are_drawn(tiny, settings):
     training = tiny.prepared(1, **settings)
-    assert training._tiles is None
+    assert stepwise(training).tiles is None
     assert np.isfinite(training.step().loss)
 
 
 def test_a_reference_clip_draws_all_tiles(tiny, tmp_path):
     training = tiny.prepared(0, is_source=False, prep_dir=tmp_path)
-    assert training._tiles is None
+    assert stepwise(training).tiles is None
 
 
 def test_cameras_beyond_the_memory_are_drawn_with_all_tiles(half):
     whole = half.prepared(1, source_steps=N_STEPS)
     bounded = half.prepared(1, source_steps=N_STEPS)
     one_camera = 160 * 120 * 3 * 4
-    bounded._tiles = ActiveTiles(bounded.model, backend=bounded.backend, max_bytes=3 * one_camera)
+    stepwise(bounded).tiles = ActiveTiles(bounded.model, backend=bounded.backend, max_bytes=3 * one_camera)
     take_steps(whole, N_STEPS)
     take_steps(bounded, N_STEPS)
     assert same_arrays(whole.state().arrays, bounded.state().arrays)

@@ -172,7 +172,7 @@ def test_number_that_is_not_finite_shows_in_the_loss(value):
     image[30, 40, 1] = value
     result, _, _ = differentiate(image, truth)
     assert not np.isfinite(float(result.loss.detach()))
-    assert not np.isfinite(result.mean_square)
+    assert not result.mean_square.isfinite()
 
 
 def test_same_bits_for_any_number_of_threads():
@@ -186,7 +186,7 @@ def test_same_bits_for_any_number_of_threads():
             for mask in (None, tile_mask):
                 result, gradient, gain_grad = differentiate(image, truth, gain, tile_mask=mask)
                 assert gain_grad is not None
-                found.append((result.loss.detach(), torch.tensor(result.mean_square), gradient, gain_grad))
+                found.append((result.loss.detach(), result.mean_square, gradient, gain_grad))
     finally:
         numba.set_num_threads(before)
     for index, other in enumerate(found):
@@ -219,7 +219,7 @@ def test_loss_can_be_scaled_before_it_is_differentiated():
     truth = make_truth(20, 30)
     image = make_image(truth).requires_grad_()
     pixels = torch.from_numpy(truth)
-    (3 * photometric_loss(image, pixels, backend=backend_called(), ssim_weight=0.2).loss).backward()
+    (3 * photometric_loss(image, pixels, backend=backend_called("cpu"), ssim_weight=0.2).loss).backward()
     _, expected, _ = differentiate(image.detach(), truth)
     assert image.grad is not None
     assert torch.allclose(image.grad, 3 * expected, rtol=1e-6, atol=0)

@@ -3,11 +3,10 @@
 import math
 
 import pytest
-import torch
 
-from engine.errors import NonFiniteLoss
+from engine.backends.phase import Fault
 from engine.training.config import TrainConfig
-from engine.training.step.nonfinite import advice, gradient_not_finite, loss_not_finite
+from engine.training.step.nonfinite import advice, not_finite
 
 CONFIG = TrainConfig()
 
@@ -22,16 +21,15 @@ CONFIG = TrainConfig()
     ],
 )
 def test_the_part_of_the_loss_that_is_no_number_is_named(photometric, volume, n_bad, said):
-    image = torch.zeros(2, 2, 3)
-    image.view(-1)[:n_bad] = math.nan
-    error = loss_not_finite(image=image, photometric=photometric, volume=volume, where="step 3", config=CONFIG)
+    error = not_finite(Fault(photometric, volume, n_bad, 12), where="step 3", config=CONFIG)
     assert error.message.startswith(said)
     assert error.hint == advice(CONFIG)
 
 
 def test_a_gradient_is_told_with_its_step():
-    error = gradient_not_finite(NonFiniteLoss("The gradient of x is nan."), where="step 3", config=CONFIG)
-    assert error.message == "The gradient of x is nan at step 3."
+    for names, said in ((("x", "y"), "x, y"), ((), "the sum")):
+        error = not_finite(Fault(0.1, 0.0, 0, 12, True, names), where="step 3", config=CONFIG)
+        assert error.message == f"The gradient of {said} is not finite at step 3."
 
 
 def test_what_is_advised_is_milder_than_what_failed_and_can_be_set():

@@ -16,7 +16,7 @@ from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
 from ui.panels.clips.comparing import next_version
 from ui.panels.clips.section import dependency_lines, listed, stale_text, use_lines
-from ui.shell.clip_questions import clip_question_texts
+from ui.shell.dialogs.clip_questions import clip_question_texts
 from ui.viewport.excluding.hatched_mask import hatch_lines
 from ui.viewport.excluding.mask_tool import MaskTool
 
@@ -47,8 +47,8 @@ def test_the_room_is_told_part_by_part() -> None:
 
 def test_questions_say_what_is_lost_and_what_it_costs() -> None:
     cut = clip_question_texts(CutQuestion(SplitClip(5), "Split clip 1 at frame 5", 1, (2, 3), 61.0))
-    assert cut[0] == "1 trained clip is out of use then. Undo brings it back as before."
-    assert cut[1].startswith("2 other clips are out of date")
+    assert cut[0] == "1 trained clip will no longer be used. Undo brings it back."
+    assert cut[1] == "2 other clips will be out of date until trained again."
     assert "1:01" in cut[2]
     room = clip_question_texts(RoomQuestion("versions", None, "all earlier versions", 3, 12_000_000))
     assert room[0] == "Delete all earlier versions: 3 files of clips, 12 MB."

@@ -158,12 +158,13 @@ def assert_shows(text: str, value: Any) -> None:
 
 def test_every_column_is_there_with_unit_direction_and_why_it_is_missing(page):
     rows = {row[0]: row for row in page.tables["clip_metrics"]}
-    assert list(rows) == [FIGURE_LABELS[name] for name in COLUMNS]
-    assert len(rows) == len(COLUMNS)
+    assert list(rows) == list(FIGURE_LABELS.values())
+    assert len(rows) == len(COLUMNS) + 3, "and LPIPS"
     assert rows["PSNR, moving pixels, after the colour fit"][1:3] == ["dB", "higher"]
     assert rows["FLIP"][1:3] == ["1", "lower"]
     assert rows["Share of moving pixels"][1:3] == ["1", ""]
-    assert rows["LPIPS"][3:] == ["–"] * 6 + [f"no network here ({6 * len(CAMERAS)} pictures)"]
+    assert rows["DSSIM, multi-scale"][3:] == ["–"] * 6 + [f"too small here ({6 * len(CAMERAS)} pictures)"]
+    assert rows["LPIPS"][3:] == ["–"] * 6 + [f"the package lpips is not installed ({6 * len(CAMERAS)} pictures)"]
     assert rows["PSNR"][-1] == ""
 
 

@@ -10,7 +10,7 @@ from engine.backends.table import backend_called
 from engine.kernels import routines
 from engine.raster.pinhole_view import n_tiles
 from engine.training.config import TrainConfig
-from engine.training.optimizer.optimizer import PhaseOptimizer
+from engine.training.optimizer.optimizer import PhaseOptimizer, schedule_of
 from engine.training.step.losses import photometric_loss
 
 
@@ -33,8 +33,9 @@ def test_warm_up_leaves_nothing_to_compile():
             image = torch.rand(3, height, width).permute(1, 2, 0)
             photometric_loss(image, truth, backend=backend_called("cpu"), ssim_weight=0.2, **options)
     parameters = {"large": (nn.Parameter(torch.zeros(40_000)), 0.1), "small": (nn.Parameter(torch.zeros(2, 3)), 0.1)}
-    config = TrainConfig(max_gradient_norm=1.0)
-    optimizer = PhaseOptimizer(parameters, n_steps=2, config=config, final_ratios={}, backend=backend_called("cpu"))
+    schedule = schedule_of(parameters, TrainConfig(max_gradient_norm=1.0), n_steps=2)
+    learning = {name: parameter for name, (parameter, _) in parameters.items()}
+    optimizer = PhaseOptimizer(learning, schedule=schedule, backend=backend_called("cpu"))
     optimizer.step()
     for parameter, _ in parameters.values():
         parameter.grad = torch.ones(parameter.shape)

@@ -1,0 +1,95 @@
+"""clipgstream calibrate: from a folder of plain videos to a capture with calibrated cameras."""
+
+from __future__ import annotations
+
+import argparse
+
+from app.calibration.job import CalibrationRequest, TimeLeft, run_calibration
+from app.cli.arguments import EXIT_FAILED, EXIT_OK, add_follow_links, path_argument
+from app.cli.terminal.progress import ProgressLine
+from app.training.service import Launch
+from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance
+from engine.errors import CaptureError
+from engine.progress import Progress
+from engine.text import printable, shown
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream calibrate`."""
+    command.add_argument(
+        "videos", type=path_argument, help="folder with one video, or one folder of images, per camera"
+    )
+    command.add_argument(
+        "--out",
+        type=path_argument,
+        metavar="CAPTURE",
+        help="folder that becomes the capture (default: that of the videos). Only capture.json is written",
+    )
+    command.add_argument(
+        "--lens",
+        choices=tuple(LENSES),
+        default="simple",
+        help="; ".join(f"{name}: {text}" for name, text in LENSES.items()) + " (default: simple)",
+    )
+    command.add_argument("--shared-lens", action="store_true", help="all cameras are of one make at one zoom")
+    command.add_argument(
+        "--distance",
+        nargs=3,
+        metavar=("CAM", "CAM", "METRES"),
+        help="a measured distance between two cameras, lens to lens: the scene gets its size from it",
+    )
+    command.add_argument(
+        "--up",
+        choices=tuple(UPS),
+        default="floor",
+        help="; ".join(f"{name}: {text}" for name, text in UPS.items()) + " (default: floor)",
+    )
+    command.add_argument(
+        "--keep-doubtful",
+        action="store_true",
+        help="write capture.json even if matches contradict many cameras, and leave doubtful ones in use",
+    )
+    command.add_argument("--replace", action="store_true", help="replace a capture.json that is there")
+    add_follow_links(command)
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream calibrate: find the cameras and write capture.json. Returns the exit code: 1 if places contradict."""
+    chosen = CalibrationOptions(options.lens, options.shared_lens, _distance(options.distance), options.up)
+    request = CalibrationRequest(
+        options.videos, options.out, chosen, options.replace, options.keep_doubtful, options.follow_links
+    )
+    line, left, seen = ProgressLine(is_quiet=options.quiet), TimeLeft(), Progress("Starting", 0.0)
+
+    def show() -> None:
+        detail = "  ".join(filter(None, [seen.stage, seen.message, left.text(seen.done)]))
+        line.update("Calibrating", seen.done, detail)
+
+    def report(progress: Progress) -> None:
+        nonlocal seen
+        seen = progress
+        show()
+
+    outcome = run_calibration(request, report=report, alive=show)  # the time moves while nothing is told
+    line.finish()
+    print(printable("\n".join(outcome.lines)))
+    if not outcome.is_written:
+        print("Nothing was written. --keep-doubtful writes capture.json all the same.")
+        return EXIT_FAILED
+    links = " --follow-links" if outcome.needs_links else ""
+    print(printable(f"The capture is {outcome.capture}. Look at it with: clipgstream inspect{links} {outcome.capture}"))
+    return EXIT_OK
+
+
+def _distance(words: list[str] | None) -> KnownDistance | None:
+    """--distance as a value. Raises CaptureError when its last part is not a number."""
+    if words is None:
+        return None
+    try:
+        return KnownDistance(words[0], words[1], float(words[2]))
+    except ValueError:
+        raise CaptureError(
+            f"--distance ends in {shown(words[2])}, which is not a number of metres.",
+            hint="Write --distance CAM CAM METRES.",
+        ) from None

@@ -1,0 +1,1 @@
+"""Commands that change a project or say what is in it."""

@@ -1,0 +1,223 @@
+"""clipgstream edit: the stack of edits of a project, listed and changed, and the history of its document."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from msgspec import structs, to_builtins
+
+from app.cli.arguments import EXIT_OK, path_argument
+from app.cli.projects.edit_arguments import (
+    add_edit_arguments,
+    chosen_action,
+    chosen_scope,
+    chosen_target,
+    has_action,
+    has_scope,
+    has_target,
+)
+from app.document.changes.edit_changes import edit_with
+from app.document.changes.edit_words import edit_title
+from app.document.changes.reach_words import acting_text, reach_note
+from app.document.storing.stored_document import ENTRIES
+from app.scripting.scripted_project import ScriptedProject, open_scripted
+from app.training.service import Launch
+from engine.editing.edit import Edit
+from engine.errors import ProjectError
+from engine.storage.json_files import JsonError, json_text, parse_json
+from engine.text import one_line
+
+EDIT_SCHEMA = 1
+MAX_STDIN_CHARACTERS = 1 << 28
+_OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo", "apply_permanently")
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream edit`."""
+    command.add_argument("project", type=path_argument, help="project folder")
+    add_edit_arguments(command)
+    stack = command.add_argument_group("the stack and the history")
+    one = stack.add_mutually_exclusive_group()
+    one.add_argument("--on", type=int, metavar="ID", help="let an edit count")
+    one.add_argument("--off", type=int, metavar="ID", help="let it not count")
+    one.add_argument("--remove", type=int, metavar="ID", help="take it out of the stack")
+    one.add_argument("--rename", nargs=2, metavar=("ID", "NAME"), help="give it another name")
+    one.add_argument(
+        "--move-to", nargs=2, type=int, metavar=("ID", "POSITION"), help="its place in the stack, 0 is the bottom"
+    )
+    one.add_argument(
+        "--replace", type=int, metavar="ID", help="change it: what is given takes the place of what it had"
+    )
+    one.add_argument("--undo", type=int, nargs="?", const=1, metavar="N", help="take back the last step, or N steps")
+    one.add_argument("--redo", type=int, nargs="?", const=1, metavar="N", help="do again what was taken back")
+    one.add_argument(
+        "--put",
+        metavar="JSON",
+        help=f"entries of the document, which take the place of what is there: {', '.join(ENTRIES)}; - reads them "
+        "from standard input",
+    )
+    one.add_argument(
+        "--apply-permanently",
+        action="store_true",
+        default=None,
+        help="take what is deleted out of the clips for good; what they were becomes versions",
+    )
+    stack.add_argument("--history", action="store_true", help="list the steps as well")
+    command.add_argument("--json", action="store_true", help="print everything as JSON")
+
+
+def run(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream edit: change what was asked for, then say what the stack is. Returns the exit code."""
+    chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
+    is_new = not chosen and has_action(options)
+    _check_options(options, chosen[0] if chosen else "")
+    with open_scripted(options.project, read_only=not (chosen or is_new), launch=launch) as project:
+        if is_new:
+            _add(options, project)
+        elif chosen:
+            _change(options, project)
+        found = describe_edits(project, has_steps=options.history)
+        lines = [] if options.json else edit_lines(project, has_steps=options.history)
+    print(json_text(found, indent=1) if options.json else "\n".join(lines))
+    return EXIT_OK
+
+
+def _check_options(options: argparse.Namespace, chosen: str) -> None:
+    """What was asked for and would be passed over is an error."""
+    takes_edit = chosen in ("", "replace")
+    given = {
+        "what an edit does": has_action(options),
+        "what an edit acts on": has_target(options),
+        "frames": has_scope(options),
+        "--name": options.name is not None,
+    }
+    for what, is_given in given.items():
+        if is_given and not takes_edit:
+            raise ProjectError(f"--{chosen.replace('_', '-')} is given with {what}.", hint="Leave one of them out.")
+        if is_given and not chosen and not has_action(options):
+            raise ProjectError(
+                "Nothing says what the edit does.", hint="Give for instance --delete, or --replace ID to change one."
+            )
+
+
+def _add(options: argparse.Namespace, project: ScriptedProject) -> None:
+    target = chosen_target(options, project, _text)
+    action, inverts = chosen_action(options, target)
+    scope = chosen_scope(options, project)
+    is_inverted = options.inverted != inverts
+    project.apply_edit(action, target, scope=scope, is_inverted=is_inverted, name=options.name or "", on_note=_say)
+
+
+def _say(note: str) -> None:
+    print(f"Note: {note}", file=sys.stderr)
+
+
+def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
+    if options.on is not None:
+        project.switch_edit(options.on, is_on=True)
+    elif options.off is not None:
+        project.switch_edit(options.off, is_on=False)
+    elif options.remove is not None:
+        project.remove_edit(options.remove)
+    elif options.rename is not None:
+        edit_id, name = options.rename
+        if not edit_id.isdecimal():
+            raise ProjectError(f"--rename is '{edit_id}', which is not the number of an edit.")
+        project.rename_edit(int(edit_id), name)
+    elif options.move_to is not None:
+        project.move_edit(*options.move_to)
+    elif options.replace is not None:
+        project.replace_edit(_replaced(options, project), on_note=_say)
+    elif options.put is not None:
+        _put(options.put, project)
+    elif options.apply_permanently:
+        project.apply_permanently()
+    else:
+        _take_steps(options, project)
+
+
+def _take_steps(options: argparse.Namespace, project: ScriptedProject) -> None:
+    is_undo = options.undo is not None
+    n = options.undo if is_undo else options.redo
+    n_known = len(project.history.past if is_undo else project.history.future)
+    if not 1 <= n <= n_known:
+        what = "taken back" if is_undo else "done again"
+        raise ProjectError(f"{n} steps cannot be {what}: there are {n_known}.")
+    for _ in range(n):
+        (project.undo if is_undo else project.redo)()
+
+
+def _replaced(options: argparse.Namespace, project: ScriptedProject) -> Edit:
+    edit = edit_with(project.document, options.replace)
+    if has_target(options):
+        edit = structs.replace(edit, target=chosen_target(options, project, _text), is_inverted=options.inverted)
+    if has_action(options):
+        action, inverts = chosen_action(options, edit.target)
+        edit = structs.replace(edit, action=action, is_inverted=edit.is_inverted != inverts)
+    if has_scope(options):
+        edit = structs.replace(edit, scope=chosen_scope(options, project))
+    if options.name is not None:
+        edit = structs.replace(edit, name=options.name)
+    return edit
+
+
+def _put(text: str, project: ScriptedProject) -> None:
+    try:
+        entries = parse_json(_text(text))
+    except JsonError as error:
+        raise ProjectError(f"--put is not JSON: {error}.") from error
+    if not isinstance(entries, dict) or not entries:
+        raise ProjectError("--put is not an object with entries of the document.")
+    project.put(entries)
+
+
+def _text(argument: str) -> str:
+    """An argument, or standard input where it is "-"."""
+    if argument != "-":
+        return argument
+    text = sys.stdin.read(MAX_STDIN_CHARACTERS + 1)
+    if len(text) > MAX_STDIN_CHARACTERS:
+        raise ProjectError("There is too much on standard input.")
+    return text
+
+
+def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict[str, Any]:
+    """The stack as plain data: schema; path; edits, bottom first; undo and redo, what each would do; with has_steps
+    also past and future, names of steps, the next one last."""
+    history, reaches = project.history, project.reaches
+    found = {
+        "schema": EDIT_SCHEMA,
+        "path": str(project.folder),
+        "edits": [
+            to_builtins(edit)
+            | {
+                "title": edit_title(edit),
+                "acts": reaches[edit.edit_id].acts,
+                "note": reach_note(reaches[edit.edit_id], edit.scope),
+            }
+            for edit in project.edits
+        ],
+        "undo": history.undo_name,
+        "redo": history.redo_name,
+    }
+    if has_steps:
+        found |= {"past": [step.name for step in history.past], "future": [step.name for step in history.future]}
+    return found
+
+
+def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str]:
+    """The same as text."""
+    edits, reaches = project.edits, project.reaches
+    lines = [f"{project.folder}: {len(edits)} edit{'' if len(edits) == 1 else 's'}"]
+    for edit in edits:
+        state = "" if edit.is_on else " (off)"
+        where = acting_text(edit.scope, reaches[edit.edit_id])
+        lines.append(f"{edit.edit_id:>5}  {one_line(edit_title(edit))}, {where}{state}")
+    if has_steps:
+        history = project.history
+        lines.append(f"Steps: {len(history.past)}")
+        lines += [f"  {one_line(step.name)}" for step in history.past]
+        lines += [f"  {one_line(step.name)} (taken back)" for step in reversed(history.future)]
+    return lines

@@ -1,0 +1,1 @@
+"""Changes of the document, each a function from one document to another, with their words."""

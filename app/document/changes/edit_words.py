@@ -1,0 +1,74 @@
+"""Edits in words: what they act on, what they do, and where in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from engine.capture.clip import Clip
+from engine.editing.actions import Action
+from engine.editing.edit import Box, Edit, Everything, Picked, Scope, Sphere, Target
+from engine.editing.picks import n_rows
+
+
+def target_text(target: Target, *, is_inverted: bool = False) -> str:
+    """What an edit acts on: "1,240 Gaussians of clip 2", "box 0.8 x 0.5 x 1.2"."""
+    text = _shape_text(target)
+    return f"all but {text}" if is_inverted else text
+
+
+def scope_text(scope: Scope, clips: Sequence[Clip] = ()) -> str:
+    """In which frames an edit holds: "frame 12", "frames 10-19 (clip 1)", "from 20 on", "everywhere".
+
+    Args:
+        clips: Of the project, so that frames that are a clip's are called so.
+    """
+    text = _frames_text(scope, clips)
+    if not scope.is_reference_only:
+        return text
+    return "the reference" if text == "everywhere" else f"the reference, {text}"
+
+
+def edit_title(edit: Edit) -> str:
+    """The user's name for an edit, else what it does to what."""
+    return edit.name or what_text(edit.action, edit.target, is_inverted=edit.is_inverted)
+
+
+def what_text(action: Action, target: Target, *, is_inverted: bool = False) -> str:
+    """What is done to what, as it can follow "Undo": "delete 1,240 Gaussians of clip 2", "crop to box 1 x 1 x 1"."""
+    if is_inverted and action.opposite:
+        return f"{action.opposite if isinstance(target, Picked) else 'crop to'} {target_text(target)}"
+    before, after = action.words
+    return f"{before} {target_text(target, is_inverted=is_inverted)} {after}".rstrip()
+
+
+def n_picked(picked: Picked) -> int:
+    """How many Gaussians were picked."""
+    return sum(n_rows(rows.rows) for rows in picked.sets)
+
+
+# ---------------------------------------------------------------- pieces
+
+
+def _shape_text(target: Target) -> str:
+    match target:
+        case Everything():
+            return "everything"
+        case Box(half_sizes=half_sizes):
+            return "box " + " × ".join(f"{2 * half:.3g}" for half in half_sizes)
+        case Sphere(radius=radius):
+            return f"sphere of radius {radius:.3g}"
+        case Picked(sets=sets):
+            clips = sorted({rows.clip_index for rows in sets})
+            of_clips = f"clip {clips[0]}" if len(clips) == 1 else f"{len(clips)} clips"
+            n = n_picked(target)
+            return f"{n:,} Gaussian{'' if n == 1 else 's'}" + (f" of {of_clips}" if clips else "")
+
+
+def _frames_text(scope: Scope, clips: Sequence[Clip]) -> str:
+    first, stop = scope.first, scope.stop
+    if stop is None:
+        return f"from {first} on" if first else "everywhere"
+    if stop == first + 1:
+        return f"frame {first}"
+    of_clip = next((clip for clip in clips if (clip.start, clip.stop) == (first, stop)), None)
+    return f"frames {first}-{stop - 1}" + (f" (clip {of_clip.clip_index})" if of_clip is not None else "")

@@ -1,0 +1,27 @@
+"""What the dialog and the command line say of edits that go along with an export."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from app.document.changes.edit_words import edit_title
+from engine.editing.edit import Edit
+from engine.text import one_line
+
+MAX_TITLES = 3
+
+
+def edits_line(edits: Sequence[Edit], *, has_edits: bool = True) -> str:
+    """How many edits of a project go along with an export, and which: "2 edits go along: delete box 1 × 1 × 1, red".
+    Empty where none is on, or the export leaves them out.
+
+    Args:
+        edits: All of the project.
+        has_edits: Whether the export applies them.
+    """
+    titles = [one_line(edit_title(edit)) for edit in edits if edit.is_on]
+    if not titles or not has_edits:
+        return ""
+    more = [f"{len(titles) - MAX_TITLES} more"] if len(titles) > MAX_TITLES else []
+    counted = "1 edit goes along" if len(titles) == 1 else f"{len(titles)} edits go along"
+    return f"{counted}: {', '.join(titles[:MAX_TITLES] + more)}"

@@ -1,1 +1,0 @@
-"""What the export dialog asks for each kind of export, and the jobs that the answers make."""

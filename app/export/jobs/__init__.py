@@ -1,0 +1,1 @@
+"""What exports can be asked for: one declaration per job, from which command line, form and scripts follow."""

@@ -1,0 +1,29 @@
+"""CamerasJob: the cameras of a project's capture."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from app.export.jobs.job import Job, option
+
+
+class CamerasJob(Job, frozen=True):
+    """What is asked for: a new or empty folder."""
+
+    kind: ClassVar[str] = "cameras"
+    title: ClassVar[str] = "Cameras"
+    about: ClassVar[str] = "Where the cameras of the capture stand and what their lenses do."
+    work: ClassVar[str] = "app.export.cameras_job"
+    is_prefixed: ClassVar[bool] = True
+
+    format: Annotated[
+        Literal["colmap", "transforms"],
+        option(
+            "What is written",
+            "Format",
+            answers={
+                "colmap": ("COLMAP", "a folder with COLMAP's sparse model, as text"),
+                "transforms": ("transforms.json", "a folder with transforms.json of nerfstudio"),
+            },
+        ),
+    ] = "colmap"

@@ -1,0 +1,131 @@
+"""Job: the base of what exports are asked for. Everything about an option stands in its annotation, once.
+
+A job is a frozen struct. The command line, the form of the window, the text to copy, the options of scripts and the
+tables of the documents follow from its fields (engine.setting). Its work is a module with two functions, imported once
+it is needed:
+
+    estimate(opened, job) -> ExportEstimate   quick, reads no more than headers; raises EngineError where it cannot be
+    run(opened, job, report) -> ExportResult  does the work; what `report` raises ends it, and then nothing is left
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast
+
+from msgspec import Meta
+
+from app.export.export_progress import ExportEstimate, ExportResult, Report
+from app.export.jobs.question import Question
+from engine.setting import Declared, Flag, setting, settings_of
+
+if TYPE_CHECKING:
+    from app.evaluation.headless import TrainedProject
+    from app.export.jobs.answers import Answers
+
+
+def option(
+    meaning: str, label: str = "", *, answers: Mapping[str, tuple[str, str]] | None = None, **declared: Any
+) -> Meta:
+    """The annotation of an option; see `engine.setting.setting`.
+
+    Args:
+        answers: Words it may be, each with what the window calls it and what it means, which may be empty.
+    """
+    if answers is not None:
+        declared["choices"] = {word: means for word, (_, means) in answers.items()}
+        declared["titles"] = {word: title for word, (title, _) in answers.items()}
+    return setting("", meaning, label=label, **declared)
+
+
+FRAMES = option("Frames of the capture", none="all that are trained")
+EDITS = option(
+    "Whether the edits of the project are applied",
+    "Edits",
+    titles={"true": "Go along", "false": "Left out"},
+    flags=(Flag("--without-edits", "The scene as it was trained", constant=False),),
+)
+
+
+class JobModule(Protocol):
+    """What the module with the work of a job provides."""
+
+    def estimate(self, opened: TrainedProject, job: Any) -> ExportEstimate:
+        """What will be written. Raises EngineError where it cannot be."""
+        ...
+
+    def run(self, opened: TrainedProject, job: Any, report: Report) -> ExportResult:
+        """Write it. Raises EngineError, and what `report` raises."""
+        ...
+
+
+class Job(Declared, frozen=True):
+    """What is asked for. Raises ProjectError for a value that an option may not have.
+
+    Attributes:
+        out: The file or folder to write.
+        kind: Name of the kind of export.
+        title: What the user calls it.
+        about: What it is for, in a sentence.
+        work: Module with its work.
+        command: The command, and method of a script, that takes it.
+        is_prefixed: Whether the kind stands in front of its formats where those of all kinds are listed.
+        needs_trained: Whether all chosen frames have to be trained.
+        has_step: Whether it can be every so many frames.
+    """
+
+    out: Path
+
+    kind: ClassVar[str]
+    title: ClassVar[str]
+    about: ClassVar[str]
+    work: ClassVar[str]
+    command: ClassVar[str] = "export"
+    is_prefixed: ClassVar[bool] = False
+    needs_trained: ClassVar[bool] = False
+    has_step: ClassVar[bool] = True
+
+    @property
+    def applies_edits(self) -> bool:
+        """Whether what is written has the edits of the project in it."""
+        return bool(getattr(self, "has_edits", False))
+
+    @classmethod
+    def load(cls) -> JobModule:
+        """Import its work."""
+        return cast("JobModule", importlib.import_module(cls.work))
+
+    @classmethod
+    def takes(cls, name: str) -> bool:
+        """Whether it has such an option."""
+        return name in settings_of(cls)
+
+    @classmethod
+    def formats(cls) -> dict[str, str]:
+        """What it is called where the formats of all kinds are listed, each with the format that this stands for."""
+        if not cls.takes("format"):
+            return {cls.kind: ""}
+        prefix = f"{cls.kind}-" if cls.is_prefixed else ""
+        return {f"{prefix}{name}": name for name in settings_of(cls)["format"].choices}
+
+    @property
+    def format_name(self) -> str:
+        """Which of `formats` it is."""
+        return next(name for name, value in self.formats().items() if value == getattr(self, "format", ""))
+
+    @classmethod
+    def suffix(cls, format_name: str) -> str:
+        """Of the file in this format, with its dot; empty where a folder is written."""
+        return ""
+
+    @classmethod
+    def asked(cls, questions: dict[str, Question], answers: Answers) -> dict[str, Question]:
+        """What the form asks, of the questions that its options alone lead to."""
+        return questions
+
+    @classmethod
+    def entries(cls, answers: Answers) -> dict[str, Any]:
+        """What the answers to `asked` mean where that is not the value of one option."""
+        return {}

@@ -1,0 +1,36 @@
+"""MetricsJob: every figure that was measured."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from app.export.jobs.job import FRAMES, Job, option
+from app.export.picked_frames import PickedFrames
+
+
+class MetricsJob(Job, frozen=True):
+    """What is asked for: a file. Clips that are not trained are left out."""
+
+    kind: ClassVar[str] = "metrics"
+    title: ClassVar[str] = "Metrics"
+    about: ClassVar[str] = "Every figure that was measured, with the settings it was reached with."
+    work: ClassVar[str] = "app.export.metrics_job"
+    is_prefixed: ClassVar[bool] = True
+
+    format: Annotated[
+        Literal["csv", "json"],
+        option(
+            "What is written",
+            "Format",
+            answers={
+                "csv": ("CSV", "a table for a spreadsheet, with a row per clip, frame and camera"),
+                "json": ("JSON", "the same with neighbouring frames, and all settings of every clip"),
+            },
+        ),
+    ] = "csv"
+    frames: Annotated[range | PickedFrames | None, FRAMES] = None
+
+    @classmethod
+    def suffix(cls, format_name: str) -> str:
+        """See `Job`."""
+        return f".{format_name}"

@@ -1,0 +1,1 @@
+"""Figures that the lab adds to an evaluation: tOF and LPIPS."""

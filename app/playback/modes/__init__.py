@@ -1,0 +1,1 @@
+"""View modes: which values Gaussians and pictures show, and in which colours."""

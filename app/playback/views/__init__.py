@@ -1,0 +1,1 @@
+"""Views: where a picture is seen from, and how that moves."""

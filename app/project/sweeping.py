@@ -1,0 +1,30 @@
+"""What a killed program has left in a project is removed when the project is opened for writing."""
+
+from __future__ import annotations
+
+import logging
+import re
+from pathlib import Path
+
+from app.project.lock import is_process_alive
+from engine.storage.files import PARTIAL_PREFIX, discard, is_left_over
+
+logger = logging.getLogger(__name__)
+
+LIVE_NAME = re.compile(r"clip-\d{4,9}-r\d{4,9}\.safetensors|[\d-]{4,19}-final\.safetensors|mended-\d{4,9}\.safetensors")
+"""What the program makes in "live": snapshots, a finished clip that is read back, drafts of mended clips."""
+
+
+def sweep(folder: Path) -> None:
+    """Remove snapshots and what is half-written. Finished files stay, and so does whatever the program has not made.
+
+    What another process is writing stays too, such as the report of a project that trains.
+
+    Args:
+        folder: Of the project, see app.project.folders.
+    """
+    found = [path for path in (folder / "live").glob("*") if LIVE_NAME.fullmatch(path.name)]
+    found += [path for path in folder.rglob(f"{PARTIAL_PREFIX}*") if is_left_over(path, is_process_alive)]
+    n_gone = sum(map(discard, found))
+    if n_gone:
+        logger.info("removed %d left-overs from %s", n_gone, folder)

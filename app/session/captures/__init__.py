@@ -1,0 +1,1 @@
+"""What happens to a capture before training: opening, calibration, synchronisation, the doctor."""

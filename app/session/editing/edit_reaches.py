@@ -1,0 +1,40 @@
+"""EditReaches: where the edits of the open project act, looked up again when clips or edits change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from app.project.clip_anchors import clip_anchors
+from app.training.service import TrainingService
+from engine.editing.edit import Edit
+from engine.editing.reach import ClipAnchors, Reach, reach_of_edit
+
+
+class EditReaches:
+    """For one thread. service: Gives the training of the open project, None without one."""
+
+    def __init__(self, service: Callable[[], TrainingService | None]) -> None:
+        self._service = service
+        self._key: object = None
+        self._clips: tuple[ClipAnchors, ...] = ()
+        self._edits: tuple[Edit, ...] = ()
+        self._reaches: dict[int, Reach] = {}
+
+    def clips(self) -> tuple[ClipAnchors, ...]:
+        """Which anchors each clip has; none without a project."""
+        service = self._service()
+        if service is None:
+            return ()
+        key = (service, service.catalog.revision)
+        if self._key != key:
+            self._key, self._edits, self._reaches = key, (), {}
+            self._clips = clip_anchors(service.project, service.clips, service.catalog)
+        return self._clips
+
+    def of(self, edits: tuple[Edit, ...]) -> Mapping[int, Reach]:
+        """Where each of a stack acts, by number."""
+        clips = self.clips()
+        if self._edits is not edits:  # held, so that nothing else gets their place in memory
+            self._edits = edits
+            self._reaches = {edit.edit_id: reach_of_edit(edit, clips) for edit in edits}
+        return self._reaches

@@ -1,0 +1,1 @@
+"""Camera paths: commands, and what they make of the paths."""

@@ -1,0 +1,1 @@
+"""Opening and starting projects, and what the window remembers of them."""

@@ -1,0 +1,112 @@
+"""ProjectOpener: opens captures and projects on threads. What was asked for last wins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from app.background.jobs import JobContext, Jobs
+from app.project.opening import Opened, open_for_window
+from app.project.projects_folder import projects_dir
+from app.project.recents import RecentProject
+from app.session.commands import OpenCapture, OpenProject
+from app.session.notices import Notice, Notices
+from engine.capture.capture import Capture
+from engine.errors import CaptureError, EngineError
+from engine.text import printable
+
+
+class ProjectOpener:
+    """Carries out OpenCapture and OpenProject. For one thread, which does not wait.
+
+    Args:
+        jobs, notices: Of the session.
+        project_dir: Folder for the project of the next capture; one in the folder of projects when None.
+        take: Called by `Jobs.poll` with what was opened.
+        open_path: Opens a path on the thread; tests bring their own.
+        refuse: Told the folder that does not open and why, where the user was to be asked about it.
+        ask: Told what does not open, and why. Whether the user is asked what to do, so that nothing else has to be
+            said.
+    """
+
+    def __init__(
+        self,
+        jobs: Jobs,
+        notices: Notices,
+        take: Callable[[Opened], None],
+        *,
+        project_dir: Path | None = None,
+        open_path: Callable[..., Opened] = open_for_window,
+        refuse: Callable[[Path, EngineError], None] | None = None,
+        ask: Callable[[OpenCapture, Exception], bool] | None = None,
+    ) -> None:
+        self.project_dir = project_dir
+        self.projects = projects_dir()
+        """The folder of projects without a place of their own."""
+        self._jobs, self._notices, self._take, self._open_path = jobs, notices, take, open_path
+        self._refuse, self._ask = refuse, ask
+        self._refusals: list[Notice] = []
+        self._newest: object | None = None
+        """Stands for what was asked for last."""
+
+    def open(
+        self,
+        command: OpenCapture | OpenProject,
+        *,
+        current: Path | None,
+        recent: Sequence[RecentProject],
+        known: Capture | None = None,
+    ) -> None:
+        """Open something; see app.project.opening for what that means.
+
+        Args:
+            current: Folder of the project that is open now.
+            recent: Projects opened lately; those of the capture may be opened.
+            known: The capture where it was opened already.
+        """
+        path, recent, project_dir, projects = Path(command.path), tuple(recent), self.project_dir, self.projects
+        asked = command if isinstance(command, OpenCapture) else OpenCapture(path, choices=command.choices)
+        self._newest = this = object()
+
+        def work(context: JobContext) -> Opened:
+            return self._open_path(
+                path,
+                scale=asked.scale,
+                project_dir=project_dir,
+                current=current,
+                context=context,
+                recent=recent,
+                is_new_project=asked.is_new_project,
+                follow_links=asked.follow_links,
+                is_asking=asked.is_asking,
+                answers=asked.answers,
+                known=known,
+                choices=asked.choices,
+                projects=projects,
+            )
+
+        def take(opened: Opened) -> None:
+            if this is self._newest:
+                self._withdraw_refusals()
+                self._take(opened)
+            elif opened.project is not None or opened.is_asking:  # something else was asked for meanwhile
+                opened.leave()
+
+        def failed(error: Exception) -> None:
+            if self._ask is not None and this is self._newest and self._ask(asked, error):
+                return
+            if asked.is_asking and self._refuse is not None and isinstance(error, CaptureError):
+                if this is self._newest:
+                    self._refuse(path, error)
+                return
+            notice = self._notices.add_failure(f"{printable(path.name or str(path))} cannot be opened", error)
+            if isinstance(error, EngineError):
+                self._refusals.append(notice)
+
+        self._jobs.start("Opening", work, take, failed)
+
+    def _withdraw_refusals(self) -> None:
+        """Something is open now; why something else was not no longer matters."""
+        for notice in self._refusals:
+            self._notices.withdraw(notice)
+        self._refusals.clear()

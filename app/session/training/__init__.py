@@ -1,0 +1,1 @@
+"""Training as the window sees it: the live clip, the queue, versions of clips, notices."""

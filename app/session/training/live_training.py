@@ -1,0 +1,328 @@
+"""LiveTraining: the training of the open project as a session sees it. Its service and what that tells, its snapshots,
+its curves, and the plan of the next clip.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+from app.background.jobs import JobContext, Jobs
+from app.plan.next_plan import NextPlan
+from app.plan.sequence import SequencePlan
+from app.playback.modes.arrays import AnchorArrays
+from app.project.clip_catalog import ClipCatalog
+from app.project.opened_project import OpenedProject
+from app.session.notices import Notices
+from app.session.questions import RetrainQuestion, retrain_question
+from app.session.training.training_notices import tell
+from app.status import ClipStatus, PlanStatus, QueueStatus, TrainingStatus
+from app.training.curves import CurveReader, Curves
+from app.training.messages import ENDINGS, Event, SnapshotWritten
+from app.training.service import Launch, ShownState, TrainingService
+from app.training.train_queue import OwnSettings
+from engine.errors import EngineError, ProjectError
+
+logger = logging.getLogger(__name__)
+
+MAX_LISTED = 12
+"""Clips named in a notice."""
+
+
+class LiveTraining:
+    """The running training, its queue and what comes of it. For one thread, and nothing here waits.
+
+    At most one snapshot of a running training is unread: its worker writes no other before that was given back.
+
+    Args:
+        jobs, notices: Of the session.
+        launch: Starts a worker.
+        can_measure: Whether plans may time the machine.
+        live_view: How often running clips are shown anew, one of app.training.messages.LIVE_VIEWS.
+    """
+
+    def __init__(
+        self, jobs: Jobs, notices: Notices, *, launch: Launch, can_measure: bool = True, live_view: str = "live"
+    ) -> None:
+        self.service: TrainingService | None = None
+        self._opened: OpenedProject | None = None
+        self._jobs, self._notices, self._launch, self._can_measure = jobs, notices, launch, can_measure
+        self._plans, self._sequence, self._curves = NextPlan(), SequencePlan(), CurveReader()
+        self._live_view = live_view
+        self._unread: SnapshotWritten | None = None
+        self._live_counts: tuple[int, int] | None = None
+        self._n_ending = 0
+        self._ended_clip: int | None = None
+
+    def start(self) -> None:
+        """Start the thread of the curves now rather than with the first request."""
+        self._curves.worker.start()
+
+    def open(self, opened: OpenedProject, catalog: ClipCatalog | None = None) -> None:
+        """Take up a project, or the same one with other settings. What trains in another one is ended on a thread,
+        keeping what was learned.
+
+        Args:
+            catalog: What lies on disk of its clips; read here when None.
+        """
+        service, before = self.service, self._opened
+        if service is not None and before is not None:
+            if before.generation == opened.generation:
+                service.close()
+            else:
+                self._retire(service, before)
+        if before is None or before.generation != opened.generation:
+            self._ended_clip = None
+        self._opened = opened
+        self.service = TrainingService(
+            opened.project,
+            opened.clips,
+            holdout=opened.holdout,
+            launch=self._launch,
+            catalog=catalog,
+            curves=self._curves,
+        )
+        self.service.live_view = self._live_view
+
+    def _retire(self, service: TrainingService, opened: OpenedProject) -> None:
+        self._plans.forget()
+        self._sequence.forget()
+        self._unread = self._live_counts = None
+        if service.worker is None:
+            service.close()
+            opened.project.close()
+            return
+        self._n_ending += 1
+
+        def work(context: JobContext) -> None:
+            service.close()
+            opened.project.close()
+
+        def failed(error: Exception) -> None:
+            self._n_ending -= 1
+            self._notices.add_failure("A training could not be ended properly", error)
+
+        def done(_: None) -> None:
+            self._n_ending -= 1
+
+        self._jobs.start("Keeping what was learned", work, done, failed)
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether a training of a project that was left is still being ended."""
+        return self._n_ending > 0
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a clip of the open project trains."""
+        return self.service is not None and self.service.worker is not None
+
+    def check_idle(self) -> None:
+        """See that nothing trains or waits to be trained, so that clips may be cut otherwise.
+
+        Raises:
+            ProjectError: Something does.
+        """
+        if self.service is not None and (self.service.worker is not None or self.service.queue):
+            raise ProjectError(
+                "Clips are being trained, or wait for it, as they are now.",
+                hint="Stop the training first: what was learned is kept.",
+            )
+
+    def is_finished(self, clip_index: int) -> bool:
+        """Whether a finished clip, or a damaged one, would be replaced by training this one."""
+        return self.service is not None and self.service.is_finished(clip_index)
+
+    def state_of(self, clip_index: int) -> ShownState | None:
+        """The state of a clip to look at."""
+        return None if self.service is None else self.service.shown_state(clip_index)
+
+    # ---------------------------------------------------------------- commands
+
+    def train_next(self) -> None:
+        """Train the first clip that is not finished, or go on with a queue that was held.
+
+        Raises:
+            ProjectError: It cannot be trained.
+        """
+        service = self.service
+        if service is None:
+            self.tell_nothing_open()
+        elif service.worker is None and service.queue:
+            service.go_on()
+        elif service.next_clip_index is not None:
+            service.enqueue(service.next_clip_index)
+        elif any(status.state in ("damaged", "stale", "untrained") for status in self.clip_states()):
+            self._notices.add(
+                "info",
+                "No clip can be trained next",
+                "What is left is damaged, or needs a clip that is.",
+                "Restore the damaged file from a copy, or train the clip again: right-click it in the timeline.",
+            )
+        else:
+            self._notices.add("info", "Every clip is trained")
+
+    def train(self, clip_index: int, *, is_confirmed: bool, own: OwnSettings | None = None) -> RetrainQuestion | None:
+        """Train a clip, or return what has to be answered before a finished one is trained again.
+
+        Args:
+            own: Settings that it alone is to have.
+        Raises:
+            ProjectError: It cannot be trained.
+        """
+        if self.service is None:
+            self.tell_nothing_open()
+        elif not is_confirmed and self.service.is_finished(clip_index):
+            return retrain_question(self.service.catalog, clip_index)
+        else:
+            self.service.enqueue(clip_index, own or None)
+        return None
+
+    @property
+    def opened_project(self) -> OpenedProject:
+        """What is open. There has to be something."""
+        assert self._opened is not None
+        return self._opened
+
+    def set_live_view(self, mode: str) -> None:
+        """How often running clips are shown anew, from now on."""
+        self._live_view = mode
+        if self.service is not None:
+            self.service.set_live_view(mode)
+
+    def tell_dropped(self, dropped: Sequence[int]) -> None:
+        """Tell the user that clips left the queue, because what they need cannot come."""
+        if dropped:
+            listed = ", ".join(str(index) for index in dropped[:MAX_LISTED])
+            more = f" and {len(dropped) - MAX_LISTED} more" if len(dropped) > MAX_LISTED else ""
+            them = "Clip" if len(dropped) == 1 else "Clips"
+            verb = "waits no more: it needs" if len(dropped) == 1 else "wait no more: they need"
+            self._notices.add("warn", f"{them} {listed}{more} {verb} a clip that is not trained")
+
+    def tell_nothing_open(self) -> None:
+        """Tell the user that no capture is open."""
+        self._notices.add("warn", "There is nothing to train yet", "No capture is open.", "Open a capture folder.")
+
+    def pause(self) -> None:
+        """Hold the running training where it is."""
+        if self.service is not None:
+            self.service.pause()
+
+    def resume(self) -> None:
+        """Go on after a pause, or with a queue that was held."""
+        if self.service is not None:
+            self.service.resume()
+            self.service.go_on()
+
+    def stop(self) -> None:
+        """End the running training, keep what was learned and empty the queue."""
+        if self.service is not None:
+            self.service.stop()
+
+    # ---------------------------------------------------------------- what the worker said
+
+    def poll(self) -> Sequence[Event]:
+        """Take in what the worker said, and tell the user what is news. Returns all of it, oldest first."""
+        running = None if self.service is None else self.service.running_clip
+        events = [] if self.service is None else self.service.poll()
+        for event in events:
+            tell(event, self._notices, running)
+            if isinstance(event, SnapshotWritten):
+                self._unread = event
+            elif isinstance(event, ENDINGS):
+                self._unread = self._live_counts = None
+                if running is not None and self.state_of(running) is not None:
+                    self._ended_clip = running
+        if events and self.service is not None:
+            self.tell_dropped(self.service.take_dropped())
+        return events
+
+    @property
+    def newest_clip(self) -> int | None:
+        """The clip with the newest state to look at: the one that trains once it has one, else the one whose training
+        has ended last, else the last one that is trained; None where there is none."""
+        service = self.service
+        if service is None:
+            return None
+        running = service.running_clip
+        state = None if running is None else service.shown_state(running)
+        if state is not None and state.is_live:
+            return running
+        if self._ended_clip is not None:
+            return self._ended_clip
+        return next((index for index in reversed(service.catalog.order) if service.is_finished(index)), None)
+
+    @property
+    def unread_clip(self) -> int | None:
+        """The clip with a snapshot that nobody has read yet."""
+        return None if self.service is None or self._unread is None else self.service.running_clip
+
+    def give_back_snapshot(self) -> None:
+        """It was read, or nobody looks at that clip: the worker may write the next one."""
+        if self.service is not None and self._unread is not None and self.service.running_clip is not None:
+            self.service.snapshot_consumed(self.service.running_clip, self._unread.revision)
+        self._unread = None
+
+    def replace_snapshot(self, error: Exception) -> None:
+        """It could not be read. It may have been replaced meanwhile; if not, another one is asked for."""
+        logger.info("a live state could not be read: %s", error)
+        if self.service is not None and self._unread is not None:
+            self.service.snapshot_now()
+            self.give_back_snapshot()
+
+    def note_anchors(self, anchors: AnchorArrays | None) -> None:
+        """All anchors of the running clip, once a state of it was loaded."""
+        if anchors is not None:
+            self._live_counts = (len(anchors.inherited_positions), len(anchors.own_positions))
+
+    def note_damage(self, error: Exception) -> None:
+        """The file of a clip could not be read."""
+        if self.service is not None and isinstance(error, EngineError):
+            self.service.catalog.note_damage(error.path, error.message)
+
+    # ---------------------------------------------------------------- status
+
+    def status(self, viewed_clip: int | None) -> TrainingStatus:
+        """The training as a whole.
+
+        Args:
+            viewed_clip: Whose curves to show while nothing trains.
+        """
+        return TrainingStatus() if self.service is None else self.service.status(viewed_clip)
+
+    def clip_states(self) -> list[ClipStatus]:
+        """One status per clip."""
+        return [] if self.service is None else self.service.clip_statuses(self._live_counts)
+
+    def plan(self) -> PlanStatus | None:
+        """What training the next clip would take; None while something trains or nothing is left to train."""
+        if self.service is None or self._opened is None:
+            return None
+        can_measure = self._can_measure and not self._jobs.statuses
+        return self._plans.status(self.service, self._opened.project, self._opened.capture, can_measure=can_measure)
+
+    def queue(self) -> QueueStatus:
+        """What waits, and what all of it takes."""
+        if self.service is None or self._opened is None:
+            return QueueStatus(live_view=self._live_view)
+        opened = self._opened
+        can_measure = self._can_measure and not self._jobs.statuses and not self._plans.is_busy
+        return self._sequence.status(self.service, opened.project, opened.capture, can_measure=can_measure)
+
+    def curves(self, clip_index: int) -> Curves | None:
+        """Loss and PSNR over the steps of a clip; None until they were read."""
+        return None if self.service is None else self.service.curves_of(clip_index)
+
+    @property
+    def finished(self) -> tuple[object, ...]:
+        """Identities of the newest plans and curves. Another value means that there is something new to see."""
+        newest = (self._plans.newest, self._sequence.newest, self._curves.worker.newest)
+        return tuple(None if found is None else found[0] for found in newest)
+
+    def close(self) -> None:
+        """End the worker, keeping what was learned, and the threads. Blocks for a few seconds at most."""
+        if self.service is not None:
+            self.service.close()
+        self._curves.close()
+        self._plans.close()
+        self._sequence.close()

@@ -1,0 +1,81 @@
+"""Commands about what is trained when, and about versions of clips: carried out on the open project."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from app.session import commands
+from app.session.notices import Notices
+from app.session.projects.settings import Settings
+from app.session.questions import Question
+from app.session.training.clip_versions import Versions
+from app.session.training.live_training import LiveTraining
+from app.session.training.own_settings_question import settings_question
+from app.training.messages import LIVE_VIEWS
+
+MAX_LISTED = 12
+
+
+class QueueCommands:
+    """For one thread, and nothing here waits.
+
+    Args:
+        live, versions, notices, settings: Of the session.
+    """
+
+    def __init__(self, live: LiveTraining, versions: Versions, notices: Notices, settings: Settings) -> None:
+        self._live, self._versions, self._notices, self._settings = live, versions, notices, settings
+
+    def obey(self, command: commands.QueueCommand) -> Question | None:
+        """Carry out a command. Returns what has to be answered first, if anything.
+
+        Raises:
+            EngineError: It cannot be done; says why.
+        """
+        live, service = self._live, self._live.service
+        match command:
+            case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed, settings=settings):
+                question = live.train(clip_index, is_confirmed=is_confirmed, own=dict(settings))
+                return None if question is None else replace(question, settings=settings)
+            case commands.SetLiveView(mode=mode):
+                if mode not in LIVE_VIEWS:
+                    raise ValueError(f"the live view is one of {', '.join(LIVE_VIEWS)}, not {mode!r}")
+                self._settings.set_live_view(mode)
+                live.set_live_view(mode)
+            case _ if service is None:
+                live.tell_nothing_open()
+            case commands.TrainAll():
+                self._train_all(range(len(service.clips)))
+            case commands.TrainClips(clip_indices=clip_indices):
+                self._train_all(clip_indices)
+            case commands.AskTrainSettings(clip_index=clip_index):
+                return settings_question(live.opened_project, service.catalog, clip_index)
+            case commands.MoveInQueue(clip_index=clip_index, position=position):
+                service.queue.move(clip_index, position)
+                live.tell_dropped(service.drop_hopeless())
+            case commands.RemoveFromQueue(clip_index=clip_index):
+                service.queue.remove(clip_index)
+                live.tell_dropped(service.drop_hopeless())
+            case commands.StopAfterClip(is_wanted=is_wanted):
+                service.stop_after_clip(is_wanted)
+            case commands.RestoreVersion(clip_index=clip_index, version=version):
+                self._versions.restore(clip_index, version)
+            case commands.RemoveVersion(clip_index=clip_index, version=version):
+                self._versions.remove(clip_index, version)
+        return None
+
+    def _train_all(self, clip_indices: range | tuple[int, ...]) -> None:
+        service = self._live.service
+        assert service is not None
+        left_out = service.enqueue_all(clip_indices)
+        if left_out:
+            listed = ", ".join(str(index) for index in left_out[:MAX_LISTED])
+            more = f" and {len(left_out) - MAX_LISTED} more" if len(left_out) > MAX_LISTED else ""
+            self._notices.add(
+                "warn",
+                f"{len(left_out)} {'clip is' if len(left_out) == 1 else 'clips are'} left out of the training",
+                f"Damaged, or in need of a clip that is: {listed}{more}.",
+                "Restore the damaged file from a copy, or train that clip again: right-click it in the timeline.",
+            )
+        elif service.worker is None and not service.queue:
+            self._notices.add("info", "All of these clips are trained")

@@ -1,0 +1,38 @@
+"""Notices to the user about a background training, made of its events."""
+
+from __future__ import annotations
+
+from app.psnr_words import psnr_words
+from app.session.notices import Notices
+from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WarningRaised, WorkerDied
+
+
+def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
+    """Add a notice if the user should know of this; most events show in the status alone."""
+    match event:
+        case ClipTrained(held_out_psnr=psnr):
+            figure = "" if psnr is None else f"{psnr_words(psnr, is_whole=False).capitalize()}."
+            notices.add("info", "A clip is trained" if clip_index is None else f"Clip {clip_index} is trained", figure)
+        case TrainingStopped(path=path, step=step):
+            detail = f"What was learned in {step} steps is kept." if path else "Nothing was learned yet."
+            notices.add("info", "Training stopped", detail)
+        case WarningRaised(title=title, detail=detail, hint=hint):
+            notices.add("warn", title, detail, hint)
+        case TrainingFailed(message=message, hint=hint):
+            notices.add("error", "Training failed", message, hint)
+        case WorkerDied(exit_code=exit_code, log_tail=log_tail):
+            last = log_tail.splitlines()[-1] if log_tail else "Its log is empty."
+            notices.add(
+                "error",
+                "The training process ended unexpectedly",
+                f"{_exit_words(exit_code)} {last}",
+                "Train the clip again; it goes on from what was kept.",
+            )
+        case _:
+            pass
+
+
+def _exit_words(exit_code: int | None) -> str:
+    if exit_code is not None and exit_code < 0:
+        return f"It was ended by signal {-exit_code}{' (often: not enough memory)' if exit_code == -9 else ''}."
+    return f"Its exit code was {exit_code}." if exit_code is not None else ""

@@ -1,0 +1,1 @@
+"""Cameras of a capture, as the files of other programs describe them."""

@@ -1,0 +1,1 @@
+"""When frames were taken: clocks, times, moments that several cameras share."""

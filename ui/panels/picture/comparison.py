@@ -1,0 +1,80 @@
+"""The rendered picture beside another one: whether they are compared, how much of each shows, and their names."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from typing import Protocol
+
+from imgui_bundle import imgui
+
+from app.playback.modes.view_modes import COLOR, MODES
+from app.playback.views.orbit_view import OrbitView
+from app.status import CAPTURED, Overlays, VersionStatus, version_number
+from ui.panels.state import UiState
+from ui.viewport.hud_text import RENDERED
+
+HOLD_KEY = imgui.Key.b
+"""While it is held, the other picture covers the rendered one."""
+
+
+class ComparisonNeeds(Protocol):
+    """What a comparison depends on."""
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def overlays(self) -> Overlays: ...
+
+
+def shown_compare(session: ComparisonNeeds) -> str:
+    """The comparison on screen: none with a captured picture from a free view, where no camera took one."""
+    overlays = session.overlays
+    return "off" if overlays.compare_with == CAPTURED and session.view.look_through is None else overlays.compare
+
+
+def is_held(session: ComparisonNeeds, ui: UiState) -> bool:
+    """Does the user hold the key that shows the other picture alone?"""
+    io = imgui.get_io()
+    is_free = not (io.want_text_input or ui.is_popup_open or io.key_ctrl or io.key_alt or io.key_shift)
+    has_other = session.overlays.compare_with != CAPTURED or session.view.look_through is not None
+    return is_free and has_other and imgui.is_key_down(HOLD_KEY)
+
+
+def covered_share(session: ComparisonNeeds, ui: UiState, *, is_held: bool) -> float:
+    """How much of the rendered picture's width the other one covers, from the left. Asks to be drawn again in time."""
+    overlays = session.overlays
+    if is_held:
+        return 1.0
+    if overlays.compare != "blink":
+        return overlays.wipe_position
+    beat = time.perf_counter() * 2.0 * overlays.blink_hz  # two pictures a cycle
+    ui.redraw_within((math.floor(beat) + 1.0 - beat) / (2.0 * overlays.blink_hz))
+    return float(math.floor(beat) % 2)
+
+
+def kind_words(kind: str, mode_label: str) -> str:
+    """What a rendered picture is called beside another one."""
+    return f"{kind}, {mode_label.lower()}" if kind == RENDERED and mode_label else kind
+
+
+def missing_words(overlays: Overlays, versions: Sequence[VersionStatus]) -> str:
+    """What stands where the other picture is not there. versions: Of the clip under the playhead."""
+    if overlays.compare_with == CAPTURED:
+        return "Captured picture is being read"
+    number = version_number(overlays.compare_with)
+    if number is not None and number not in [version.number for version in versions]:
+        return f"This clip has no version {number}"
+    return f"{other_label(overlays)} is being drawn"
+
+
+def other_label(overlays: Overlays) -> str:
+    """What the other picture is called in menus."""
+    if overlays.compare_with == CAPTURED:
+        return "Captured picture"
+    number = version_number(overlays.compare_with)
+    if number is not None:
+        return f"Version {number}"
+    return "Own colours" if overlays.compare_with == COLOR else MODES[overlays.compare_with].label

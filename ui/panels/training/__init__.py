@@ -1,0 +1,1 @@
+"""Panels of training: progress, plan, queue, curves, and the quality and versions of clips."""

@@ -1,0 +1,257 @@
+"""Asking for a folder without stopping the frame loop, and the help sheet.
+
+The desktop's own dialog is used where its helper program is installed; elsewhere a small path box with a folder list.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import portable_file_dialogs as native
+
+from app.project.project_choices import ProjectChoices
+from app.session.commands import LookAtVideos, OpenCapture, OpenProject
+from ui.panels.actions.action import BOOKMARKS, PLAY, TIME, WINDOW
+from ui.panels.actions.table import ACTIONS
+from ui.panels.picture.gestures import mouse_help
+from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import text_wrapped_dim
+from ui.style import theme
+
+_LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
+OPEN, CALIBRATE, READ_ONLY, RELOCATE = "open", "calibrate", "read only", "relocate"
+"""What a folder is asked for."""
+_TITLES = {
+    OPEN: "Open a capture or project folder",
+    CALIBRATE: "Calibrate a folder of plain videos",
+    READ_ONLY: "Open a project for reading only",
+    RELOCATE: "Where the capture of the project is by now",
+}
+_HINTS = {
+    OPEN: "Folder with the cameras and their videos or pictures, or of a project",
+    CALIBRATE: "Folder with one video, or one folder of pictures, per camera",
+    READ_ONLY: "Folder of a project, or of a capture that has one; nothing in it is changed",
+    RELOCATE: "Folder with the cameras and their videos or pictures",
+}
+_MAX_LISTED = 500
+
+
+def has_native_dialog() -> bool:
+    """Can this desktop show its own folder dialog? Without a helper it would look like Cancel."""
+    if not sys.platform.startswith("linux"):
+        return True
+    return any(shutil.which(program) for program in _LINUX_HELPERS)
+
+
+def list_folders(folder: Path) -> list[str]:
+    """Names of the visible subfolders, sorted; empty when the folder cannot be read."""
+    try:
+        with os.scandir(folder) as entries:
+            names = [entry.name for entry in entries if entry.is_dir() and not entry.name.startswith(".")]
+    except OSError:
+        return []
+    return sorted(names, key=str.lower)[:_MAX_LISTED]
+
+
+def typed_path(text: str) -> Path | None:
+    """The path that a text names; None where it is empty or cannot be one: too long, a home that nobody has."""
+    if not text.strip():
+        return None
+    try:
+        path = Path(text).expanduser()
+        path.is_dir()
+    except (OSError, RuntimeError, ValueError):
+        return None
+    return path
+
+
+class OpenFolderDialog:
+    """One question for a folder: native when possible, else drawn. Owns the running question only."""
+
+    def __init__(self, start: Path | None = None) -> None:
+        self._start = (start or Path.home()).resolve()
+        self._native: Any = None
+        self._is_box_wanted = False
+        self._is_keyboard_wanted = False
+        self._text = str(self._start)
+        self._listed: tuple[str, list[str]] = ("", [])
+        self._purpose = OPEN
+        self._project: Path | None = None
+
+    @property
+    def is_waiting(self) -> bool:
+        """True while the desktop's dialog is up and has to be polled."""
+        return self._native is not None
+
+    def open_wished(self, ui: UiState) -> None:
+        """Ask for what is wished, if anything is."""
+        wishes = ui.wishes
+        if wishes.relocated_project is not None:
+            self.open(purpose=RELOCATE, project=wishes.relocated_project)
+        elif wishes.is_read_only or wishes.is_calibration or ui.is_open_requested:
+            self.open(purpose=READ_ONLY if wishes.is_read_only else CALIBRATE if wishes.is_calibration else OPEN)
+        wishes.relocated_project = None
+        ui.is_open_requested = wishes.is_calibration = wishes.is_read_only = False
+
+    def open(self, start: Path | None = None, *, purpose: str = OPEN, project: Path | None = None) -> None:
+        """Ask, for one of the purposes above. A second call while a question is up does nothing.
+
+        Args:
+            project: The project whose capture is asked for.
+        """
+        if self._native is not None:
+            return
+        self._purpose, self._project = purpose, project
+        if start is not None:
+            self._start = start
+            self._text = str(start)
+        if has_native_dialog():
+            self._native = native.select_folder(_TITLES[self._purpose], str(self._start))
+        else:
+            self._is_box_wanted = True
+
+    def draw(self, dispatch: Dispatch, ui: UiState) -> None:
+        """Poll the desktop's dialog or draw our own; dispatches a command on an answer."""
+        if self._native is not None:
+            self._poll_native(dispatch, ui)
+        if self._is_box_wanted:
+            self._is_box_wanted = False
+            self._is_keyboard_wanted = True
+            imgui.open_popup(self._popup)
+        center = imgui.get_main_viewport().get_center()
+        imgui.set_next_window_pos(center, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
+        imgui.set_next_window_size(ImVec2(620, 420), imgui.Cond_.appearing)
+        is_open, _ = imgui.begin_popup_modal(self._popup, True, imgui.WindowFlags_.no_saved_settings)
+        if is_open:
+            self._draw_box(dispatch, ui)
+            imgui.end_popup()
+
+    @property
+    def _popup(self) -> str:
+        return f"{_TITLES[self._purpose]}###folder"
+
+    def _answer(self, folder: Path) -> OpenCapture | OpenProject | LookAtVideos:
+        if self._purpose == RELOCATE and self._project is not None:
+            return OpenProject(self._project, ProjectChoices(capture=folder))
+        if self._purpose == READ_ONLY:
+            return OpenCapture(folder, choices=ProjectChoices(is_read_only=True))
+        return LookAtVideos(folder) if self._purpose == CALIBRATE else OpenCapture(folder, is_asking=True)
+
+    def _poll_native(self, dispatch: Dispatch, ui: UiState) -> None:
+        if not self._native.ready(0):
+            ui.redraw_within(0.1)
+            return
+        answer, self._native = self._native.result(), None
+        if answer:
+            self._start = Path(answer)
+            dispatch(self._answer(Path(answer)))
+
+    def _draw_box(self, dispatch: Dispatch, ui: UiState) -> None:
+        imgui.text_disabled(_HINTS[self._purpose])
+        if self._is_keyboard_wanted:
+            self._is_keyboard_wanted = False
+            imgui.set_keyboard_focus_here()
+        imgui.set_next_item_width(-1)
+        flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
+        is_entered, self._text = imgui.input_text("##path", self._text, flags)
+        ui.mark("open.path")
+        folder = typed_path(self._text)
+        is_folder = folder is not None and folder.is_dir()
+        if imgui.begin_child("folders", ImVec2(0, -46), imgui.ChildFlags_.borders):
+            self._draw_folders(self._start if folder is None else folder if is_folder else folder.parent)
+        imgui.end_child()
+        if not is_folder:
+            imgui.align_text_to_frame_padding()
+            imgui.text_colored(theme.ORANGE, f"{theme.Icon.WARNING}  There is no such folder")
+            imgui.same_line()
+        imgui.set_cursor_pos_x(imgui.get_window_width() - 252)
+        if imgui.button("Cancel", ImVec2(110, 0)):
+            imgui.close_current_popup()
+        imgui.same_line()
+        imgui.begin_disabled(not is_folder)
+        is_clicked = imgui.button("Open" if self._purpose in (OPEN, READ_ONLY) else "Go on", ImVec2(120, 0))
+        ui.mark("open.accept")
+        imgui.end_disabled()
+        if (is_clicked or is_entered) and folder is not None and is_folder:
+            self._start = folder
+            dispatch(self._answer(folder))
+            imgui.close_current_popup()
+        elif imgui.is_key_pressed(imgui.Key.escape, False):
+            imgui.close_current_popup()
+
+    def _draw_folders(self, folder: Path) -> None:
+        if self._listed[0] != str(folder):
+            self._listed = (str(folder), list_folders(folder))
+        if folder.parent != folder and imgui.selectable(f"{theme.Icon.FOLDER}  ..", False)[0]:
+            self._text = str(folder.parent)
+        for name in self._listed[1]:
+            if imgui.selectable(f"{theme.Icon.FOLDER}  {name}", False)[0]:
+                self._text = str(folder / name)
+
+
+def draw_help(ui: UiState) -> None:
+    """The F1 sheet: every key, and what the mouse does."""
+    if not ui.is_help_open:
+        return
+    center = imgui.get_main_viewport().get_center()
+    imgui.set_next_window_pos(center, imgui.Cond_.always, ImVec2(0.5, 0.5))
+    highest = imgui.get_main_viewport().work_size.y - 24
+    imgui.set_next_window_size(ImVec2(880, 0), imgui.Cond_.always)
+    imgui.set_next_window_size_constraints(ImVec2(880, 100), ImVec2(880, highest))  # in a low window it scrolls
+    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_resize
+    flags |= imgui.WindowFlags_.no_collapse
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 1.0)
+    imgui.push_style_color(imgui.Col_.window_bg, imgui.ImVec4(*theme.POPUP))
+    is_shown, is_kept = imgui.begin("Keys and mouse", True, flags)
+    imgui.pop_style_color()
+    imgui.pop_style_var()
+    if imgui.is_window_appearing():
+        ui.redraw_within(0.0)  # only then does what lies below know that it is covered
+    if is_shown:
+        groups = dict.fromkeys(action.group for action in ACTIONS)
+        left = (TIME, PLAY, BOOKMARKS, WINDOW)
+        if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
+            imgui.table_next_column()
+            for group in left:
+                _draw_group(group, _rows(group, ui))
+            _draw_group("Mouse", list(mouse_help(ui.navigation.preset)))
+            imgui.table_next_column()
+            for group in (group for group in groups if group not in left):
+                _draw_group(group, _rows(group, ui))
+            imgui.end_table()
+        others = next(action for action in ACTIONS if action.id == "window.palette")
+        key = ui.keys.label(others)
+        text_wrapped_dim(f"What has no key is in the menus; {key} finds everything by its name." if key else "")
+    imgui.end()
+    ui.is_help_open = bool(is_kept)
+
+
+def _rows(group: str, ui: UiState) -> list[tuple[str, str]]:
+    """Keys and words of the actions of a group that have a key."""
+    rows = ((", ".join(ui.keys.labels(action)), action) for action in ACTIONS if action.group == group)
+    return [(label, action.text) for label, action in rows if label and action.is_in_help]
+
+
+def _draw_group(title: str, rows: list[tuple[str, str]]) -> None:
+    if not rows:
+        return
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.SKY))
+    imgui.separator_text(title)
+    imgui.pop_style_color()
+    key_width = max(imgui.calc_text_size(label).x for label, _ in rows) + 14
+    if not imgui.begin_table(title, 2):
+        return
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, key_width)
+    imgui.table_setup_column("text")
+    for label, text in rows:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text(label)
+        imgui.table_next_column()
+        text_wrapped_dim(text)
+    imgui.end_table()
