@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.calibration.agreement import Agreement, agreement
 from engine.calibration.calibrate import CalibrationJob
 from engine.calibration.calibrated import Calibration
 from engine.calibration.finishing import finished
-from engine.calibration.looking import key_points as looked_for
-from engine.calibration.mapping import FirstEstimate, focals_to_try, map_cameras, verified_matches
-from engine.calibration.matching import KeyPoints, all_pairs, match_all
+from engine.calibration.matching.looking import key_points as looked_for
+from engine.calibration.matching.matching import KeyPoints, all_pairs, match_all
+from engine.calibration.matching.pictures import matching_size, read_pictures
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import WHAT_TO_DO, PairCounts, pair_lines
-from engine.calibration.pictures import matching_size, read_pictures
-from engine.calibration.solving import FINE, ROUGH, Solution, solve
+from engine.calibration.solving.agreement import Agreement, agreement
+from engine.calibration.solving.mapping import FirstEstimate, focals_to_try, map_cameras, verified_matches
+from engine.calibration.solving.solving import FINE, ROUGH, Solution, solve
 from engine.calibration.stages import StageProgress
 from engine.calibration.videos import PlainVideo, common_length, find_videos
 from engine.children.child import Parent

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.calibration.agreement import MIN_AGREEING, Agreement, agreement
 from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCamera
-from engine.calibration.cameras import Cameras
-from engine.calibration.matching import KeyPoints, Pair, all_pairs
+from engine.calibration.matching.matching import KeyPoints, Pair, all_pairs
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import FEW_MATCHES, PairCounts
-from engine.calibration.solving import Solution
-from engine.calibration.strain import is_strained
+from engine.calibration.solving.agreement import MIN_AGREEING, Agreement, agreement
+from engine.calibration.solving.cameras import Cameras
+from engine.calibration.solving.solving import Solution
+from engine.calibration.solving.strain import is_strained
+from engine.calibration.solving.world import find_up, known_scale, unit_scale, upright
 from engine.calibration.videos import MIN_CAMERAS, PlainVideo
-from engine.calibration.world import find_up, known_scale, unit_scale, upright
 from engine.camera.lens import Lens, LensModel
 from engine.camera.rig import CameraRig
 

@@ -11,10 +11,10 @@ from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.light import AnchorLight
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility
-from engine.cloud.stereo.consistency import check_depths
-from engine.cloud.stereo.slanted import refine_slanted
-from engine.cloud.stereo.smoothing import smooth_inverse_depth
-from engine.cloud.stereo.sweep import matching_costs
+from engine.cloud.stereo.depth.consistency import check_depths
+from engine.cloud.stereo.depth.slanted import refine_slanted
+from engine.cloud.stereo.depth.smoothing import smooth_inverse_depth
+from engine.cloud.stereo.depth.sweep import matching_costs
 from engine.images.image_filters import dilate
 from engine.images.remap import remap
 

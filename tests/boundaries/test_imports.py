@@ -69,7 +69,7 @@ def test_import_contracts_hold() -> None:
         ("app/session/seeded.py", "import app.lab.report.page.tables", "Layers of app:"),
         ("ui/gl/seeded.py", "import ui.panels.state", "Layers of ui:"),
         ("ui/panels/seeded.py", "import app.training.service", "The window talks to the session"),
-        ("engine/cloud/background/seeded.py", "import engine.cloud.stereo.sweep", "Layers of engine.cloud:"),
+        ("engine/cloud/background/seeded.py", "import engine.cloud.stereo.depth.sweep", "Layers of engine.cloud:"),
         ("engine/training/step/seeded.py", "import engine.training.preparation.stages", "Layers of engine.training:"),
     ],
 )

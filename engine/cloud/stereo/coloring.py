@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 from engine.camera.projection import is_in_picture, project, projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import gain_spread, gains_from_observations, scene_colors
-from engine.cloud.stereo.depth_scene import DepthMaps
+from engine.cloud.stereo.depth.depth_scene import DepthMaps
 from engine.images.image_filters import block_mean
 
 COLOR_DEPTH_TOLERANCE = 0.05

@@ -19,10 +19,10 @@ from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import scene_colors
 from engine.cloud.fusion import fuse_tiers, keep_inliers
 from engine.cloud.keeping import Arrays, Keep, do_now
-from engine.cloud.stereo.changed_depths import changed_depth_maps
 from engine.cloud.stereo.coloring import balance, colored_by_neighbors, observe
-from engine.cloud.stereo.depth_maps import estimate_depth_maps
-from engine.cloud.stereo.depth_scene import DepthMaps
+from engine.cloud.stereo.depth.changed_depths import changed_depth_maps
+from engine.cloud.stereo.depth.depth_maps import estimate_depth_maps
+from engine.cloud.stereo.depth.depth_scene import DepthMaps
 from engine.cloud.stereo.sampling import median_footprint, sample_tiers, seen_pixels, working_pictures
 from engine.cloud.voxel import voxel_keys, voxel_means
 from engine.errors import PreparationError

@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.camera.projection import focal_px, unproject
 from engine.cloud.fusion import Samples
-from engine.cloud.stereo.depth_scene import MIN_AGREE, DepthMaps
+from engine.cloud.stereo.depth.depth_scene import MIN_AGREE, DepthMaps
 from engine.images.image_filters import block_mean
 
 MIN_VALID_SHARE = 0.99

@@ -13,8 +13,8 @@ from scipy.spatial import KDTree
 
 from engine.camera.projection import is_in_picture, pixel_rays, project, projection_matrices, to_world
 from engine.camera.rig import CameraRig
-from engine.cloud.stereo.consistency import SEE_THROUGH_SHARE
-from engine.cloud.stereo.fill import fill_inverse_depth
+from engine.cloud.stereo.depth.consistency import SEE_THROUGH_SHARE
+from engine.cloud.stereo.depth.fill import fill_inverse_depth
 from engine.cloud.voxel import voxel_means
 
 MARGIN = 0.3

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.calibration.bundle import Observations
-from engine.calibration.cameras import N_LENS, Cameras, rotation_of
+from engine.calibration.solving.bundle import Observations
+from engine.calibration.solving.cameras import N_LENS, Cameras, rotation_of
 from engine.synthetic.rigs import looking_at
 
 SIZE = (640, 480)

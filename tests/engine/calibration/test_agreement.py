@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from engine.calibration.agreement import Agreement, agreement
-from engine.calibration.cameras import Cameras, rotation_of
-from engine.calibration.matching import KeyPoints, Pair, all_pairs
+from engine.calibration.matching.matching import KeyPoints, Pair, all_pairs
+from engine.calibration.solving.agreement import Agreement, agreement
+from engine.calibration.solving.cameras import Cameras, rotation_of
 from tests.engine.calibration.made_rigs import SIZE, make_seen
 
 N_CAMERAS = 12

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.calibration.bundle import Expectations, Observations, _jacobians, adjust, errors_px
-from engine.calibration.cameras import Cameras, rotation_of
+from engine.calibration.solving.bundle import Expectations, Observations, _jacobians, adjust, errors_px
+from engine.calibration.solving.cameras import Cameras, rotation_of
 from tests.engine.calibration.made_rigs import SIZE, Seen, make_seen, off_truth, rough
 
 

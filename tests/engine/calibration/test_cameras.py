@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.calibration.cameras import distort, undistort
 from engine.calibration.finishing import LENS_MODEL
+from engine.calibration.solving.cameras import distort, undistort
 from engine.camera.lens import Lens
 from tests.engine.calibration.made_rigs import LENS_PARAMS
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.calibration.agreement import Agreement
 from engine.calibration.finishing import _doubts, _failure
+from engine.calibration.solving.agreement import Agreement
 
 NAMES = [f"cam{row}" for row in range(8)]
 

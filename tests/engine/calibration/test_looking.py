@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.calibration import looking
-from engine.calibration.matching import KeyPoints
-from engine.calibration.pictures import CameraPictures, MovingPart
+from engine.calibration.matching import looking
+from engine.calibration.matching.matching import KeyPoints
+from engine.calibration.matching.pictures import CameraPictures, MovingPart
 from engine.errors import PreparationError
 from engine.features.child import ChildFailed
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from engine.calibration.pictures import N_BACKGROUND_FRAMES, read_pictures
+from engine.calibration.matching.pictures import N_BACKGROUND_FRAMES, read_pictures
 from engine.calibration.stages import STAGES, StageProgress
 from engine.calibration.videos import find_videos
 from engine.progress import Progress

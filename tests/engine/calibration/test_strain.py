@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from engine.calibration.agreement import agreement
-from engine.calibration.strain import is_strained
+from engine.calibration.solving.agreement import agreement
+from engine.calibration.solving.strain import is_strained
 from tests.engine.calibration.made_rigs import SIZE
 from tests.engine.calibration.test_agreement import N_CAMERAS, matched
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.calibration.matching import KeyPoints, match_all
-from engine.calibration.tracks import build_tracks, fitting_matches
+from engine.calibration.matching.matching import KeyPoints, match_all
+from engine.calibration.solving.tracks import build_tracks, fitting_matches
 from tests.engine.calibration.made_rigs import make_seen
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.calibration.cameras import rotation_of
-from engine.calibration.world import find_up, known_scale, unit_scale, upright
+from engine.calibration.solving.cameras import rotation_of
+from engine.calibration.solving.world import find_up, known_scale, unit_scale, upright
 from tests.engine.calibration.made_rigs import make_seen
 
 

@@ -224,9 +224,9 @@ def _build_clouds(say: Say) -> None:
     from engine.cloud.background.background import estimate_background
     from engine.cloud.background.masks import motion_mask
     from engine.cloud.motion.hull import Grid, _integrate, carve, hull_colors, hull_visibility
-    from engine.cloud.stereo.consistency import check_depths
-    from engine.cloud.stereo.smoothing import smooth_inverse_depth
-    from engine.cloud.stereo.sweep import matching_costs
+    from engine.cloud.stereo.depth.consistency import check_depths
+    from engine.cloud.stereo.depth.smoothing import smooth_inverse_depth
+    from engine.cloud.stereo.depth.sweep import matching_costs
     from engine.images.image_filters import dilate
 
     with pytest.raises(IndexError):  # or nothing is checked

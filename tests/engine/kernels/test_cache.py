@@ -216,7 +216,7 @@ import engine, engine.kernels.cache, engine.kernels.compile_ahead, engine.errors
 assert "numba" not in __import__("sys").modules
 import numba, torch
 between = dict(os.environ)
-import engine.kernels.threads, engine.cloud.stereo.sweep, engine.cloud.voxel  # which compile nothing yet
+import engine.kernels.threads, engine.cloud.stereo.depth.sweep, engine.cloud.voxel  # which compile nothing yet
 after = dict(os.environ)
 from numba.core import config
 print(sorted(set(after.items()) ^ set(between.items())), repr(config.CACHE_DIR))

@@ -15,7 +15,7 @@ from engine.backends.table import backend_called
 from engine.camera.depth_range import NEAR_SHARE
 from engine.clip_files.clip_header import FieldShape
 from engine.cloud.motion.dedup import residual_rows
-from engine.cloud.stereo.depth_scene import WORKING_PIXELS
+from engine.cloud.stereo.depth.depth_scene import WORKING_PIXELS
 from engine.cloud.stereo.frames_cloud import FRAME_SPACING_PX
 from engine.conventions import ALPHA_MAX, ALPHA_MIN
 from engine.model.anchors import AnchorSet

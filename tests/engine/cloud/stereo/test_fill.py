@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from engine.cloud.stereo.fill import fill_inverse_depth
+from engine.cloud.stereo.depth.fill import fill_inverse_depth
 
 HEIGHT, WIDTH = 24, 32
 SLOPE = np.broadcast_to(np.linspace(0.2, 0.8, WIDTH), (HEIGHT, WIDTH))

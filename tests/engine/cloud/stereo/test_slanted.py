@@ -7,9 +7,9 @@ import pytest
 
 from engine.camera.projection import pixel_rays, project, projection_matrices, to_world, unproject
 from engine.camera.rig import CameraRig
-from engine.cloud.stereo import slanted
-from engine.cloud.stereo.slanted import refine_slanted
-from engine.cloud.stereo.sweep import GREY_TRUNCATION, GREY_WEIGHT, STD_FLOOR, UNKNOWN_COST
+from engine.cloud.stereo.depth import slanted
+from engine.cloud.stereo.depth.slanted import refine_slanted
+from engine.cloud.stereo.depth.sweep import GREY_TRUNCATION, GREY_WEIGHT, STD_FLOOR, UNKNOWN_COST
 from engine.synthetic.rigs import rig_at
 from engine.synthetic.textures import noise
 

@@ -6,7 +6,7 @@ import pytest
 from engine.camera.depth_range import depth_ranges
 from engine.camera.projection import project, projection_matrices
 from engine.camera.rig import CameraRig
-from engine.cloud.stereo.sweep import (
+from engine.cloud.stereo.depth.sweep import (
     BEST_ANGLES_DEG,
     WIDEST_ANGLE_DEG,
     choose_sources,

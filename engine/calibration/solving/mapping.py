@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.calibration.cameras import Cameras
-from engine.calibration.matching import KeyPoints, Pair
+from engine.calibration.matching.matching import KeyPoints, Pair
+from engine.calibration.solving.cameras import Cameras
 
 SEED = 0
 FOCALS_PER_SIDE = (0.8, 0.65, 1.0, 1.4)

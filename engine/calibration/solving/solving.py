@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.calibration.bundle import Expectations, adjust, errors_px
-from engine.calibration.cameras import N_LENS, Cameras
-from engine.calibration.mapping import FirstEstimate
-from engine.calibration.matching import KeyPoints, Pair, all_pairs
-from engine.calibration.tracks import Tracks, build_tracks, cleaned, fitting_matches
+from engine.calibration.matching.matching import KeyPoints, Pair, all_pairs
+from engine.calibration.solving.bundle import Expectations, adjust, errors_px
+from engine.calibration.solving.cameras import N_LENS, Cameras
+from engine.calibration.solving.mapping import FirstEstimate
+from engine.calibration.solving.tracks import Tracks, build_tracks, cleaned, fitting_matches
 
 
 class Stage(NamedTuple):

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from engine.calibration.bundle import Observations, errors_px
-from engine.calibration.cameras import Cameras
-from engine.calibration.matching import KeyPoints, Pair, epipolar_px
+from engine.calibration.matching.matching import KeyPoints, Pair, epipolar_px
+from engine.calibration.solving.bundle import Observations, errors_px
+from engine.calibration.solving.cameras import Cameras
 
 MIN_ANGLE_DEG = 1.5
 """Between the rays to a point: less says nothing about its distance."""

@@ -14,8 +14,8 @@ import numpy as np
 from engine.camera.depth_range import MIN_POINTS, depth_ranges, focus_distances, near_plane
 from engine.camera.rig import CameraRig
 from engine.cloud.keeping import Arrays, Keep, do_now
-from engine.cloud.stereo.consistency import check_depths
-from engine.cloud.stereo.depth_scene import (
+from engine.cloud.stereo.depth.consistency import check_depths
+from engine.cloud.stereo.depth.depth_scene import (
     AGREE_TOLERANCE,
     MIN_AGREE,
     WORKING_PIXELS,
@@ -24,7 +24,7 @@ from engine.cloud.stereo.depth_scene import (
     prepared,
     sweep_all,
 )
-from engine.cloud.stereo.sweep import choose_sources
+from engine.cloud.stereo.depth.sweep import choose_sources
 
 logger = logging.getLogger(__name__)
 

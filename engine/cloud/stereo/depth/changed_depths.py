@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.cloud.stereo.depth_scene import WORKING_PIXELS, DepthMaps, prepared, sweep_all
+from engine.cloud.stereo.depth.depth_scene import WORKING_PIXELS, DepthMaps, prepared, sweep_all
 from engine.images.image_filters import dilate
 
 CHANGED_GREY_LEVELS = 5.0

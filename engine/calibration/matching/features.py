@@ -1,4 +1,4 @@
-"""Key points of one camera: SIFT by pycolmap, in a process of its own (engine.calibration.features_child)."""
+"""Key points of one camera: SIFT by pycolmap, in a process of its own (engine.calibration.matching.features_child)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from engine.calibration.matching import KeyPoints
-from engine.calibration.pictures import CameraPictures
+from engine.calibration.matching.matching import KeyPoints
+from engine.calibration.matching.pictures import CameraPictures
 
 MAX_KEY_POINTS = 6000
 """Of a background; the largest are kept."""

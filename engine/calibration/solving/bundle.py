@@ -11,7 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from engine.calibration.cameras import Cameras, distort, lens_jacobian, plane_jacobian, rotation_of, safe_depth, skew
+from engine.calibration.solving.cameras import (
+    Cameras,
+    distort,
+    lens_jacobian,
+    plane_jacobian,
+    rotation_of,
+    safe_depth,
+    skew,
+)
 
 MIN_SCALE_PX = 0.25
 """No key point is found more exactly than this."""

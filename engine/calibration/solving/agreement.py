@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from engine.calibration.cameras import Cameras
-from engine.calibration.matching import KeyPoints, Pair
-from engine.calibration.tracks import fitting_matches
+from engine.calibration.matching.matching import KeyPoints, Pair
+from engine.calibration.solving.cameras import Cameras
+from engine.calibration.solving.tracks import fitting_matches
 
 REACH_PX = 6.0
 """At a width of 640, from the epipolar line."""

@@ -8,8 +8,8 @@ from threading import Semaphore
 
 import numpy as np
 
-from engine.calibration.matching import KeyPoints
-from engine.calibration.pictures import CameraPictures
+from engine.calibration.matching.matching import KeyPoints
+from engine.calibration.matching.pictures import CameraPictures
 from engine.children.kind import ChildFailed
 from engine.errors import PreparationError
 from engine.features.child import arrays_kind, work_on_arrays
@@ -19,13 +19,15 @@ MAX_PROCESSES = 4
 USUAL_S = 5.0
 """For progress: a process tells none, since its interpreter is busy."""
 LOOKING = arrays_kind(
-    "engine.calibration.looking:LOOKING", "engine.calibration.features_child:main", "the process that looks"
+    "engine.calibration.matching.looking:LOOKING",
+    "engine.calibration.matching.features_child:main",
+    "the process that looks",
 )
 _may_begin = Semaphore(MAX_PROCESSES)
 
 
 def key_points(pictures: CameraPictures, name: str, advance: Callable[[float], None] = lambda _: None) -> KeyPoints:
-    """Key points of background and moving parts; see engine.calibration.features. May be called by several threads.
+    """Key points of background and moving parts; see engine.calibration.matching.features. Called by several threads.
 
     Args:
         pictures: Of one camera.

@@ -16,7 +16,7 @@ from numba import njit
 
 from engine.camera.projection import relative_homography
 from engine.camera.rig import CameraRig
-from engine.cloud.stereo.sweep import GREY_TRUNCATION, GREY_WEIGHT, STD_FLOOR, UNKNOWN_COST
+from engine.cloud.stereo.depth.sweep import GREY_TRUNCATION, GREY_WEIGHT, STD_FLOOR, UNKNOWN_COST
 
 RADIUS_PX = 4
 STRIDE_PX = 2

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.calibration.cameras import Cameras, skew
+from engine.calibration.solving.cameras import Cameras, skew
 from engine.parallel import map_ordered
 
 MAX_RATIO = 0.85

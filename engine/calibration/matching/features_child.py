@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.calibration.features import extract
-from engine.calibration.pictures import CameraPictures, MovingPart
+from engine.calibration.matching.features import extract
+from engine.calibration.matching.pictures import CameraPictures, MovingPart
 from engine.children.child import Parent
 from engine.features.child_side import answer
 from engine.progress import Progress
 
 
 def look(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.ndarray]:
-    """Answer what engine.calibration.looking asks."""
+    """Answer what engine.calibration.matching.looking asks."""
     parts = [
         MovingPart(int(moment), arrays[f"picture{row}"], (int(corner[0]), int(corner[1])), arrays[f"is_moving{row}"])
         for row, (moment, corner) in enumerate(zip(arrays["moments"], arrays["corners"], strict=True))

@@ -1,7 +1,7 @@
 """Fronto-parallel plane sweep: how badly every plane of every camera matches its neighbours.
 
 Owns source choice, plane spacing and the matching cost. Smoothing and the choice of a depth live in
-engine.cloud.stereo.smoothing. Textbook: Collins 1996 (sweep), Hirschmueller & Scharstein 2009 (costs).
+engine.cloud.stereo.depth.smoothing. Textbook: Collins 1996 (sweep), Hirschmueller & Scharstein 2009 (costs).
 Letters: H W working picture size, D planes, S sources of one camera.
 """
 

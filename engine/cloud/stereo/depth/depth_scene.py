@@ -14,11 +14,11 @@ from engine.camera.depth_range import near_plane
 from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import gains_from_pictures
 from engine.cloud.keeping import Arrays, Keep, do_now
-from engine.cloud.stereo.consistency import Agreement, check_depths
-from engine.cloud.stereo.fill import fill_inverse_depth
-from engine.cloud.stereo.slanted import N_SCANS, refine_slanted
-from engine.cloud.stereo.smoothing import smooth_inverse_depth
-from engine.cloud.stereo.sweep import UNKNOWN_COST, matching_costs, plane_inverse_depths
+from engine.cloud.stereo.depth.consistency import Agreement, check_depths
+from engine.cloud.stereo.depth.fill import fill_inverse_depth
+from engine.cloud.stereo.depth.slanted import N_SCANS, refine_slanted
+from engine.cloud.stereo.depth.smoothing import smooth_inverse_depth
+from engine.cloud.stereo.depth.sweep import UNKNOWN_COST, matching_costs, plane_inverse_depths
 from engine.images.image_filters import block_mean, erode
 from engine.parallel import map_ordered
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.calibration.cameras import Cameras
+from engine.calibration.solving.cameras import Cameras
 
 N_TRIES = 400
 FLOOR_TOLERANCE = 0.015

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.calibration.cameras import Cameras
-from engine.calibration.matching import KeyPoints, Pair, epipolar_px
+from engine.calibration.matching.matching import KeyPoints, Pair, epipolar_px
+from engine.calibration.solving.cameras import Cameras
 
 QUANTILE = 0.9
 """Of the distances of a pair's matches from their epipolar lines."""

@@ -1,0 +1,1 @@
+"""Key points of cameras, and which of them look alike."""

@@ -1,0 +1,1 @@
+"""Cameras from matches: first estimates, adjustment, and what does not fit."""

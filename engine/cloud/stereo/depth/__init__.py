@@ -1,0 +1,1 @@
+"""Depth maps of cameras: swept, slanted, smoothed, and checked by each other."""
