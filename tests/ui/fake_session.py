@@ -19,6 +19,8 @@ from app.export.export_plan import ExportPlan
 from app.export.export_status import ExportStatus
 from app.playback.markers import Markers
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.modes.coverage import Coverage
+from app.playback.modes.trails import Trails
 from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
@@ -39,7 +41,6 @@ from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import changed, edits_status
-from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.editing.selection_status import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
@@ -166,17 +167,6 @@ class FakeSynchronising:
 
 
 @dataclass
-class FakeSelecting:
-    """What the panels read of Selecting."""
-
-    selection: Selection = NOTHING_SELECTED
-
-    def mask(self, gaussians: GaussianArrays) -> np.ndarray:
-        """Nothing of it is selected."""
-        return np.zeros(len(gaussians), np.bool_)
-
-
-@dataclass
 class FakeMending:
     """What the window of mending reads."""
 
@@ -263,7 +253,7 @@ class FakeSession:
             inherited_reasons=np.where(inherited_roles == 2, 2, 255).astype(np.uint8),
             own_reasons=np.full(300, 255, np.uint8),
         )
-        self.selection, self.selecting = SelectionStatus(), FakeSelecting()
+        self.selection = SelectionStatus()
         self.command_texts = CommandTexts(lambda: None, lambda clip_index: False)
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
@@ -553,13 +543,13 @@ class FakeSession:
         """Anchors of trained clips."""
         return self._anchors if self._is_trained() else None
 
-    def shown_coverage(self) -> None:
+    def shown_coverage(self) -> Coverage | None:
         """Nothing is measured here."""
-        return
+        return None
 
-    def shown_trails(self) -> None:
+    def shown_trails(self) -> Trails | None:
         """Nothing moves here."""
-        return
+        return None
 
     def shown_points(self) -> PointArrays:
         """A coloured ball of points."""

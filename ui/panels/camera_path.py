@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
 from app.document.camera_paths import MAX_NAME_CHARACTERS
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import PathsStatus
 from app.session.paths.path_commands import (
     AimCameraKey,
     ChooseCameraPath,
@@ -24,6 +23,7 @@ from app.session.paths.path_commands import (
     SetCameraKeyFov,
     TimeCameraKey,
 )
+from app.session.session_view import SessionView
 from engine.camera.camera_path import CameraPath
 from engine.text import one_line
 from ui.panels.history_buttons import draw_history
@@ -42,20 +42,7 @@ ROWS_BELOW = 4.5
 """What stands below the list of keys, in rows of buttons."""
 
 
-class PathPanelNeeds(Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def paths(self) -> PathsStatus: ...
-
-    @property
-    def history(self) -> HistoryStatus: ...
-
-
-def draw_paths(session: PathPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_paths(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Making paths, the list, the keys of the chosen one, the way back."""
     status = session.paths
     if session.capture is None:

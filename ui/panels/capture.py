@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.views.orbit_view import OrbitView
 from app.session.commands import LookThrough
-from app.session.edit_status import EditsStatus
+from app.session.session_view import CaptureFacts, SessionView
 from engine.camera.rig import CameraRig
-from engine.capture.clip import Clip
 from engine.text import one_line
 from ui.gl.image import ImageTexture
 from ui.panels.editing.labels import draw_label_field, with_label
-from ui.panels.excluding.excluded_drawing import ExcludedNeeds
 from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.timeline.stage import hatch
-from ui.panels.welcome.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.welcome.thumbnails import Thumbnails
 from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -30,44 +26,6 @@ ROW_HEIGHT = 50.0
 PICTURE_SIZE = (64.0, 40.0)
 HELD_OUT_WORDS, EXCLUDED_WORDS = ("held out", "test"), ("excluded", "out")
 """The longest that there is room for."""
-
-
-class CaptureFacts(Protocol):
-    """What the summary shows of a capture."""
-
-    @property
-    def path(self) -> Path: ...
-
-    @property
-    def format(self) -> str: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def n_frames(self) -> int: ...
-
-    @property
-    def fps(self) -> float: ...
-
-
-class CaptureNeeds(ThumbnailNeeds, ExcludedNeeds, Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> CaptureFacts | None: ...
-
-    @property
-    def clips(self) -> Sequence[Clip]: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def holdout(self) -> tuple[int, ...]: ...
-
-    @property
-    def edits(self) -> EditsStatus: ...
 
 
 class CapturePanel:
@@ -92,7 +50,7 @@ class CapturePanel:
         """Free the thumbnails. GL thread only."""
         self._thumbnails.release()
 
-    def draw(self, session: CaptureNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Summary, then one row per camera."""
         capture = session.capture
         if capture is None:
@@ -111,7 +69,7 @@ class CapturePanel:
             self._draw_cameras(capture.rig, session, dispatch, ui)
         imgui.end_child()
 
-    def _draw_summary(self, capture: CaptureFacts, session: CaptureNeeds, ui: UiState) -> None:
+    def _draw_summary(self, capture: CaptureFacts, session: SessionView, ui: UiState) -> None:
         push_bold(ui, ui.fonts.body_size + 1)
         imgui.text(elided(capture.path.name, imgui.get_content_region_avail().x))
         pop_bold(ui)
@@ -124,7 +82,7 @@ class CapturePanel:
         text_wrapped_dim(f"{format_count(len(session.clips))} clips{measured}")
         imgui.spacing()
 
-    def _draw_cameras(self, rig: CameraRig, session: CaptureNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_cameras(self, rig: CameraRig, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         held_out = frozenset(session.holdout)
         shown = session.view.look_through
         self._thumbnails.begin()
@@ -156,7 +114,7 @@ class CapturePanel:
             self._shown_camera = None
 
     def _draw_row(
-        self, session: CaptureNeeds, ui: UiState, row: Rect, index: int, is_held_out: bool, *, is_shown: bool
+        self, session: SessionView, ui: UiState, row: Rect, index: int, is_held_out: bool, *, is_shown: bool
     ) -> bool:
         """Picture, name and size of a camera. Whether its name had to be cut."""
         assert session.capture is not None

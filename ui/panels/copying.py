@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Protocol
 
 from imgui_bundle import imgui
 
 from app.command_text.command_text import CommandText
-from app.session.copying.command_texts import CommandTexts
 from engine.errors import EngineError
 from ui.panels.state import UiState
 from ui.style.theme import Icon
 
 COMMAND, PYTHON = "Copy as command", "Copy as Python"
-
-
-class CopyNeeds(Protocol):
-    """A session that knows commands as text."""
-
-    @property
-    def command_texts(self) -> CommandTexts: ...
 
 
 def copy_command(make: Callable[[], CommandText]) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.export.export_status import ExportStatus
@@ -17,6 +15,7 @@ from app.session.commands import (
     RetryExport,
     ShowExport,
 )
+from app.session.session_view import SessionView
 from engine.text import duration_text, one_line, size_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, elided_path, primary_button, text_wrapped, text_wrapped_dim
@@ -31,23 +30,6 @@ WIDE = 620.0
 """In a panel at least so wide the buttons stand at the end of the first line."""
 BUTTONS_WIDTH = 215.0
 EMPTY = "Exports are listed here: Gaussians, videos, players, figures, cameras."
-
-
-class ExportingFacts(Protocol):
-    """What this panel reads of Exporting."""
-
-    @property
-    def statuses(self) -> tuple[ExportStatus, ...]: ...
-
-
-class ExportsNeeds(Protocol):
-    """A session with one."""
-
-    @property
-    def exporting(self) -> ExportingFacts: ...
-
-    @property
-    def capture(self) -> object | None: ...
 
 
 # ---- words -----------------------------------------------------------------------------------------------------
@@ -114,7 +96,7 @@ def _color(status: ExportStatus) -> Color:
 # ---- the panel -------------------------------------------------------------------------------------------------
 
 
-def draw_exports(session: ExportsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_exports(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The button that asks for an export, and the list."""
     statuses = session.exporting.statuses
     if any(status.state in ("running", "stopping") for status in statuses):

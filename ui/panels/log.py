@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.status import TrainingStatus
+from app.background.log_reader import LogLine
+from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 from ui.style.theme import Icon
@@ -19,31 +19,6 @@ _RANK = {"DEBUG": 0, "INFO": 1, "WARNING": 2, "ERROR": 3, "CRITICAL": 4}
 _MARKS = {"WARNING": Icon.WARNING, "ERROR": Icon.ERROR, "CRITICAL": Icon.ERROR}
 REFRESH_S = 0.5
 """While something trains; it writes its log whenever it likes."""
-
-
-class LogLine(Protocol):
-    """What is shown of a line; see app.background.log_reader."""
-
-    @property
-    def time(self) -> str: ...
-
-    @property
-    def level(self) -> str: ...
-
-    @property
-    def source(self) -> str: ...
-
-    @property
-    def text(self) -> str: ...
-
-
-class LogNeeds(Protocol):
-    """What this panel reads."""
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    def log_lines(self) -> Sequence[LogLine]: ...
 
 
 @dataclass
@@ -84,7 +59,7 @@ class LogPanel:
         self._shown_of: tuple[object, ...] = ()
         self._was_at_end = True
 
-    def draw(self, session: LogNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Filter, buttons, lines."""
         shown = self._filtered(session.log_lines())
         self._draw_tools(shown, ui)

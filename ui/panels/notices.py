@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import DismissNotice
-from app.session.notices import Notice, Notices
+from app.session.notices import Notice
+from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.style import theme
 from ui.style.theme import Icon
@@ -23,13 +23,6 @@ ROOM_BELOW = 34.0
 _ICONS = {"info": Icon.INFO, "warn": Icon.WARNING, "error": Icon.ERROR}
 
 
-class NoticesNeeds(Protocol):
-    """What the toasts read."""
-
-    @property
-    def notices(self) -> Notices: ...
-
-
 def notice_text(notice: Notice) -> str:
     """Everything a notice says, for the clipboard."""
     return "\n".join(part for part in (notice.title, notice.detail, notice.hint) if part)
@@ -41,7 +34,7 @@ class NoticesPanel:
     def __init__(self) -> None:
         self._seen_s: dict[int, float] = {}
 
-    def draw(self, session: NoticesNeeds, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
         """Newest at the bottom, at most MAX_TOASTS, stacked up from the lower right corner of the area."""
         notices = list(session.notices)
         now_s = time.monotonic()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import RemoveRegion
-from app.session.edit_status import HistoryStatus
+from app.session.session_view import SessionView
 from app.status import RegionsStatus
 from engine.gate.regions import GateRegion
 from ui.panels.history_buttons import draw_history
@@ -24,20 +23,7 @@ MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everythin
 ROW_HEIGHT = 44.0
 
 
-class RegionsNeeds(Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def regions(self) -> RegionsStatus: ...
-
-    @property
-    def history(self) -> HistoryStatus: ...
-
-
-def begin_choosing(session: RegionsNeeds, ui: UiState) -> None:
+def begin_choosing(session: SessionView, ui: UiState) -> None:
     """Start choosing a sphere, or switch what it means; where nothing can be marked the panel says why."""
     ui.wanted_panel = REGIONS
     if session.regions.can_mark:
@@ -47,7 +33,7 @@ def begin_choosing(session: RegionsNeeds, ui: UiState) -> None:
         ui.regions.leave()
 
 
-def draw_regions(session: RegionsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_regions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Choosing, the list, the way back, and in which clips all of it takes effect."""
     status = session.regions
     if session.capture is None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
@@ -17,26 +16,27 @@ from pyglet.window import BaseWindow
 from app.session.commands import Command, SetFrameMemory, SetProjectsFolder
 from app.session.projects.preferences import Preferences, PreferencesFile
 from app.session.projects.window_memory import WindowMemory
+from app.session.session_view import WindowSession
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
-from ui.panels.camera_path import PathPanelNeeds, draw_paths
-from ui.panels.capture import CaptureNeeds, CapturePanel
-from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
-from ui.panels.editing.edits_panel import EditsPanelNeeds, draw_edits
+from ui.panels.camera_path import draw_paths
+from ui.panels.capture import CapturePanel
+from ui.panels.doctor.panel import DoctorPanel
+from ui.panels.editing.edits_panel import draw_edits
 from ui.panels.editing.history_panel import HistoryPanel
-from ui.panels.editing.mend_panel import HasMending, draw_mending
-from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
+from ui.panels.editing.mend_panel import draw_mending
+from ui.panels.editing.select_panel import draw_selection
 from ui.panels.exports import draw_exports
 from ui.panels.guard import Guard, draw_failed
-from ui.panels.log import LogNeeds, LogPanel
-from ui.panels.notices import NoticesNeeds, NoticesPanel
+from ui.panels.log import LogPanel
+from ui.panels.notices import NoticesPanel
 from ui.panels.panel_keys import step_panel
 from ui.panels.picture.heat_overlay import HeatOverlay
 from ui.panels.picture.picture_pane import PicturePane
-from ui.panels.picture.viewport import ViewportNeeds, ViewportPanel
+from ui.panels.picture.viewport import ViewportPanel
 from ui.panels.regions import draw_regions
-from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
+from ui.panels.residuals.panel import ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
@@ -56,28 +56,26 @@ from ui.panels.state import (
     Rect,
     UiState,
 )
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training.training import draw_training
 from ui.panels.welcome.recent_rows import RecentRows
 from ui.shell.dialogs.about import AboutDialog
-from ui.shell.dialogs.calibration_dialog import CalibrationDialog, HasCalibrating
+from ui.shell.dialogs.calibration_dialog import CalibrationDialog
 from ui.shell.dialogs.dialogs import OpenFolderDialog, draw_help
-from ui.shell.dialogs.export_dialog import ExportDialog, HasExporting
-from ui.shell.dialogs.opening_dialog import HasOpening, OpeningDialog
-from ui.shell.dialogs.questions import QuestionDialogs, QuestionNeeds
-from ui.shell.dialogs.synchronisation_dialog import HasSynchronising, SynchronisationDialog
+from ui.shell.dialogs.export_dialog import ExportDialog
+from ui.shell.dialogs.opening_dialog import OpeningDialog
+from ui.shell.dialogs.questions import QuestionDialogs
+from ui.shell.dialogs.synchronisation_dialog import SynchronisationDialog
 from ui.shell.finding.palette import Palette
-from ui.shell.finding.palette_entries import PaletteNeeds
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
 from ui.shell.layouts import Layouts
-from ui.shell.menu_bar import MenuNeeds, draw_menu_bar
+from ui.shell.menu_bar import draw_menu_bar
 from ui.shell.preferences import PreferencesDialog
 from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
-from ui.shell.remembering import Remembering, RememberNeeds
+from ui.shell.remembering import Remembering
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
-from ui.shell.status_bar import StatusNeeds, draw_status_bar
+from ui.shell.status_bar import draw_status_bar
 from ui.style import theme
 from ui.style.fonts import load_fonts
 from ui.style.theme_in_use import ThemeInUse
@@ -98,38 +96,6 @@ MAX_TICK_S = 0.25
 NOTHING = ImVec4(0, 0, 0, 0)
 
 
-class FrameNeeds(
-    ViewportNeeds,
-    CaptureNeeds,
-    SelectionPanelNeeds,
-    EditsPanelNeeds,
-    TimelineNeeds,
-    MenuNeeds,
-    PaletteNeeds,
-    HasExporting,
-    StatusNeeds,
-    QuestionNeeds,
-    HasOpening,
-    HasCalibrating,
-    HasSynchronising,
-    HasMending,
-    RememberNeeds,
-    NoticesNeeds,
-    LogNeeds,
-    ResidualsNeeds,
-    DoctorNeeds,
-    PathPanelNeeds,
-    Protocol,
-):
-    """Everything that the window and its panels use of a session."""
-
-    def dispatch(self, command: Command) -> None: ...
-
-    def poll(self) -> bool: ...
-
-    def lead_view(self) -> bool: ...
-
-
 class Frame:
     """Draws the whole window; owns panels and the redraw plan.
 
@@ -148,7 +114,7 @@ class Frame:
         self,
         window: BaseWindow,
         ctx: moderngl.Context,
-        session: FrameNeeds,
+        session: WindowSession,
         *,
         fixed_delta_s: float | None = None,
         on_input: Callable[[], None] = lambda: None,
@@ -204,7 +170,7 @@ class Frame:
         self._is_welcome = self._is_picture_only = False
         self._visible_panels: set[str] = set()
         self._shown_before: set[str] = set()
-        self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
+        self._panels: tuple[tuple[str, Callable[[WindowSession, Dispatch, UiState], None], bool], ...] = (
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),

@@ -5,20 +5,19 @@ depends on what is open, such as recent projects and kept layouts, is added here
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
-from app.status import ProjectStatus
+from app.session.session_view import SessionView
 from engine.text import one_line
-from ui.panels.actions.action import Action, ActionNeeds
+from ui.panels.actions.action import Action
 from ui.panels.actions.menus import Menu, menus
 from ui.panels.actions.window import choose_scale
 from ui.panels.state import Dispatch, UiState
-from ui.panels.training.training import TrainingNeeds, next_label
+from ui.panels.training.training import next_label
 from ui.panels.welcome.recent_rows import open_recent
-from ui.panels.welcome.welcome import SAMPLE_PATH, WelcomeNeeds
+from ui.panels.welcome.welcome import SAMPLE_PATH
 from ui.panels.widgets import elided_path
 from ui.style.theme import Icon
 from ui.style.ui_scale import CHOICES, scale_text
@@ -29,14 +28,7 @@ MIN_PATH_WIDTH = 60.0
 MENUS = menus()
 
 
-class MenuNeeds(ActionNeeds, TrainingNeeds, WelcomeNeeds, Protocol):
-    """What the menus read."""
-
-    @property
-    def project_status(self) -> ProjectStatus | None: ...
-
-
-def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_menu_bar(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """All menus, and the name of what is open at the right end."""
     if not imgui.begin_main_menu_bar():
         return
@@ -63,7 +55,7 @@ def _begin_menu(title: str, ui: UiState) -> bool:
     return is_open
 
 
-def _draw_items(menu: Menu, session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_items(menu: Menu, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The actions of one menu, and what is added behind some of them."""
     for item in menu.items:
         match item:
@@ -84,7 +76,7 @@ def _draw_items(menu: Menu, session: MenuNeeds, dispatch: Dispatch, ui: UiState)
         _draw_scale_menu(ui)
 
 
-def _draw_action(action: Action, session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_action(action: Action, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if action.needs_choosing and not ui.regions.is_active:
         return  # they would be most of their menu, and almost always grey
     why_not = action.why_not(session, ui)
@@ -98,7 +90,7 @@ def _draw_action(action: Action, session: MenuNeeds, dispatch: Dispatch, ui: UiS
         action.run(session, dispatch, ui)
 
 
-def _train_label(session: MenuNeeds) -> str:
+def _train_label(session: SessionView) -> str:
     """What the key for training does at the moment."""
     if session.training.state in ("starting", "preparing", "running"):
         return f"{Icon.PAUSE}  Pause"
@@ -141,7 +133,7 @@ def _draw_scale_menu(ui: UiState) -> None:
     imgui.end_menu()
 
 
-def _draw_layouts(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_layouts(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Layouts that the user has kept: shown by a click, forgotten in a menu of their own."""
     names = list(ui.preferences.layouts)
     if not names:
@@ -165,7 +157,7 @@ def _draw_layouts(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
         ui.mark("menu.Remove a layout")
 
 
-def _draw_recent_menu(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_recent_menu(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if imgui.begin_menu("Open a recent project", bool(session.recent.entries)):
         width = max(imgui.calc_text_size(one_line(entry.name)).x for entry in session.recent.entries)
         for index, entry in enumerate(session.recent.entries):
@@ -190,14 +182,14 @@ def _draw_recent_menu(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> No
         dispatch(OpenCapture(SAMPLE_PATH))
 
 
-_AFTER: dict[str, Callable[[MenuNeeds, Dispatch, UiState], None]] = {
+_AFTER: dict[str, Callable[[SessionView, Dispatch, UiState], None]] = {
     "window.open": _draw_recent_menu,
     "window.save_layout": _draw_layouts,
 }
 """What is added behind an action, by its id."""
 
 
-def _draw_name(session: MenuNeeds, ui: UiState) -> None:
+def _draw_name(session: SessionView, ui: UiState) -> None:
     """What is open: name, how far it is trained and where it lies, as much of it as there is room for."""
     opened = session.project_status
     name = "no project open" if opened is None else f"{one_line(opened.name)} - {opened.trained_text}"

@@ -6,18 +6,15 @@ Written a while after something changed and when the window closes, so that a ki
 from __future__ import annotations
 
 import time
-from typing import Any, Protocol
+from typing import Any
 
 from imgui_bundle import imgui
 
-from app.project.project import Project
-from app.session.commands import ActivateView, Command
-from app.session.edit_status import EditsStatus
+from app.session.commands import ActivateView
 from app.session.editing.edit_commands import PutMarker
-from app.session.notices import Notices
 from app.session.projects.preferences import PreferencesFile
-from app.session.projects.window_memory import Viewed, WindowMemory, markers_of, show_again, view_of
-from ui.panels.capture import CaptureFacts
+from app.session.projects.window_memory import WindowMemory, markers_of, show_again, view_of
+from app.session.session_view import WindowSession
 from ui.panels.state import UiState
 
 SAVE_AFTER_S = 5.0
@@ -42,24 +39,6 @@ def take_layout(text: str) -> bool:
     return True
 
 
-class RememberNeeds(Viewed, Protocol):
-    """What is remembered of a session."""
-
-    @property
-    def capture(self) -> CaptureFacts | None: ...
-
-    @property
-    def project(self) -> Project | None: ...
-
-    @property
-    def notices(self) -> Notices: ...
-
-    @property
-    def edits(self) -> EditsStatus: ...
-
-    def dispatch(self, command: Command) -> None: ...
-
-
 class Remembering:
     """Follows one session in one window. memory, preferences: None keeps nothing, as in most tests."""
 
@@ -74,7 +53,7 @@ class Remembering:
         if self._memory is not None:
             take_layout(self._memory.layout)
 
-    def restore_marks(self, session: RememberNeeds) -> None:
+    def restore_marks(self, session: WindowSession) -> None:
         """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline, and what
         mouse and keys do."""
         if self._memory is None:
@@ -88,7 +67,7 @@ class Remembering:
         if self._memory.mark_opacity is not None:
             session.overlays.mark_opacity = self._memory.mark_opacity
 
-    def follow(self, session: RememberNeeds) -> None:
+    def follow(self, session: WindowSession) -> None:
         """Once per turn of the loop: shows a project that was just opened as it was left, and keeps what changes."""
         memory = self._memory
         is_due = time.perf_counter() - self._saved_s >= SAVE_AFTER_S
@@ -112,14 +91,14 @@ class Remembering:
         elif folder is not None:
             memory.keep_view(folder, view_of(session))
 
-    def _take_over_markers(self, session: RememberNeeds, kept: dict[str, Any]) -> None:
+    def _take_over_markers(self, session: WindowSession, kept: dict[str, Any]) -> None:
         """Markers that an earlier version has kept beside the project become part of it, once."""
         if session.edits.can_edit and not session.timeline.markers:
             gesture = self._ui.timeline.begin_gesture()
             for frame_index, text in markers_of(kept, session.timeline):
                 session.dispatch(PutMarker(frame_index, text, gesture))
 
-    def save(self, session: RememberNeeds) -> None:
+    def save(self, session: WindowSession) -> None:
         """Keep everything now."""
         if self._preferences is not None:
             self._preferences.save()
@@ -128,7 +107,7 @@ class Remembering:
             self._memory.save()
         self._tell(session)
 
-    def _keep(self, session: RememberNeeds) -> None:
+    def _keep(self, session: WindowSession) -> None:
         memory = self._memory
         assert memory is not None
         self._saved_s = time.perf_counter()
@@ -141,7 +120,7 @@ class Remembering:
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
         memory.time_unit, memory.folded_lanes = self._ui.timeline.unit, tuple(sorted(self._ui.timeline.folded))
 
-    def _tell(self, session: RememberNeeds) -> None:
+    def _tell(self, session: WindowSession) -> None:
         """Say once that nothing can be kept, for whatever file it was found out first."""
         failed = next((file for file in (self._preferences, self._memory) if file is not None and file.failure), None)
         if failed is None or self._has_told:
@@ -155,7 +134,7 @@ class Remembering:
         )
 
 
-def _folder_of(session: RememberNeeds) -> str | None:
+def _folder_of(session: WindowSession) -> str | None:
     if session.capture is None:
         return None
     return str(session.capture.path if session.project is None else session.project.folder)

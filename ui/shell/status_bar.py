@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import CancelJob
-from app.session.editing.selection_status import SelectionStatus
-from app.session.notices import Notices
-from app.status import JobStatus, ProjectStatus, QueueStatus, TrainingStatus, UsageStatus
+from app.session.session_view import SessionView
 from engine.text import duration_text
-from ui.panels.exports import ExportingFacts
 from ui.panels.state import Dispatch, UiState
 from ui.panels.training.queue import clips_text, usage_text
 from ui.panels.widgets import draw_job_bar, elided
@@ -26,38 +21,7 @@ HEIGHT = 28.0
 BAR_WIDTH = 90.0
 
 
-class StatusNeeds(Protocol):
-    """What the lowest line reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def jobs(self) -> Sequence[JobStatus]: ...
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    @property
-    def project_status(self) -> ProjectStatus | None: ...
-
-    @property
-    def notices(self) -> Notices: ...
-
-    @property
-    def usage(self) -> UsageStatus: ...
-
-    @property
-    def queue(self) -> QueueStatus: ...
-
-    @property
-    def exporting(self) -> ExportingFacts: ...
-
-    @property
-    def selection(self) -> SelectionStatus: ...
-
-
-def draw_status_bar(session: StatusNeeds, dispatch: Dispatch, ui: UiState, *, is_software: bool) -> None:
+def draw_status_bar(session: SessionView, dispatch: Dispatch, ui: UiState, *, is_software: bool) -> None:
     """Work and its progress on the left; notices and the kind of drawing on the right."""
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_docking
     imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.BACKDROP))
@@ -89,7 +53,7 @@ def draw_status_bar(session: StatusNeeds, dispatch: Dispatch, ui: UiState, *, is
     imgui.pop_style_color(2)
 
 
-def status_text(session: StatusNeeds) -> str:
+def status_text(session: SessionView) -> str:
     """What goes on, in one line."""
     if session.jobs:
         job = session.jobs[0]
@@ -112,7 +76,7 @@ def status_text(session: StatusNeeds) -> str:
     return f"{selected} selected    {trained}" if selected else trained
 
 
-def _exports_text(session: StatusNeeds) -> str:
+def _exports_text(session: SessionView) -> str:
     """How far the export is that runs, and that others wait; empty where none does."""
     left = [status for status in session.exporting.statuses if not status.is_over]
     if not left:
@@ -121,7 +85,7 @@ def _exports_text(session: StatusNeeds) -> str:
     return f"{Icon.DROP} {100 * left[0].done:.0f} %{more}    "
 
 
-def _right_text(session: StatusNeeds, *, is_software: bool) -> str:
+def _right_text(session: SessionView, *, is_software: bool) -> str:
     worst = [notice for notice in session.notices if notice.kind != "info"]
     notices = f"{Icon.WARNING} {len(worst)}    " if worst else ""
     usage = usage_text(session.usage)

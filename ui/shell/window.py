@@ -9,9 +9,8 @@ import logging
 import signal
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import moderngl
 import pyglet
@@ -19,9 +18,10 @@ from pyglet.event import EVENT_HANDLED
 
 from app.session.projects.preferences import PreferencesFile
 from app.session.projects.window_memory import WindowMemory
+from app.session.session_view import WindowSession
 from engine.text import one_line
 from ui.gl import free_dropped
-from ui.shell.frame import Frame, FrameNeeds
+from ui.shell.frame import Frame
 from ui.style.ui_scale import MIN_UNITS, UiScale
 
 logger = logging.getLogger(__name__)
@@ -33,14 +33,6 @@ DEFAULT_SIZE = (1440, 900)
 FRAME_PX, TASK_BAR_PX = 16, 120
 """How much of the screen borders, title bar and task bars take from a maximised window."""
 TITLE = "ClipGStream Studio"
-
-
-class WindowNeeds(FrameNeeds, Protocol):
-    """What a window needs of a session."""
-
-    def close(self) -> None: ...
-
-    def wake_by(self, wake: Callable[[], None]) -> None: ...
 
 
 def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
@@ -77,7 +69,7 @@ def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
     return window
 
 
-def window_title(session: WindowNeeds) -> str:
+def window_title(session: WindowSession) -> str:
     """The open project, how far it is trained and where it lies."""
     opened = session.project_status
     return TITLE if opened is None else one_line(f"{opened.name} - {opened.trained_text} - {opened.folder} - {TITLE}")
@@ -107,7 +99,7 @@ class StudioWindow:
 
     def __init__(
         self,
-        session: WindowNeeds,
+        session: WindowSession,
         *,
         width: int | None = None,
         height: int | None = None,

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
 from app.playback.modes.arrays import GaussianArrays
 from app.playback.modes.color_maps import mapped
-from app.playback.views.orbit_view import OrbitView
 from app.residuals.anchor_heat import AnchorHeat
-from app.status import Overlays
+from app.session.session_view import SessionView
 from ui.gl import PointRenderer, Target
 from ui.viewport.occlusion import OcclusionMap
 
@@ -27,24 +26,12 @@ FAINT_SHARE = 0.06
 """Least opacity, of an anchor without any residual: what is hot has to stand out."""
 
 
-class AnchorHeatNeeds(Protocol):
-    """What the points are made from."""
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    def anchor_heat(self, column: str) -> AnchorHeat | None: ...
-
-
 def anchor_column(kind: str) -> str:
     """The residual of anchors that stands for a heat map: excess flicker where that compares frames, else the error."""
     return "E" if kind in ("R", "G", "E", "clips") else "error"
 
 
-def shown_anchor_heat(session: AnchorHeatNeeds) -> AnchorHeat | None:
+def shown_anchor_heat(session: SessionView) -> AnchorHeat | None:
     """What is to be shown; None where no heat map is chosen, a camera is looked through, or nothing is there yet."""
     if not session.overlays.heat or session.view.look_through is not None:
         return None
@@ -86,7 +73,7 @@ class AnchorHeatLayer:
         """Is there nothing to draw?"""
         return not self._is_shown
 
-    def take(self, session: AnchorHeatNeeds, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
+    def take(self, session: SessionView, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
         """Take up the anchors' residuals; asks for what is missing.
 
         Args:

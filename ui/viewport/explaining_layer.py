@@ -5,7 +5,7 @@ them, and the trails of what moves.
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from app.playback.modes.color_maps import SIGNED, mapped
 from app.playback.modes.coverage import Coverage
 from app.playback.modes.trails import Trails
-from app.status import Overlays
+from app.session.session_view import SessionView
 from ui.gl import LineRenderer, PointRenderer, Target
 from ui.style.colors import ROLE_COLORS
 from ui.viewport.anchor_marks import thinned
@@ -30,17 +30,6 @@ DISTANCE_SIZE = 5.5
 """Of a mark in the colour of its distance, units."""
 TRAIL_WIDTH = 1.6
 """Units."""
-
-
-class ExplainingNeeds(Protocol):
-    """What it is drawn from."""
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    def shown_coverage(self) -> Coverage | None: ...
-
-    def shown_trails(self) -> Trails | None: ...
 
 
 class ExplainingLayer:
@@ -66,7 +55,7 @@ class ExplainingLayer:
         """Is there nothing to draw?"""
         return self.coverage is None and self._trails is None
 
-    def take(self, session: ExplainingNeeds, view: SceneView) -> Hashable:
+    def take(self, session: SessionView, view: SceneView) -> Hashable:
         """Take up what belongs to the session's frame; gives a key that differs whenever what is drawn does."""
         overlays = session.overlays
         self.coverage = session.shown_coverage() if overlays.show_coverage else None

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays
 from app.playback.picture_source import UNKNOWN, PictureSource
-from app.playback.views.orbit_view import OrbitView
-from app.status import Overlays
-from engine.camera.rig import CameraRig
+from app.session.session_view import SessionView
 from ui.gl import (
     INHERITED_ANCHOR_COLOR,
     NEAR,
@@ -48,24 +46,6 @@ POINTED_SHARE = 2.2
 REACH = 6.0
 """A pyramid whose lines are this near to the pointer is the one that is meant; units."""
 POINTED_COLOR = (1.0, 1.0, 1.0, 1.0)
-
-
-class MarkNeeds(Protocol):
-    """What marks are drawn from."""
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def holdout(self) -> tuple[int, ...]: ...
-
-    def shown_anchors(self) -> AnchorArrays | None: ...
 
 
 @dataclass(frozen=True)
@@ -113,14 +93,14 @@ class MarkLayer:
         for thing in (self._frusta, self._inherited, self._residual, self._pointed):
             thing.release()
 
-    def is_empty(self, session: MarkNeeds) -> bool:
+    def is_empty(self, session: SessionView) -> bool:
         """Is there nothing to draw?"""
         overlays = session.overlays
         has_frusta = overlays.show_frusta and session.view.look_through is None
         has_inherited = overlays.show_inherited and self.counts.n_inherited > 0
         return not (has_frusta or has_inherited or (overlays.show_residual and self.counts.n_residual > 0))
 
-    def take(self, session: MarkNeeds, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
+    def take(self, session: SessionView, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
         """Take up the marks of the session's frame.
 
         Args:
@@ -155,7 +135,7 @@ class MarkLayer:
         pointed = None if self.pointed_anchor is None else self.pointed_anchor.tobytes()
         return (*common, anchors.key, behind if any(shown) else None, *shown, self._look(session), pointed)
 
-    def _look(self, session: MarkNeeds) -> tuple[float, float]:
+    def _look(self, session: SessionView) -> tuple[float, float]:
         return float(session.overlays.mark_size), float(session.overlays.mark_opacity)
 
     def _colors(self, marks: AnchorMarks, view: SceneView, gaussians: GaussianArrays | None) -> np.ndarray:
@@ -186,7 +166,7 @@ class MarkLayer:
             second.counts,
         )
 
-    def draw(self, target: Target, view: SceneView, session: MarkNeeds) -> None:
+    def draw(self, target: Target, view: SceneView, session: SessionView) -> None:
         """Draw over what the target holds."""
         overlays, unit = session.overlays, self.pixels_per_unit
         size, opacity = self._look(session)
@@ -209,7 +189,7 @@ class MarkLayer:
     # ---- the pointer -----------------------------------------------------------------------------------------
 
     def anchor_under(
-        self, session: MarkNeeds, view: SceneView, x: float, y: float, near: float
+        self, session: SessionView, view: SceneView, x: float, y: float, near: float
     ) -> tuple[AnchorMarks, int] | None:
         """Marks and row of the anchor under a pixel of the view; None where none is shown."""
         if self._marks is None:
@@ -221,7 +201,7 @@ class MarkLayer:
                 return marks, row
         return None
 
-    def camera_under(self, session: MarkNeeds, view: SceneView, x: float, y: float) -> int | None:
+    def camera_under(self, session: SessionView, view: SceneView, x: float, y: float) -> int | None:
         """The camera whose pyramid lies under a pixel of the view; None where none is shown."""
         if not session.overlays.show_frusta or session.view.look_through is not None:
             return None

@@ -5,17 +5,13 @@ renderers; GL thread only. Knows no ImGui.
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
-from app.playback.timeline import Timeline
-from app.playback.views.views import Views
-from app.session.edit_status import PathsStatus
-from app.status import Overlays
+from app.session.session_view import SessionView
 from engine.camera.camera_path import CameraKey, CameraPath
-from engine.camera.rig import CameraRig
 from ui.gl import NEAR, LineRenderer, PointRenderer, Target
 from ui.style.colors import CHOSEN, PATH, Color
 from ui.viewport.frusta import frustum_size
@@ -35,25 +31,6 @@ PYRAMID_SHARE, HERE_SHARE = 0.7, 0.6
 DARK = np.array([0.03, 0.04, 0.05, 1.0], np.float32)
 HERE: Color = (1.0, 1.0, 1.0, 1.0)
 """The camera at the playhead."""
-
-
-class PathNeeds(Protocol):
-    """What the path is drawn from."""
-
-    @property
-    def paths(self) -> PathsStatus: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def views(self) -> Views: ...
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def timeline(self) -> Timeline: ...
 
 
 class PathLayer:
@@ -78,7 +55,7 @@ class PathLayer:
         for thing in (self._halo, self._lines, self._here, self._points, self._chosen):
             thing.release()
 
-    def shown_path(self, session: PathNeeds) -> CameraPath | None:
+    def shown_path(self, session: SessionView) -> CameraPath | None:
         """The path that is drawn; None where there is none to be seen."""
         status = session.paths
         path = status.path
@@ -87,11 +64,11 @@ class PathLayer:
             return None
         return path
 
-    def is_empty(self, session: PathNeeds) -> bool:
+    def is_empty(self, session: SessionView) -> bool:
         """Is there nothing to draw?"""
         return self.shown_path(session) is None
 
-    def take(self, session: PathNeeds) -> Hashable:
+    def take(self, session: SessionView) -> Hashable:
         """Take up what is to be drawn. Returns a key that differs whenever that does."""
         path = self.shown_path(session)
         if path is None:
@@ -109,7 +86,7 @@ class PathLayer:
             self._here.set(*key_pyramids((here,), size, color=HERE))
         return (*key, self._held_here, self.pixels_per_unit)
 
-    def _set(self, path: CameraPath, session: PathNeeds, standing_out: int | None) -> None:
+    def _set(self, path: CameraPath, session: SessionView, standing_out: int | None) -> None:
         line = path_line(path)
         pyramids, colors = key_pyramids(path.keys, PYRAMID_SHARE * frustum_size(session.rig), chosen=standing_out)
         vertices = np.concatenate([line, pyramids])
@@ -121,7 +98,7 @@ class PathLayer:
         chosen = centers[:0] if standing_out is None else centers[standing_out : standing_out + 1]
         self._chosen.set(chosen, np.array(CHOSEN, np.float32))
 
-    def key_under(self, session: PathNeeds, view: SceneView, x: float, y: float) -> int | None:
+    def key_under(self, session: SessionView, view: SceneView, x: float, y: float) -> int | None:
         """Number of the key under a pixel of the view; None where none is shown."""
         path, unit = self.shown_path(session), self.pixels_per_unit
         if path is None:
@@ -130,7 +107,7 @@ class PathLayer:
             path.keys, view.world_to_camera, view.K, x, y, near=max(NEAR, view.near), reach_px=REACH * unit
         )
 
-    def draw(self, target: Target, view: SceneView, session: PathNeeds) -> None:
+    def draw(self, target: Target, view: SceneView, session: SessionView) -> None:
         """Draw over what the target holds."""
         if self.is_empty(session):
             return

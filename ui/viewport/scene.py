@@ -10,19 +10,18 @@ from __future__ import annotations
 import time
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 import moderngl
 import numpy as np
 
-from app.playback.modes.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
+from app.playback.modes.arrays import BACKGROUND, GaussianArrays
 from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.picture_source import PictureSource
 from app.playback.prefetch_order import Course
-from app.playback.timeline import Timeline
 from app.playback.views.pointing import pixel_ray, seen_point
+from app.session.session_view import SessionView
 from app.status import CAPTURED as CAPTURED_PICTURE
-from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from engine.editing.selection.seen_from import SeenFrom
 from ui.gl import (
@@ -33,13 +32,13 @@ from ui.gl import (
     Target,
     is_software,
 )
-from ui.viewport.anchor_heat_layer import AnchorHeatLayer, AnchorHeatNeeds
+from ui.viewport.anchor_heat_layer import AnchorHeatLayer
 from ui.viewport.anchor_marks import nearest_under
-from ui.viewport.editing.selection_layer import SelectionLayer, SelectionNeeds
-from ui.viewport.explaining_layer import ExplainingLayer, ExplainingNeeds
+from ui.viewport.editing.selection_layer import SelectionLayer
+from ui.viewport.explaining_layer import ExplainingLayer
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
-from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
-from ui.viewport.path_layer import PathLayer, PathNeeds
+from ui.viewport.mark_layer import AnchorCounts, MarkLayer
+from ui.viewport.path_layer import PathLayer
 from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
 from ui.viewport.region_layer import RegionLayer, ShownRegions
 
@@ -49,30 +48,6 @@ HINT_NEAR_SHARE = 0.4
 """Pictures in space nearer than this share of the way to the pivot are left out."""
 _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
-
-
-class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, PathNeeds, SelectionNeeds, Protocol):
-    """What the picture is made from."""
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-    @property
-    def regions(self) -> RegionsStatus: ...
-
-    def wanted_frame(self) -> WantedFrame | None: ...
-
-    def shown_gaussians(self) -> GaussianArrays | None: ...
-
-    def shown_points(self) -> PointArrays | None: ...
-
-    def request_render(
-        self, width: int, height: int, *, full_size: tuple[int, int] | None = None
-    ) -> Picture | None: ...
-
-    def compared_picture(self, camera_index: int, max_width: int) -> Picture | None: ...
-
-    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None: ...
 
 
 @dataclass(frozen=True)
@@ -204,7 +179,7 @@ class Scene:
 
     # ---- what arrived ----------------------------------------------------------------------------------------
 
-    def has_news(self, session: SceneNeeds) -> bool:
+    def has_news(self, session: SessionView) -> bool:
         """Did a picture arrive since the last compose? Asks again for what was asked last."""
         if self._asked_sizes is not None:
             size, full_size = self._asked_sizes
@@ -224,7 +199,7 @@ class Scene:
 
     # ---- the picture -----------------------------------------------------------------------------------------
 
-    def compose(self, session: SceneNeeds, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
+    def compose(self, session: SessionView, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
         """Draw what belongs to the session's frame from this view, unless it is drawn already."""
         self._target.resize(view.width, view.height)
         is_cloud_chosen = bool(session.overlays.show_cloud)
@@ -282,13 +257,13 @@ class Scene:
             self.shown = shown = replace(shown, is_on_its_way=True)
         return Composed(self._target.texture, shown)
 
-    def _has_no_marks(self, session: SceneNeeds, regions: ShownRegions) -> bool:
+    def _has_no_marks(self, session: SessionView, regions: ShownRegions) -> bool:
         """Is nothing to be drawn over the picture?"""
         are_empty = regions.is_empty and self.explaining.is_empty and self._anchor_heat.is_empty
         are_empty &= self.selection.is_empty
         return are_empty and self.marks.is_empty(session) and self.path.is_empty(session)
 
-    def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
+    def captured(self, session: SessionView, width_px: int) -> CapturedPicture | None:
         """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
         until anything was."""
         camera_index = session.view.look_through
@@ -307,7 +282,7 @@ class Scene:
             self._captured.texture, source.frame_index, picture.is_stale, has_scene_colors=source.has_scene_colors
         )
 
-    def other(self, session: SceneNeeds, view: SceneView) -> CapturedPicture | None:
+    def other(self, session: SessionView, view: SceneView) -> CapturedPicture | None:
         """What the rendered picture is compared with: see `captured`, or the same frame in another mode."""
         self._asked_other = None
         if session.overlays.compare_with == CAPTURED_PICTURE:
@@ -344,7 +319,9 @@ class Scene:
             )
         return shown
 
-    def _take_picture(self, session: SceneNeeds, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
+    def _take_picture(
+        self, session: SessionView, view: SceneView, shown: ShownPicture
+    ) -> tuple[Hashable, ShownPicture]:
         full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
         full_size = picture_size(view.width, view.height, full)
         timeline, now_s = session.timeline, time.perf_counter()
@@ -374,7 +351,7 @@ class Scene:
         )
 
     def _take_gaussians(
-        self, session: SceneNeeds, view: SceneView, shown: ShownPicture
+        self, session: SessionView, view: SceneView, shown: ShownPicture
     ) -> tuple[Hashable, ShownPicture]:
         gaussians, wanted = session.shown_gaussians(), session.wanted_frame()
         if gaussians is None:
@@ -394,7 +371,7 @@ class Scene:
         is_current = wanted is None or (shown.is_of(wanted) and shown.source.revision == wanted.revision)
         return gaussians.key, replace(shown, is_on_its_way=not is_current)
 
-    def _take_points(self, session: SceneNeeds) -> Hashable:
+    def _take_points(self, session: SessionView) -> Hashable:
         cloud = session.shown_points()
         if cloud is None:
             return None
@@ -422,7 +399,7 @@ class Scene:
         value = float(self._values[int(y * height), int(x * width)])
         return None if np.isnan(value) else value
 
-    def anchor_text(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> str:
+    def anchor_text(self, session: SessionView, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
         out from the next frame on."""
         found = self.marks.anchor_under(session, view, x, y, max(self._near, view.near))
@@ -430,7 +407,7 @@ class Scene:
         self.marks.pointed_anchor = found[0].positions[found[1]] if found is not None and text else None
         return text
 
-    def point_under(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> np.ndarray | None:
+    def point_under(self, session: SessionView, view: SceneView, x: float, y: float) -> np.ndarray | None:
         """The place under a pixel of the view: of the anchor there if anchors are shown, else of what one sees there;
         None where there is nothing. Scene units. [3]"""
         near = max(self._near, view.near)
@@ -448,7 +425,7 @@ class Scene:
         return None
 
     def _draw(
-        self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: SceneNeeds
+        self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: SessionView
     ) -> None:
         camera = (view.world_to_camera, view.K, view.width, view.height)
         target = self._target

@@ -254,6 +254,7 @@ class Selecting:
             self._before is not None,
             gaussians is not None and gaussians.rows is not None,
             self._revision,
+            self.selection.counts,
         )
 
     def spread(self, attribute: str) -> Spread | None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from engine.editing.gaussian_rows import RowSet
+
 
 @dataclass(frozen=True, slots=True)
 class SelectionStatus:
@@ -16,6 +18,7 @@ class SelectionStatus:
         has_before: Whether there is a selection to go back to.
         can_select: Whether there are Gaussians to select.
         revision: Differs whenever the selection does.
+        counts: Anchor sets, and how many Gaussians of each are selected.
     """
 
     words: str = ""
@@ -25,3 +28,4 @@ class SelectionStatus:
     has_before: bool = False
     can_select: bool = False
     revision: int = 0
+    counts: tuple[tuple[RowSet, int], ...] = ()

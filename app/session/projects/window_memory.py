@@ -11,14 +11,15 @@ import math
 import threading
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from app.document.project_document import MAX_TEXT_CHARACTERS
 from app.playback.timeline import SPEEDS, Timeline
-from app.playback.views.bookmarks import Bookmarks, read_bookmarks
+from app.playback.views.bookmarks import read_bookmarks
 from app.playback.views.orbit_view import OrbitView
 from app.playback.views.view_place import ViewPlace
-from app.playback.views.views import COUNTS, Views
+from app.playback.views.views import COUNTS
+from app.session.session_view import SessionView
 from app.status import COMPARE_MODES, OVERLAY_NAMES, Overlays
 from engine.errors import EngineError
 from engine.storage.json_files import read_checked_json, write_checked_json
@@ -154,26 +155,7 @@ def read_window_memory(path: Path | None = None) -> WindowMemory:
     return memory
 
 
-class Viewed(Protocol):
-    """What is remembered of a session, and given back to it."""
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-    @property
-    def views(self) -> Views: ...
-
-    @property
-    def bookmarks(self) -> Bookmarks: ...
-
-
-def view_of(session: Viewed) -> dict[str, Any]:
+def view_of(session: SessionView) -> dict[str, Any]:
     """Frame, views and overlays of the open capture, as plain values. Those of the active view stand by themselves."""
     looks = session.views.shown
     return {
@@ -196,7 +178,7 @@ def _look_of(view: OrbitView, overlays: Overlays) -> dict[str, Any]:
     }
 
 
-def show_again(session: Viewed, kept: dict[str, Any]) -> None:
+def show_again(session: SessionView, kept: dict[str, Any]) -> None:
     """Go back to what `view_of` has kept. What makes no sense for this capture stays as it is."""
     timeline = session.timeline
     frame_index = _number(kept.get("frame_index"), 0, timeline.last_frame)

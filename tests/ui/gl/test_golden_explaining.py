@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import moderngl
 import numpy as np
 import pytest
 
 from app.playback.modes.coverage import Coverage
 from app.playback.modes.trails import Trails, trail_lines
-from app.status import Overlays
 from tests.golden_images import assert_matches_golden
+from tests.ui.fake_session import FakeSession
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.pixels import read_resolved
 from tests.ui.gl.scenes import make_camera
@@ -26,11 +24,13 @@ BACKGROUND = (0.07, 0.08, 0.09)
 SIZE = (192, 128)
 
 
-class Explained:
+class Explained(FakeSession):
     """A session with a row of spheres, residual anchors around them, and Gaussians that turn around the middle."""
 
-    def __init__(self, **overlays: Any) -> None:
-        self.overlays = Overlays(**overlays)
+    def __init__(self, **overlays: bool) -> None:
+        super().__init__(has_capture=False)
+        for name, value in overlays.items():
+            setattr(self.overlays, name, value)
         centers = np.stack([np.linspace(-0.8, 0.8, 7), np.zeros(7), np.zeros(7)], axis=1)
         points = np.random.default_rng(5).uniform(-0.7, 0.7, (40, 3))
         radii = np.linspace(0.1, 0.25, 7)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 
-import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
@@ -24,7 +23,6 @@ from app.session.editing.edit_commands import (
     SetScale,
     SetUp,
 )
-from app.session.editing.selection import Selection
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.actions import Delete, Expose, Hide, Smooth
 from engine.editing.edit import Box, Scope, Sphere
@@ -111,8 +109,9 @@ def test_an_edit_that_cannot_act_is_not_offered_and_says_why(panel: Pilot) -> No
     clips = (ClipAnchors(0, 0, 10, "a"), ClipAnchors(1, 10, 20, "b", "a"))
     panel.session.edits = dataclasses.replace(panel.session.edits, clips=clips)
     own = RowSet("b", 1, "residual")
-    panel.session.selecting.selection = Selection(((own, np.arange(3)),))
-    panel.session.selection = SelectionStatus(n_gaussians=3, n_shown=3, words="3 Gaussians", can_select=True)
+    panel.session.selection = SelectionStatus(
+        n_gaussians=3, n_shown=3, words="3 Gaussians", can_select=True, counts=((own, 3),)
+    )
     panel.draw(2)
     assert "edits.note" in panel.rects, "it ends at the borders of its clip"
     panel.session.timeline.seek(12)

@@ -21,7 +21,7 @@ def session(*selected: int) -> Any:
     return SimpleNamespace(
         shown_gaussians=lambda: SimpleNamespace(means=MEANS, rows=()),
         selection=SimpleNamespace(n_gaussians=len(selected)),
-        selecting=SimpleNamespace(mask=lambda gaussians: mask),
+        selected=lambda gaussians: mask,
     )
 
 

@@ -4,23 +4,11 @@ rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
-from app.playback.modes.arrays import AnchorArrays, GaussianArrays
-from app.playback.timeline import Timeline
-from app.playback.views.bookmarks import Bookmarks
-from app.playback.views.orbit_view import OrbitView
-from app.playback.views.views import Views
-from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
-from app.session.editing.selection_status import SelectionStatus
-from app.status import ClipStatus, Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
-from engine.camera.rig import CameraRig
-from engine.capture.exclusions import Exclusions
-from ui.panels.editing.edit_subject import Selects
-from ui.panels.editing.mend_panel import HasMending, is_asking_to_mend
-from ui.panels.regions import RegionsNeeds
+from app.session.session_view import SessionView
+from ui.panels.editing.mend_panel import is_asking_to_mend
 from ui.panels.state import Dispatch, UiState
 
 TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
@@ -29,64 +17,7 @@ SELECT, EDIT = "Select", "Edit"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
-class ActionNeeds(RegionsNeeds, HasMending, Protocol):
-    """What actions act on."""
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def views(self) -> Views: ...
-
-    @property
-    def bookmarks(self) -> Bookmarks: ...
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def paths(self) -> PathsStatus: ...
-
-    @property
-    def history(self) -> HistoryStatus: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    @property
-    def clip_states(self) -> Sequence[ClipStatus]: ...
-
-    @property
-    def queue(self) -> QueueStatus: ...
-
-    @property
-    def selection(self) -> SelectionStatus: ...
-
-    @property
-    def selecting(self) -> Selects: ...
-
-    @property
-    def edits(self) -> EditsStatus: ...
-
-    def shown_anchors(self) -> AnchorArrays | None: ...
-
-    @property
-    def exclusions(self) -> Exclusions: ...
-
-    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
-
-    def shown_gaussians(self) -> GaussianArrays | None: ...
-
-    def wanted_frame(self) -> WantedFrame | None: ...
-
-
-Run = Callable[[ActionNeeds, Dispatch, UiState], None]
+Run = Callable[[SessionView, Dispatch, UiState], None]
 
 
 @dataclass(frozen=True)
@@ -123,16 +54,16 @@ class Action:
     moves_keys: bool = False
     repeats: bool = False
     needs_edit: bool = False
-    is_on: Callable[[ActionNeeds], bool] | None = None
-    lacks: Callable[[ActionNeeds], str] | None = None
+    is_on: Callable[[SessionView], bool] | None = None
+    lacks: Callable[[SessionView], str] | None = None
     menu: str = ""
     is_in_help: bool = True
 
-    def is_offered(self, session: ActionNeeds, ui: UiState) -> bool:
+    def is_offered(self, session: SessionView, ui: UiState) -> bool:
         """Whether it can be run now."""
         return not self.why_not(session, ui)
 
-    def why_not(self, session: ActionNeeds, ui: UiState) -> str:
+    def why_not(self, session: SessionView, ui: UiState) -> str:
         """Why it cannot be run now, as a sentence; empty when it can."""
         if self.needs_capture and session.capture is None:
             return "Open a capture or a project first."

@@ -7,11 +7,12 @@ from collections.abc import Callable
 from app.playback.views.bookmarks import NUMBERS, Bookmark
 from app.playback.views.view_place import ViewPlace
 from app.session.commands import SetFrame
-from ui.panels.actions.action import BOOKMARKS, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import BOOKMARKS, Action, Run
 from ui.panels.state import Dispatch, UiState
 
 
-def go_to_bookmark(session: ActionNeeds, dispatch: Dispatch, bookmark: Bookmark) -> None:
+def go_to_bookmark(session: SessionView, dispatch: Dispatch, bookmark: Bookmark) -> None:
     """Look from there, at its frame if it has one that the capture has."""
     bookmark.place.show(session.view)
     if bookmark.frame_index is not None and bookmark.frame_index <= session.timeline.last_frame:
@@ -19,7 +20,7 @@ def go_to_bookmark(session: ActionNeeds, dispatch: Dispatch, bookmark: Bookmark)
 
 
 def _go(number: int) -> Run:
-    def go(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def go(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         bookmark = session.bookmarks.numbered(number)
         if bookmark is not None:
             go_to_bookmark(session, dispatch, bookmark)
@@ -27,19 +28,19 @@ def _go(number: int) -> Run:
     return go
 
 
-def _no_bookmark(number: int) -> Callable[[ActionNeeds], str]:
+def _no_bookmark(number: int) -> Callable[[SessionView], str]:
     why_not = f"There is no bookmark {number} yet."
     return lambda session: "" if session.bookmarks.numbered(number) is not None else why_not
 
 
 def _keep(number: int) -> Run:
-    def keep(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def keep(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         session.bookmarks.set_numbered(number, ViewPlace.of(session.view))
 
     return keep
 
 
-def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _open(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_view_popup_wanted = True
 
 

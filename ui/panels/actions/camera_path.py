@@ -20,21 +20,22 @@ from app.session.paths.path_commands import (
     TimeCameraKey,
 )
 from app.session.paths.path_edits import key_at
+from app.session.session_view import SessionView
 from engine.camera.camera_path import CameraPath
-from ui.panels.actions.action import PATH, Action, ActionNeeds, Run
+from ui.panels.actions.action import PATH, Action, Run
 from ui.panels.picture.key_grip import choose_key
 from ui.panels.state import PATHS, Dispatch, UiState
 from ui.viewport.path_tool import nudged
 
 
-def begin_path(session: ActionNeeds, dispatch: Dispatch, ui: UiState, command: PathCommand) -> None:
+def begin_path(session: SessionView, dispatch: Dispatch, ui: UiState, command: PathCommand) -> None:
     """Make a path, or add to it, with the panel in front; where nothing can be changed the panel says why."""
     ui.wanted_panel = PATHS
     if session.paths.can_edit:
         dispatch(command)
 
 
-def nudge_key(session: ActionNeeds, dispatch: Dispatch, ui: UiState, direction: tuple[float, float, float]) -> None:
+def nudge_key(session: SessionView, dispatch: Dispatch, ui: UiState, direction: tuple[float, float, float]) -> None:
     """Move the chosen key by a step along the axes of the view: to the right, down, forward."""
     status, pose = session.paths, session.view.shown_pose
     if status.key is not None and status.chosen_key is not None and status.can_edit:
@@ -52,30 +53,30 @@ def nudge_key(session: ActionNeeds, dispatch: Dispatch, ui: UiState, direction: 
 
 
 def _make(make: Callable[[], PathCommand]) -> Run:
-    def run(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def run(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         begin_path(session, dispatch, ui, make())
 
     return run
 
 
-def _set_key(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _set_key(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     begin_path(session, dispatch, ui, SetCameraKey())
 
 
-def _along(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _along(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(LookAlongPath(not session.paths.is_along))
 
 
-def _close(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _close(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.paths.path is not None:
         dispatch(CloseCameraPath(not session.paths.path.is_closed))
 
 
-def _delete(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _delete(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     begin_path(session, dispatch, ui, DeleteCameraPath())
 
 
-def _next_path(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _next_path(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     status = session.paths
     ui.wanted_panel = PATHS
     if status.chosen is not None:
@@ -83,7 +84,7 @@ def _next_path(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _key_by(step: int) -> Run:
-    def go(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def go(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         path = session.paths.path
         if path is not None and path.keys:
             choose_key(dispatch, ui, key_beside(path, session.timeline.frame_index, step), is_going=True)
@@ -101,7 +102,7 @@ def key_beside(path: CameraPath, frame_index: int, step: int) -> int:
 
 
 def _time_by(step: int) -> Run:
-    def move(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def move(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         status = session.paths
         if status.key is not None and status.chosen_key is not None and status.can_edit:
             dispatch(TimeCameraKey(status.chosen_key, status.key.frame + step, ui.paths.press_gesture()))
@@ -109,33 +110,33 @@ def _time_by(step: int) -> Run:
     return move
 
 
-def _aim(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _aim(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.paths.chosen_key is not None:
         dispatch(AimCameraKey(session.paths.chosen_key))
 
 
-def _cannot_edit(session: ActionNeeds) -> str:
+def _cannot_edit(session: SessionView) -> str:
     return "" if session.paths.can_edit else session.paths.why_not or "Camera paths cannot be changed now."
 
 
-def _no_path(session: ActionNeeds) -> str:
+def _no_path(session: SessionView) -> str:
     return "There is no camera path yet." if session.paths.path is None else ""
 
 
-def _no_keys(session: ActionNeeds) -> str:
+def _no_keys(session: SessionView) -> str:
     path = session.paths.path
     return _no_path(session) or ("The camera path has no keys yet." if path is None or not path.keys else "")
 
 
-def _cannot_edit_path(session: ActionNeeds) -> str:
+def _cannot_edit_path(session: SessionView) -> str:
     return _cannot_edit(session) or _no_path(session)
 
 
-def _cannot_edit_key(session: ActionNeeds) -> str:
+def _cannot_edit_key(session: SessionView) -> str:
     return _cannot_edit(session) or ("No key of a camera path is chosen." if session.paths.key is None else "")
 
 
-def _is_loop(session: ActionNeeds) -> bool:
+def _is_loop(session: SessionView) -> bool:
     return session.paths.path is not None and session.paths.path.is_closed
 
 

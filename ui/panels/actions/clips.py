@@ -11,12 +11,13 @@ from app.session.clips.clip_commands import (
     SplitClip,
     TrainStale,
 )
-from ui.panels.actions.action import TRAIN, Action, ActionNeeds
+from app.session.session_view import SessionView
+from ui.panels.actions.action import TRAIN, Action
 from ui.panels.clips.comparing import compared_version, next_version
 from ui.panels.state import Dispatch, UiState
 
 
-def _compare_version(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _compare_version(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The newest version first, an older one with every press, and none after the oldest."""
     clip = session.timeline.clip
     if clip is None:
@@ -27,60 +28,60 @@ def _compare_version(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> N
         dispatch(CompareVersion(clip.clip_index, number))
 
 
-def _no_version(session: ActionNeeds) -> str:
+def _no_version(session: SessionView) -> str:
     clip = session.timeline.clip
     has_one = clip is not None and bool(session.clip_versions(clip.clip_index))
     is_shown = compared_version(session.overlays) is not None
     return "" if has_one or is_shown else "The clip under the playhead has no earlier version."
 
 
-def _train_stale(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _train_stale(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(TrainStale())
 
 
-def _nothing_stale(session: ActionNeeds) -> str:
+def _nothing_stale(session: SessionView) -> str:
     return "No clip is out of date." if session.queue.stale is None else ""
 
 
-def _split(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _split(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SplitClip(session.timeline.frame_index))
 
 
-def _cannot_split(session: ActionNeeds) -> str:
+def _cannot_split(session: SessionView) -> str:
     clip = session.timeline.clip
     if clip is None or session.timeline.frame_index == clip.start:
         return "Move the playhead behind the first frame of a clip."
     return _something_trains(session)
 
 
-def _merge(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _merge(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     clip = session.timeline.clip
     if clip is not None:
         dispatch(MergeClips(clip.clip_index))
 
 
-def _cannot_merge(session: ActionNeeds) -> str:
+def _cannot_merge(session: SessionView) -> str:
     clip = session.timeline.clip
     if clip is None or clip.stop >= session.timeline.n_frames:
         return "There is no clip after the one under the playhead."
     return _something_trains(session)
 
 
-def _make_reference(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _make_reference(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     clip = session.timeline.clip
     if clip is not None:
         dispatch(SetReferenceClip(clip.clip_index))
 
 
-def _something_trains(session: ActionNeeds) -> str:
+def _something_trains(session: SessionView) -> str:
     return "" if session.training.state in ("idle", "failed") else "Stop the training first: what was learned is kept."
 
 
-def _free_versions(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _free_versions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(AskFreeSpace("versions"))
 
 
-def _apply_deletions(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _apply_deletions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(ApplyDeletions())
 
 

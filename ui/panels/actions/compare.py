@@ -7,8 +7,9 @@ from typing import Any
 
 from app.playback.modes.view_modes import MODES
 from app.session.commands import LookThrough, SetCompare, SetCompareWith, ToggleOverlay
+from app.session.session_view import SessionView
 from app.status import CAPTURED, COMPARE_MODES
-from ui.panels.actions.action import COMPARE, Action, ActionNeeds, Run
+from ui.panels.actions.action import COMPARE, Action, Run
 from ui.panels.actions.view import nearest_camera
 from ui.panels.picture.comparison import shown_compare
 from ui.panels.state import Dispatch, UiState
@@ -18,19 +19,19 @@ MARK_NAMES = ("show_frusta", "show_inherited", "show_residual")
 """The overlays that Tab shows or hides together."""
 
 
-def set_compare(session: ActionNeeds, dispatch: Dispatch, mode: str) -> None:
+def set_compare(session: SessionView, dispatch: Dispatch, mode: str) -> None:
     """Compare with another picture; a captured one needs a camera, so the nearest one is taken from a free view."""
     if mode != "off" and session.overlays.compare_with == CAPTURED and session.view.look_through is None:
         dispatch(LookThrough(nearest_camera(session)))
     dispatch(SetCompare(mode))
 
 
-def _cycle_compare(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _cycle_compare(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     shown = COMPARE_MODES.index(shown_compare(session))
     set_compare(session, dispatch, COMPARE_MODES[(shown + 1) % len(COMPARE_MODES)])
 
 
-def set_other(session: ActionNeeds, dispatch: Dispatch, other: str) -> None:
+def set_other(session: SessionView, dispatch: Dispatch, other: str) -> None:
     """Compare with this picture from now on; wipe where nothing was compared."""
     dispatch(SetCompareWith(other))
     if other != session.overlays.mode and session.overlays.compare == "off":
@@ -38,7 +39,7 @@ def set_other(session: ActionNeeds, dispatch: Dispatch, other: str) -> None:
 
 
 def _set_other(other: str) -> Run:
-    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def choose(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         set_other(session, dispatch, other)
 
     return choose
@@ -49,7 +50,7 @@ def _has_other(other: str) -> Callable[[Any], bool]:
 
 
 def _set_compare(mode: str) -> Run:
-    def compare(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def compare(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         set_compare(session, dispatch, mode)
 
     return compare
@@ -63,11 +64,11 @@ def _is_shown(name: str) -> Callable[[Any], bool]:
     return lambda session: bool(getattr(session.overlays, name))
 
 
-def _are_marks_shown(session: ActionNeeds) -> bool:
+def _are_marks_shown(session: SessionView) -> bool:
     return all(getattr(session.overlays, name) for name in MARK_NAMES)
 
 
-def _toggle_overlays(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_overlays(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     is_all_shown = _are_marks_shown(session)
     for name in MARK_NAMES:
         if getattr(session.overlays, name) == is_all_shown:
@@ -75,23 +76,23 @@ def _toggle_overlays(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> N
 
 
 def _toggle_overlay(name: str) -> Run:
-    def toggle(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def toggle(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(ToggleOverlay(name))
 
     return toggle
 
 
-def cloud_overlay(session: ActionNeeds) -> str:
+def cloud_overlay(session: SessionView) -> str:
     """The overlay that shows or hides the point cloud: in place of a trained picture, or where there is none."""
     wanted = session.wanted_frame()
     return "show_points" if wanted is None or not wanted.revision else "show_cloud"
 
 
-def _is_cloud_shown(session: ActionNeeds) -> bool:
+def _is_cloud_shown(session: SessionView) -> bool:
     return bool(getattr(session.overlays, cloud_overlay(session)))
 
 
-def _toggle_cloud(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_cloud(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(ToggleOverlay(cloud_overlay(session)))
 
 

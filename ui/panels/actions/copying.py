@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.command_text.command_text import CommandText
-from ui.panels.actions.action import EDIT, TRAIN, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import EDIT, TRAIN, Action, Run
 from ui.panels.copying import copy_command, copy_python
 from ui.panels.state import Dispatch, UiState
 
@@ -13,23 +14,23 @@ MENU = "Edit/Copy as command"
 _WAYS = (("command", "command", copy_command), ("python", "Python", copy_python))
 
 
-def _copy(way: Callable[[Callable[[], CommandText]], None], of: Callable[[ActionNeeds], CommandText]) -> Run:
-    def copy(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _copy(way: Callable[[Callable[[], CommandText]], None], of: Callable[[SessionView], CommandText]) -> Run:
+    def copy(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         way(lambda: of(session))
 
     return copy
 
 
-def _last_step(session: ActionNeeds) -> CommandText:
+def _last_step(session: SessionView) -> CommandText:
     return session.command_texts.step()
 
 
-def _training(session: ActionNeeds) -> CommandText:
+def _training(session: SessionView) -> CommandText:
     clip = session.timeline.clip
     return session.command_texts.training(0 if clip is None else clip.clip_index)
 
 
-def _no_step(session: ActionNeeds) -> str:
+def _no_step(session: SessionView) -> str:
     return "" if session.history.undo else "There is no step to copy yet."
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from app.session.commands import ExamineCapture
-from ui.panels.actions.action import WINDOW, Action, ActionNeeds
+from app.session.session_view import SessionView
+from ui.panels.actions.action import WINDOW, Action
 from ui.panels.state import DOCTOR, Dispatch, UiState
 
 
-def _examine(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _examine(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_picture_only = False
     ui.wanted_panel = DOCTOR
     dispatch(ExamineCapture())

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 from app.session.editing.edit_commands import DuplicateEdit, GoToStep, MoveEdit, RemoveEdit, SetUp, ToggleEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, ScopeChoice
+from app.session.session_view import SessionView
 from engine.editing.actions import Hide
 from engine.editing.edit import Edit
-from ui.panels.actions.action import EDIT, Action, ActionNeeds, Run
+from ui.panels.actions.action import EDIT, Action, Run
 from ui.panels.editing.edit_subject import drawn_volume, invert_selection
 from ui.panels.editing.making import MAKINGS, Making, make_edit, mark_moving
 from ui.panels.editing.world_section import view_up
@@ -17,13 +18,13 @@ from ui.viewport.editing.edit_tool import Asking
 
 
 def _make(making: Making) -> Run:
-    def make(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def make(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         make_edit(session, dispatch, ui, making)
 
     return make
 
 
-def _show_again(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _show_again(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Switch off what was hidden last."""
     for edit in reversed(session.edits.edits):
         if edit.is_on and isinstance(edit.action, Hide):
@@ -32,19 +33,19 @@ def _show_again(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _hold_in(choice: ScopeChoice) -> Run:
-    def hold(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def hold(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.editing.scope = choice
 
     return hold
 
 
-def _next_scope(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _next_scope(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     following = (SCOPE_CHOICES.index(ui.editing.scope) + 1) % len(SCOPE_CHOICES)
     ui.editing.scope = SCOPE_CHOICES[following]
     ui.wanted_panel = EDITS
 
 
-def _outside(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _outside(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if drawn_volume(ui) is not None:
         invert_selection(dispatch, ui)
 
@@ -52,7 +53,7 @@ def _outside(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 def _choose_by(step: int) -> Run:
     """To the next edit of the stack, up or down; to none beyond its ends."""
 
-    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def choose(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ids: list[int | None] = [None, *(edit.edit_id for edit in session.edits.edits)]
         present = ids.index(ui.editing.chosen) if ui.editing.chosen in ids else 0
         ui.editing.choose(ids[(present + step) % len(ids)])
@@ -61,10 +62,10 @@ def _choose_by(step: int) -> Run:
     return choose
 
 
-def _of_chosen(make: Callable[[ActionNeeds, Edit], object]) -> Run:
+def _of_chosen(make: Callable[[SessionView, Edit], object]) -> Run:
     """Send a command for the chosen edit, if there is one."""
 
-    def send(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def send(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         edit = session.edits.edit(ui.editing.chosen)
         command = None if edit is None else make(session, edit)
         if command is not None:
@@ -73,38 +74,38 @@ def _of_chosen(make: Callable[[ActionNeeds, Edit], object]) -> Run:
     return send
 
 
-def _moved_by(step: int) -> Callable[[ActionNeeds, Edit], MoveEdit | None]:
-    def moved(session: ActionNeeds, edit: Edit) -> MoveEdit | None:
+def _moved_by(step: int) -> Callable[[SessionView, Edit], MoveEdit | None]:
+    def moved(session: SessionView, edit: Edit) -> MoveEdit | None:
         position = session.edits.edits.index(edit) + step
         return MoveEdit(edit.edit_id, position) if 0 <= position < len(session.edits.edits) else None
 
     return moved
 
 
-def _up_of_view(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _up_of_view(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SetUp(view_up(session.view)))
 
 
 def _ask(asking: Asking) -> Run:
-    def ask(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def ask(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.editing.ask(None if ui.editing.asking == asking else asking)
 
     return ask
 
 
 def _step_by(n_steps: int) -> Run:
-    def step(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def step(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(GoToStep(n_steps))
         ui.wanted_panel = HISTORY
 
     return step
 
 
-def _cannot_edit(session: ActionNeeds) -> str:
+def _cannot_edit(session: SessionView) -> str:
     return "" if session.edits.can_edit else session.edits.why_not or "Nothing can be edited now."
 
 
-def _no_edits(session: ActionNeeds) -> str:
+def _no_edits(session: SessionView) -> str:
     return _cannot_edit(session) or ("" if session.edits.edits else "There are no edits yet.")
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from app.session.commands import AskExport
-from ui.panels.actions.action import WINDOW, Action, ActionNeeds
+from app.session.session_view import SessionView
+from ui.panels.actions.action import WINDOW, Action
 from ui.panels.state import Dispatch, UiState
 
 
-def _export(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _export(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(AskExport())
 
 

@@ -8,7 +8,8 @@ from app.session.commands import Redo, RemoveRegion, Undo
 from app.session.editing.edit_commands import RemoveEdit
 from app.session.mending.mend_commands import CloseMend
 from app.session.paths.path_commands import DeleteCameraKey
-from ui.panels.actions.action import MARK, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import MARK, Action, Run
 from ui.panels.actions.camera_path import nudge_key
 from ui.panels.editing.edit_subject import meant
 from ui.panels.editing.making import DELETE, make_edit
@@ -18,15 +19,15 @@ from ui.panels.state import REGIONS, Dispatch, UiState
 from ui.viewport.region_tool import GROWTH
 
 
-def _choose_region(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _choose_region(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     begin_choosing(session, ui)
 
 
-def _mark_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _mark_chosen(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.regions.is_accepted = True  # the viewport marks it, once it knows where the pointer is
 
 
-def _leave_choosing(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _leave_choosing(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if ui.editing.held is not None:  # the drag of a handle is given back, and nothing else
         return
     if is_asking_to_mend(session):  # that window lies on top
@@ -40,14 +41,14 @@ def _leave_choosing(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> No
 
 
 def _grow_by(factor: float) -> Run:
-    def grow(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def grow(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.regions.set_radius(ui.regions.radius * factor)
 
     return grow
 
 
 def _shift_by(right: float, down: float, forward: float) -> Run:
-    def shift(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def shift(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if ui.regions.is_active:
             ui.regions.shift(session.view.world_to_camera(), right, down, forward)
         else:
@@ -56,12 +57,12 @@ def _shift_by(right: float, down: float, forward: float) -> Run:
     return shift
 
 
-def _next_region(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _next_region(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wanted_panel = REGIONS
     ui.regions.highlight_next(len(session.regions.regions))
 
 
-def _remove_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _remove_chosen(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The region that stands out; without one, what is selected or drawn; else the camera key or the edit that is
     chosen."""
     if ui.regions.highlighted is None and meant(session, ui)[1]:
@@ -76,17 +77,17 @@ def _remove_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> Non
         dispatch(RemoveEdit(ui.editing.chosen))
 
 
-def _undo(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _undo(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.history.undo:
         dispatch(Undo())
 
 
-def _redo(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _redo(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.history.redo:
         dispatch(Redo())
 
 
-def _cannot_remove(session: ActionNeeds) -> str:
+def _cannot_remove(session: SessionView) -> str:
     if session.regions.can_mark or session.paths.can_edit or session.edits.can_edit:
         return ""
     return session.regions.why_not or "Regions cannot be removed now."

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended, RevertMend, StartMend, StopMend
-from ui.panels.actions.action import TRAIN, Action, ActionNeeds
+from app.session.session_view import SessionView
+from ui.panels.actions.action import TRAIN, Action
 from ui.panels.state import Dispatch, UiState
 
 
-def _mend_seam(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _mend_seam(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Ask about the seam that is played around, else about the nearest one; what is asked already begins."""
     timeline = session.timeline
     clips, around = timeline.clips, timeline.around
@@ -21,48 +22,48 @@ def _mend_seam(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(AskMend(after=after))
 
 
-def _one_clip(session: ActionNeeds) -> str:
+def _one_clip(session: SessionView) -> str:
     return "There is one clip, and so no seam." if len(session.timeline.clips) < 2 else _is_running(session)
 
 
-def _mend_frames(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _mend_frames(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
     if timeline.in_frame is not None and timeline.out_frame is not None:
         dispatch(AskMend(frames=(timeline.in_frame, timeline.out_frame + 1)))
 
 
-def _no_frames(session: ActionNeeds) -> str:
+def _no_frames(session: SessionView) -> str:
     timeline = session.timeline
     if timeline.in_frame is None or timeline.out_frame is None:
         return "Choose the frames that flicker by I and O first."
     return _is_running(session)
 
 
-def _is_running(session: ActionNeeds) -> str:
+def _is_running(session: SessionView) -> str:
     page = session.mending.page
     return "Something is being mended already." if page is not None and page.state == "running" else ""
 
 
-def _compare(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _compare(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(CompareMended())
 
 
-def _revert(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _revert(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(RevertMend())
 
 
-def _nothing_mended(session: ActionNeeds) -> str:
+def _nothing_mended(session: SessionView) -> str:
     page = session.mending.page
     is_there = page is not None and page.state == "done" and page.record is not None and page.record.has_helped
     return "" if is_there else "Nothing was mended just now; the menu of a clip has its versions."
 
 
-def _close(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _close(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     page = session.mending.page
     dispatch(StopMend() if page is not None and page.state == "running" else CloseMend())
 
 
-def _nothing_shown(session: ActionNeeds) -> str:
+def _nothing_shown(session: SessionView) -> str:
     return "Nothing is being mended." if session.mending.page is None else ""
 
 

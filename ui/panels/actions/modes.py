@@ -6,29 +6,30 @@ from collections.abc import Callable
 
 from app.playback.modes.view_modes import CONTENTS, MODES
 from app.session.commands import SetContent, SetMode
-from ui.panels.actions.action import MODE, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import MODE, Action, Run
 from ui.panels.state import Dispatch, UiState
 
 
 def _set_mode(mode: str) -> Run:
-    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(SetMode(mode))
 
     return show
 
 
-def _has_mode(mode: str) -> Callable[[ActionNeeds], bool]:
+def _has_mode(mode: str) -> Callable[[SessionView], bool]:
     return lambda session: session.overlays.mode == mode
 
 
 def _set_content(content: str) -> Run:
-    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(SetContent(content))
 
     return show
 
 
-def _has_content(content: str) -> Callable[[ActionNeeds], bool]:
+def _has_content(content: str) -> Callable[[SessionView], bool]:
     return lambda session: session.overlays.content == content
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from app.playback.views.scene_axes import AXIS_VIEWS, UP_AXES
 from app.session.commands import LookThrough
-from ui.panels.actions.action import NAVIGATE, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import NAVIGATE, Action, Run
 from ui.panels.picture.gestures import PRESETS
 from ui.panels.state import Dispatch, UiState
 
@@ -26,14 +27,14 @@ _AXIS_KEYS = {
 }
 
 
-def frame_all(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def frame_all(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The whole scene, seen from the same side."""
     view = session.view
     if view.rig is not None and len(view.rig):
         view.frame(view.rig.focus_point(), 0.5 * view.radius)
 
 
-def frame_selection(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def frame_selection(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The highlighted region, else the sphere that is being chosen, else the anchor that was pointed at, else the
     pivot."""
     view, tool, regions = session.view, ui.regions, session.regions.regions
@@ -49,20 +50,20 @@ def frame_selection(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> No
         view.frame(view.shown_pose.pivot, 0.25 * view.radius)
 
 
-def toggle_orthographic(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def toggle_orthographic(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Perspective or none."""
     session.view.set_orthographic(not session.view.is_orthographic)
 
 
 def _look_along(name: str) -> Run:
-    def look(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def look(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         session.view.look_along(name)
 
     return look
 
 
 def _lean(radians: float) -> Run:
-    def lean(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def lean(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if session.view.look_through is not None:
             dispatch(LookThrough(None))
         session.view.lean(radians)
@@ -70,12 +71,12 @@ def _lean(radians: float) -> Run:
     return lean
 
 
-def _stand_upright(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _stand_upright(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     session.view.stand_upright()
 
 
 def _scale_fov(factor: float) -> Run:
-    def scale(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def scale(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if session.view.look_through is not None:
             dispatch(LookThrough(None))
         session.view.set_fov(session.view.fov_y * factor)
@@ -84,20 +85,20 @@ def _scale_fov(factor: float) -> Run:
 
 
 def _set_up(name: str) -> Run:
-    def set_up(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def set_up(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         session.view.set_up_axis(name)
 
     return set_up
 
 
 def _choose_preset(name: str) -> Run:
-    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def choose(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.navigation.preset_name = name
 
     return choose
 
 
-def _toggle_easing(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_easing(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.navigation.is_motion_reduced = not ui.navigation.is_motion_reduced
 
 

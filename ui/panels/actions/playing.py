@@ -5,48 +5,49 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.playback.timeline import Timeline
-from ui.panels.actions.action import PLAY, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import PLAY, Action, Run
 from ui.panels.state import TIMELINE, Dispatch, UiState
 
 
 def _on_timeline(act: Callable[[Timeline], object]) -> Run:
-    def run(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def run(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         act(session.timeline)
 
     return run
 
 
-def _toggle_every_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_every_frame(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     session.timeline.toggle_every_frame()
 
 
-def _toggle_loop(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_loop(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     session.timeline.is_looping = not session.timeline.is_looping
 
 
 def _zoom_by(n_steps: int) -> Run:
-    def zoom(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def zoom(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.timeline.zoom_at_playhead(n_steps, session.timeline)
 
     return zoom
 
 
 def _pan_by(n_steps: int) -> Run:
-    def pan(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def pan(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.timeline.pan(n_steps, session.timeline.n_frames)
 
     return pan
 
 
-def _toggle_fit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_fit(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.timeline.toggle_fit(session.timeline)
 
 
-def _next_unit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _next_unit(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.timeline.next_unit()
 
 
-def _clip_menu(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _clip_menu(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.timeline.is_menu_wanted = True
     ui.wanted_panel = TIMELINE
 

@@ -12,7 +12,8 @@ from app.session.editing.selection_commands import (
     SelectAll,
     ShrinkSelection,
 )
-from ui.panels.actions.action import SELECT, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import SELECT, Action, Run
 from ui.panels.editing.edit_subject import invert_selection
 from ui.panels.editing.select_panel import near_distance, select_moving
 from ui.panels.state import SELECTION, Dispatch, UiState
@@ -20,7 +21,7 @@ from ui.viewport.editing.select_tool import TOOL_WORDS, ToolKind
 
 
 def _tool(kind: ToolKind) -> Run:
-    def take(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def take(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.regions.leave()
         ui.selecting.choose(kind)
         ui.wanted_panel = SELECTION if ui.selecting.is_active else ui.wanted_panel
@@ -28,19 +29,19 @@ def _tool(kind: ToolKind) -> Run:
     return take
 
 
-def _invert(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _invert(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     invert_selection(dispatch, ui)
 
 
 def _send(make: Callable[[], Any]) -> Run:
-    def send(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def send(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(make())
 
     return send
 
 
 def _by_distance(make: Callable[[float], Any]) -> Run:
-    def send(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def send(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         distance = near_distance(session, ui.selecting)
         if distance > 0.0:
             dispatch(make(distance))
@@ -48,26 +49,26 @@ def _by_distance(make: Callable[[float], Any]) -> Run:
     return send
 
 
-def _moving(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _moving(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     select_moving(dispatch, ui)
 
 
 def _toggle(name: str) -> Run:
-    def toggle(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def toggle(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         setattr(ui.selecting, name, not getattr(ui.selecting, name))
 
     return toggle
 
 
-def _nothing_to_select(session: ActionNeeds) -> str:
+def _nothing_to_select(session: SessionView) -> str:
     return "" if session.selection.can_select else "There are no Gaussians to select in this frame."
 
 
-def _nothing_selected(session: ActionNeeds) -> str:
+def _nothing_selected(session: SessionView) -> str:
     return "" if session.selection.n_gaussians else "Nothing is selected."
 
 
-def _no_before(session: ActionNeeds) -> str:
+def _no_before(session: SessionView) -> str:
     return "" if session.selection.has_before else "There is no selection before this one."
 
 

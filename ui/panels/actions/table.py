@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import imgui
 
 from app.session.notices import Notices
+from app.session.session_view import SessionView
 from ui.panels.actions import (
     bookmarks,
     camera_path,
@@ -29,7 +28,7 @@ from ui.panels.actions import (
     view,
     window,
 )
-from ui.panels.actions.action import Action, ActionNeeds
+from ui.panels.actions.action import Action
 from ui.panels.panel_keys import belongs_to_panel
 from ui.panels.state import Dispatch, UiState
 
@@ -57,14 +56,7 @@ ACTIONS: tuple[Action, ...] = (
 )
 
 
-class KeyNeeds(ActionNeeds, Protocol):
-    """What actions act on, and where it is said why one cannot."""
-
-    @property
-    def notices(self) -> Notices: ...
-
-
-def handle_keys(session: KeyNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def handle_keys(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Run the actions of keys pressed since the last frame, or say why not. Text fields keep their keys."""
     io = imgui.get_io()
     if ui.is_help_open and imgui.is_key_pressed(imgui.Key.escape, False):

@@ -9,7 +9,8 @@ import numpy as np
 from app.playback.timeline import Timeline
 from app.session.commands import FollowTraining, SetFrame, TogglePlay
 from app.session.editing.edit_commands import RemoveMarker
-from ui.panels.actions.action import TIME, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import TIME, Action, Run
 from ui.panels.state import TIMELINE, Dispatch, UiState
 from ui.panels.timeline.marker_box import mark_playhead
 
@@ -20,49 +21,49 @@ def go_to_frame(timeline: Timeline, dispatch: Dispatch, frame_index: int) -> Non
 
 
 def _step_by(n: int) -> Run:
-    def step(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def step(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         go_to_frame(session.timeline, dispatch, session.timeline.frame_index + n)
 
     return step
 
 
 def _step_second(sign: int) -> Run:
-    def step(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def step(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         n = max(1, round(session.timeline.fps))
         go_to_frame(session.timeline, dispatch, session.timeline.frame_index + sign * n)
 
     return step
 
 
-def _first_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _first_frame(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     go_to_frame(session.timeline, dispatch, 0)
 
 
-def _last_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _last_frame(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.timeline.frame_index == session.timeline.last_frame:
         dispatch(FollowTraining())
     else:
         go_to_frame(session.timeline, dispatch, session.timeline.last_frame)
 
 
-def _follow(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _follow(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(FollowTraining(not session.timeline.is_following))
 
 
-def _previous_clip(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _previous_clip(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     go_to_frame(session.timeline, dispatch, session.timeline.previous_clip_start(session.timeline.frame_index))
 
 
-def _next_clip(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _next_clip(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     go_to_frame(session.timeline, dispatch, session.timeline.next_clip_start(session.timeline.frame_index))
 
 
-def _toggle_play(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_play(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(TogglePlay())
 
 
 def _marker_by(direction: int) -> Run:
-    def jump(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def jump(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         timeline = session.timeline
         find = timeline.markers.after if direction > 0 else timeline.markers.before
         marker = find(timeline.frame_index)
@@ -72,8 +73,8 @@ def _marker_by(direction: int) -> Run:
     return jump
 
 
-def _no_marker(direction: int) -> Callable[[ActionNeeds], str]:
-    def why_not(session: ActionNeeds) -> str:
+def _no_marker(direction: int) -> Callable[[SessionView], str]:
+    def why_not(session: SessionView) -> str:
         markers = session.timeline.markers
         find = markers.after if direction > 0 else markers.before
         is_there = find(session.timeline.frame_index) is not None
@@ -82,22 +83,22 @@ def _no_marker(direction: int) -> Callable[[ActionNeeds], str]:
     return why_not
 
 
-def _no_marker_here(session: ActionNeeds) -> str:
+def _no_marker_here(session: SessionView) -> str:
     is_there = session.timeline.markers.at(session.timeline.frame_index) is not None
     return "" if is_there else "This frame has no marker."
 
 
-def _jump(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _jump(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.timeline.is_jump_wanted = True
     ui.wanted_panel = TIMELINE
 
 
-def _mark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _mark(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     mark_playhead(session.timeline, dispatch, ui)
     ui.wanted_panel = TIMELINE
 
 
-def _unmark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _unmark(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.timeline.markers.at(session.timeline.frame_index) is not None:
         dispatch(RemoveMarker(session.timeline.frame_index))
 

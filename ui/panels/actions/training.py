@@ -18,11 +18,12 @@ from app.session.commands import (
     TrainClips,
     TrainNextClip,
 )
-from ui.panels.actions.action import TRAIN, WINDOW, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import TRAIN, WINDOW, Action, Run
 from ui.panels.state import LOG, TRAINING, Dispatch, UiState
 
 
-def train_or_pause(session: ActionNeeds, dispatch: Dispatch) -> None:
+def train_or_pause(session: SessionView, dispatch: Dispatch) -> None:
     """One key for the whole loop: start the next clip, pause what runs, resume what is paused."""
     status = session.training
     if status.state in ("starting", "preparing", "running"):
@@ -33,16 +34,16 @@ def train_or_pause(session: ActionNeeds, dispatch: Dispatch) -> None:
         dispatch(TrainNextClip())
 
 
-def _train(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _train(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     train_or_pause(session, dispatch)
 
 
-def _stop_training(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _stop_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.training.state not in ("idle", "failed", "stopping"):
         dispatch(StopTraining())
 
 
-def _cannot_train(session: ActionNeeds) -> str:
+def _cannot_train(session: SessionView) -> str:
     status = session.training
     if status.state in ("starting", "preparing", "running", "paused") or status.can_train_next:
         return ""
@@ -50,46 +51,46 @@ def _cannot_train(session: ActionNeeds) -> str:
     return "Every clip is trained." if is_all else "No clip can be trained next."
 
 
-def _nothing_waits(session: ActionNeeds) -> str:
+def _nothing_waits(session: SessionView) -> str:
     return "" if session.queue.waiting else "No clip is waiting."
 
 
-def _nothing_failed(session: ActionNeeds) -> str:
+def _nothing_failed(session: SessionView) -> str:
     return "" if session.queue.failed else "No clip has failed."
 
 
-def _nothing_trains(session: ActionNeeds) -> str:
+def _nothing_trains(session: SessionView) -> str:
     return "Nothing is being trained." if session.training.state in ("idle", "failed", "stopping") else ""
 
 
-def _toggle_quality(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_quality(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_quality_open = not ui.is_quality_open
     if ui.is_quality_open:
         ui.wanted_panel = TRAINING
 
 
-def _train_all(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _train_all(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(TrainAll())
 
 
-def _train_from_here(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _train_from_here(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     clip = session.timeline.clip
     if clip is not None:
         dispatch(TrainClips(tuple(range(clip.clip_index, len(session.timeline.clips)))))
 
 
-def _ask_settings(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _ask_settings(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     clip = session.timeline.clip
     if clip is not None:
         dispatch(AskTrainSettings(clip.clip_index))
 
 
-def _hold_after(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _hold_after(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.training.state not in ("idle", "failed"):
         dispatch(StopAfterClip(not session.queue.is_ending_after))
 
 
-def _next_waiting(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _next_waiting(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     waiting = [clip.clip_index for clip in session.queue.waiting]
     if waiting:
         place = waiting.index(ui.queue_chosen) + 1 if ui.queue_chosen in waiting else 0
@@ -97,7 +98,7 @@ def _next_waiting(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None
 
 
 def _move_waiting(by: int) -> Run:
-    def move(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def move(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         waiting = [clip.clip_index for clip in session.queue.waiting]
         if ui.queue_chosen not in waiting:
             _next_waiting(session, dispatch, ui)
@@ -107,33 +108,33 @@ def _move_waiting(by: int) -> Run:
     return move
 
 
-def _remove_waiting(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _remove_waiting(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if ui.queue_chosen in [clip.clip_index for clip in session.queue.waiting]:
         dispatch(RemoveFromQueue(ui.queue_chosen))
         ui.queue_chosen = None
 
 
-def _retry_failed(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _retry_failed(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     for clip_index, _ in session.queue.failed:
         dispatch(TrainClip(clip_index))
 
 
 def _live_view(mode: str) -> Run:
-    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def choose(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(SetLiveView(mode))
 
     return choose
 
 
-def _is_live_view(mode: str) -> Callable[[ActionNeeds], bool]:
+def _is_live_view(mode: str) -> Callable[[SessionView], bool]:
     return lambda session: session.queue.live_view == mode
 
 
-def _show_log(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _show_log(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wanted_panel = LOG
 
 
-def _toggle_log_loss(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_log_loss(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.curves.is_log = not ui.curves.is_log
 
 

@@ -8,12 +8,13 @@ import numpy as np
 
 from app.playback.views.views import COUNTS
 from app.session.commands import ActivateView, HomeView, LookThrough, ShowViews
-from ui.panels.actions.action import VIEW, Action, ActionNeeds, Run
+from app.session.session_view import SessionView
+from ui.panels.actions.action import VIEW, Action, Run
 from ui.panels.state import Dispatch, UiState
 
 
 def _camera_by(step: int) -> Run:
-    def hop(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def hop(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if ui.selecting.kind == "brush":
             ui.selecting.resize(step)
             return
@@ -27,11 +28,11 @@ def _camera_by(step: int) -> Run:
     return hop
 
 
-def _home(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _home(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(HomeView())
 
 
-def nearest_camera(session: ActionNeeds) -> int:
+def nearest_camera(session: SessionView) -> int:
     """The capture camera that looks most like the current view: near in place and direction."""
     rig = session.rig
     pose = session.view.shown_pose
@@ -42,26 +43,26 @@ def nearest_camera(session: ActionNeeds) -> int:
 
 
 def _show_views(n: int) -> Run:
-    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(ShowViews(n))
 
     return show
 
 
-def _shows(n: int) -> Callable[[ActionNeeds], bool]:
+def _shows(n: int) -> Callable[[SessionView], bool]:
     return lambda session: session.views.n_shown == n
 
 
-def next_layout(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def next_layout(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """From one view to two, to four, and back to one."""
     dispatch(ShowViews(COUNTS[(COUNTS.index(session.views.n_shown) + 1) % len(COUNTS)]))
 
 
-def _next_view(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _next_view(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(ActivateView((session.views.active_index + 1) % session.views.n_shown))
 
 
-def _one_view(session: ActionNeeds) -> str:
+def _one_view(session: SessionView) -> str:
     return "There is one view." if session.views.n_shown == 1 else ""
 
 

@@ -6,8 +6,9 @@ from typing import Any, Literal
 
 from app.session.commands import AskStartOver, NewProject, SynchroniseCameras
 from app.session.files.file_commands import AskSaveAs, ShowProjectFolder
+from app.session.session_view import SessionView
 from engine.assets import asset_path
-from ui.panels.actions.action import WINDOW, Action, ActionNeeds, Run
+from ui.panels.actions.action import WINDOW, Action, Run
 from ui.panels.state import LAYOUT_WORDS, LAYOUTS, PANELS, Dispatch, UiState
 from ui.style.palette import THEMES
 from ui.style.ui_scale import next_choice
@@ -23,99 +24,99 @@ def choose_scale(ui: UiState, scale: float | None) -> None:
 
 
 def _scale_by(step: int) -> Run:
-    def change(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def change(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         choose_scale(ui, next_choice(ui.scale.wanted, step))
 
     return change
 
 
-def _reset_scale(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _reset_scale(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     choose_scale(ui, None)
 
 
-def _menu(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _menu(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_menu_wanted = True
 
 
-def _help(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _help(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_help_open = not ui.is_help_open
 
 
-def _documents(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _documents(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(ShowProjectFolder(DOCUMENTS))
 
 
-def _about(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _about(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_about = True
 
 
-def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _open(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_open_requested = True
 
 
-def _open_read_only(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _open_read_only(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_read_only = True
 
 
-def _new_project(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _new_project(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(NewProject())
 
 
-def _start_over(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _start_over(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(AskStartOver())
 
 
-def _save_as(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _save_as(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(AskSaveAs())
 
 
-def _calibrate(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _calibrate(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_calibration = True
 
 
-def _synchronise(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _synchronise(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SynchroniseCameras())
 
 
-def _palette(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _palette(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_palette = True
 
 
 def _preferences(page: str = "") -> Run:
-    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.wishes.preferences_page = page
 
     return show
 
 
-def _fullscreen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _fullscreen(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_fullscreen = True
 
 
-def _picture_only(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _picture_only(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_picture_only = not ui.is_picture_only
 
 
 def _layout(name: str) -> Run:
-    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.wishes.layout = name
 
     return show
 
 
-def _save_layout(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _save_layout(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_layout_name = True
 
 
 def _step_panel(step: int) -> Run:
-    def go(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def go(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.wishes.panel_step = step
 
     return go
 
 
 def _show_panel(title: str) -> Run:
-    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.is_picture_only = False
         ui.wanted_panel = title
 
@@ -123,14 +124,14 @@ def _show_panel(title: str) -> Run:
 
 
 def _theme(name: Literal["dark", "light", "system"]) -> Run:
-    def take(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def take(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.preferences.theme = name
         ui.redraw_within(0.0)
 
     return take
 
 
-def _quit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _quit(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.quit_requested = True
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from app.session.clips.clip_commands import MergeClips, SetReferenceClip, SplitClip
+from app.session.session_view import SessionView
 from engine.capture.clip import Clip
 from ui.panels.state import Dispatch, UiState
-from ui.panels.training.clip_training_menu import ClipMenuNeeds
 from ui.style.theme import Icon
 
 
 def draw_cutting(
-    session: ClipMenuNeeds, dispatch: Dispatch, ui: UiState, clip: Clip, *, frame_index: int, n_clips: int
+    session: SessionView, dispatch: Dispatch, ui: UiState, clip: Clip, *, frame_index: int, n_clips: int
 ) -> None:
     """Entries: split at a frame, merge with the next one, make it the reference. What is trained and lost by it is
     asked about.

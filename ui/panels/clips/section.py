@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.playback.timeline import Timeline
 from app.project.disk.use import DiskUse
 from app.session.clips.clip_commands import AskFreeSpace, CompareVersion, TrainStale
 from app.session.commands import RemoveVersion, RestoreVersion
-from app.status import ClipStatus, DependencyStatus, Overlays, QueueStatus, TrainingStatus, VersionStatus
+from app.session.session_view import SessionView
+from app.status import DependencyStatus, QueueStatus, VersionStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text, size_text
 from ui.panels.clips.comparing import compared_version
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title
-from ui.panels.training.clip_versions import VersionNeeds, difference_lines, version_text
+from ui.panels.training.clip_versions import difference_lines, version_text
 from ui.panels.widgets import text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import Icon
@@ -25,32 +24,6 @@ from ui.style.theme import Icon
 STALE_TOOLTIP = "Clips whose reference has changed since, hatched in the timeline (Alt+T)"
 MAX_LISTED = 8
 """Clips named in a row."""
-
-
-class ClipSectionNeeds(VersionNeeds, Protocol):
-    """What this part reads."""
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def clip_states(self) -> Sequence[ClipStatus]: ...
-
-    @property
-    def reference_index(self) -> int: ...
-
-    @property
-    def queue(self) -> QueueStatus: ...
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    def clip_dependencies(self, clip_index: int) -> DependencyStatus: ...
-
-    def disk_use(self) -> DiskUse | None: ...
 
 
 # ---- words -----------------------------------------------------------------------------------------------------
@@ -105,7 +78,7 @@ def use_lines(use: DiskUse) -> list[tuple[str, int]]:
 # ---- parts -----------------------------------------------------------------------------------------------------
 
 
-def draw_stale(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_stale(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The button that trains again everything that is out of date; nothing where nothing is."""
     text = stale_text(session.queue)
     if not text:
@@ -120,7 +93,7 @@ def draw_stale(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState) -> No
     imgui.set_item_tooltip(STALE_TOOLTIP)
 
 
-def draw_clip_section(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_clip_section(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """A header that folds out, for the clip under the playhead."""
     clip = session.timeline.clip
     if clip is None or clip.clip_index >= len(session.clip_states):
@@ -151,7 +124,7 @@ def draw_clip_section(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState
         _draw_use(use, dispatch, ui, index)
 
 
-def _draw_versions(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState, clip: Clip) -> None:
+def _draw_versions(session: SessionView, dispatch: Dispatch, ui: UiState, clip: Clip) -> None:
     versions = session.clip_versions(clip.clip_index)
     if not versions:
         text_wrapped_dim("No earlier versions. Training a clip again keeps the one before.")
@@ -166,9 +139,7 @@ def _draw_versions(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState, c
         imgui.pop_id()
 
 
-def _draw_buttons(
-    session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState, clip: Clip, version: VersionStatus
-) -> None:
+def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState, clip: Clip, version: VersionStatus) -> None:
     is_shown = compared_version(session.overlays) == version.number
     if imgui.small_button("Stop comparing" if is_shown else "Compare"):
         dispatch(CompareVersion(clip.clip_index, None if is_shown else version.number))

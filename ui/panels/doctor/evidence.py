@@ -7,11 +7,12 @@ from collections.abc import Callable
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import LookThrough, SetFrame
+from app.session.session_view import SessionView
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding, PairEvidence, Point
 from ui.gl import ImageTexture
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.welcome.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.welcome.thumbnails import Thumbnails
 from ui.panels.widgets import elided, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
@@ -37,7 +38,7 @@ class Evidence:
         """Free all pictures, as when another capture was opened."""
         self._pictures.release()
 
-    def draw(self, session: ThumbnailNeeds, finding: Finding, rig: CameraRig, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, finding: Finding, rig: CameraRig, dispatch: Dispatch, ui: UiState) -> None:
         """Fill what is left of the window with the pictures of one finding; a click goes there."""
         self._pictures.begin()
         boxes: list[tuple[str, int, str]] = []
@@ -70,7 +71,7 @@ class Evidence:
 
     def _draw_box(
         self,
-        session: ThumbnailNeeds,
+        session: SessionView,
         index: int,
         box: tuple[str, int, str],
         shape: tuple[float, float],

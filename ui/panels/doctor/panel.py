@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.project.project import Project
 from app.session.captures.doctor_status import DoctorStatus
 from app.session.commands import ExamineCapture, LookThrough, StopExamining
-from app.status import ProjectStatus
+from app.session.session_view import SessionView
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding
 from ui.gl import ImageTexture
-from ui.panels.capture import CaptureFacts
 from ui.panels.doctor.camera_map import CameraPlan, camera_plan, draw_bars, draw_legend, draw_map
 from ui.panels.doctor.evidence import Evidence
 from ui.panels.doctor.findings import draw_findings
 from ui.panels.doctor.words import summary_text
 from ui.panels.state import Dispatch, UiState
-from ui.panels.welcome.thumbnails import ThumbnailNeeds
 from ui.panels.widgets import draw_job_bar, primary_button, text_wrapped_dim
 from ui.style.progress_words import job_words
 from ui.style.theme import Icon
@@ -35,25 +31,6 @@ SHARES = (0.34, 0.38)
 LOW, WORDS = 250.0, 28.0
 """In a room lower than this the bars stand beside the map; and the height of a line of words."""
 STACKED_HEIGHTS = (0.5, 0.3)
-
-
-class DoctorNeeds(ThumbnailNeeds, Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> CaptureFacts | None: ...
-
-    @property
-    def project(self) -> Project | None: ...
-
-    @property
-    def project_status(self) -> ProjectStatus | None: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def doctor_status(self) -> DoctorStatus: ...
 
 
 class DoctorPanel:
@@ -74,7 +51,7 @@ class DoctorPanel:
         """Free the pictures. GL thread only."""
         self._evidence.release()
 
-    def draw(self, session: DoctorNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Buttons and progress, then findings, pictures and map."""
         if session.capture is None:
             text_wrapped_dim("What is wrong with a capture, and what helps, is listed here.")
@@ -134,7 +111,7 @@ class DoctorPanel:
         imgui.pop_text_wrap_pos()
 
     def _draw_list(
-        self, session: DoctorNeeds, status: DoctorStatus, rig: CameraRig, dispatch: Dispatch, ui: UiState
+        self, session: SessionView, status: DoctorStatus, rig: CameraRig, dispatch: Dispatch, ui: UiState
     ) -> None:
         if not status.findings:
             done = "Nothing is wrong with this capture, as far as can be seen."
@@ -148,7 +125,7 @@ class DoctorPanel:
         )
 
     def _draw_evidence(
-        self, session: DoctorNeeds, chosen: Finding | None, rig: CameraRig, dispatch: Dispatch, ui: UiState
+        self, session: SessionView, chosen: Finding | None, rig: CameraRig, dispatch: Dispatch, ui: UiState
     ) -> None:
         if chosen is not None and chosen.evidence:
             self._evidence.draw(session, chosen, rig, dispatch, ui)

@@ -12,13 +12,13 @@ from app.document.changes.edit_words import edit_title, scope_text, target_text
 from app.document.changes.reach_words import reach_note
 from app.session.editing.edit_commands import ChangeEdit, RenameEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_of, chosen_scope, extent_text
+from app.session.session_view import SessionView
 from engine.camera.rotations import quats_of_turns, turns_of_quats
 from engine.editing.actions import Action, Quat, Transform, Vector
 from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Scope, Sphere, Target
 from engine.setting import Setting, settings_of
 from engine.text import one_line
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
-from ui.panels.editing.making import MakingNeeds
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import segment, text_warning, text_wrapped_dim
 
@@ -29,7 +29,7 @@ SPEED_SHARE = 2e-3
 """Of a drag over a field, per unit: as a share of the size of what is changed."""
 
 
-def draw_details(session: MakingNeeds, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
+def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     """Fields of the chosen edit."""
     _draw_name(dispatch, ui, edit)
     _draw_scope(session, dispatch, ui, edit)
@@ -67,7 +67,7 @@ def _draw_name(dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
         ui.editing.renamed = None
 
 
-def _draw_scope(session: MakingNeeds, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
+def _draw_scope(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     timeline, scope = session.timeline, edit.scope
     label_before("Holds")
     if imgui.begin_combo("##scope", scope_text(scope, timeline.clips)):
@@ -127,7 +127,7 @@ def _draw_target(ui: UiState, target: Target) -> Target | None:
     return None if changed is target else changed
 
 
-def _draw_action(session: MakingNeeds, ui: UiState, action: Action) -> Action | None:
+def _draw_action(session: SessionView, ui: UiState, action: Action) -> Action | None:
     """Fields of what an edit does; what it was changed to."""
     changed = action
     for one in settings_of(type(action)).values():

@@ -16,8 +16,8 @@ from app.playback.views.scene_axes import rig_radius
 from app.session.commands import Undo
 from app.session.editing.edit_commands import SetScaleByLength, SetUpByGround
 from app.session.editing.selection_commands import InvertSelection, SelectVolume
+from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
-from ui.panels.actions.action import ActionNeeds
 from ui.panels.editing.edit_subject import Subject, subject_of
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
@@ -37,7 +37,7 @@ class EditGrip:
 
     def follow(
         self,
-        session: ActionNeeds,
+        session: SessionView,
         dispatch: Dispatch,
         ui: UiState,
         pointer: Pointer,
@@ -76,7 +76,7 @@ class EditGrip:
 
     def _drag(
         self,
-        session: ActionNeeds,
+        session: SessionView,
         dispatch: Dispatch,
         ui: UiState,
         pointer: Pointer,
@@ -126,7 +126,7 @@ class EditGrip:
         tool.release()
 
     def _take_point(
-        self, session: ActionNeeds, dispatch: Dispatch, ui: UiState, pointer: Pointer, pane: Rect, pick: Pick
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, pointer: Pointer, pane: Rect, pick: Pick
     ) -> None:
         """A click, not a drag, gives a point; enough of them say what was asked for."""
         tool = ui.editing
@@ -145,7 +145,7 @@ class EditGrip:
             dispatch(command)
 
 
-def _given(session: ActionNeeds, tool: EditTool) -> SetUpByGround | SetScaleByLength:
+def _given(session: SessionView, tool: EditTool) -> SetUpByGround | SetScaleByLength:
     """What enough points say."""
     points = [_vector(point) for point in tool.points]
     if tool.asking == "length":

@@ -3,45 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from msgspec import structs
 
-from app.playback.modes.arrays import GaussianArrays
-from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import ChangeEdit
-from app.session.editing.selection import Selection
 from app.session.editing.selection_commands import InvertSelection
-from app.session.editing.selection_status import SelectionStatus
+from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
 from engine.editing.edit import Box, Edit, Sphere
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, axes_of, middle_of
-
-
-class Selects(Protocol):
-    """Knows what is selected."""
-
-    @property
-    def selection(self) -> Selection: ...
-
-    def mask(self, gaussians: GaussianArrays) -> np.ndarray: ...
-
-
-class SubjectNeeds(Protocol):
-    """What this module reads of a session."""
-
-    @property
-    def edits(self) -> EditsStatus: ...
-
-    @property
-    def selection(self) -> SelectionStatus: ...
-
-    @property
-    def selecting(self) -> Selects: ...
-
-    def shown_gaussians(self) -> GaussianArrays | None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +49,7 @@ def invert_selection(dispatch: Dispatch, ui: UiState) -> None:
         ui.editing.is_outside = not ui.editing.is_outside
 
 
-def subject_of(session: SubjectNeeds, ui: UiState) -> Subject | None:
+def subject_of(session: SessionView, ui: UiState) -> Subject | None:
     """What has handles now: what was drawn, else what belongs to the chosen edit."""
     volume = drawn_volume(ui)
     if volume is not None:
@@ -87,7 +59,7 @@ def subject_of(session: SubjectNeeds, ui: UiState) -> Subject | None:
     return None if thing is None else Subject(thing, edit)
 
 
-def meant(session: SubjectNeeds, ui: UiState) -> tuple[Box | Sphere | None, str]:
+def meant(session: SessionView, ui: UiState) -> tuple[Box | Sphere | None, str]:
     """What a new edit would act on: the box or sphere that was drawn, with its words; None stands for what is selected.
     No words where there is neither."""
     volume = drawn_volume(ui)
@@ -96,7 +68,7 @@ def meant(session: SubjectNeeds, ui: UiState) -> tuple[Box | Sphere | None, str]
     return None, "the selection" if session.selection.n_gaussians else ""
 
 
-def pivot_of(session: SubjectNeeds, volume: Box | Sphere | None) -> Vector:
+def pivot_of(session: SessionView, volume: Box | Sphere | None) -> Vector:
     """Where a movement turns about: the middle of what it moves, as it is shown. Scene units"""
     if volume is not None:
         return _vector(middle_of(volume))
@@ -104,7 +76,7 @@ def pivot_of(session: SubjectNeeds, volume: Box | Sphere | None) -> Vector:
     return _vector(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
 
 
-def bounds_of(session: SubjectNeeds, volume: Box | Sphere | None) -> tuple[Vector, Vector] | None:
+def bounds_of(session: SessionView, volume: Box | Sphere | None) -> tuple[Vector, Vector] | None:
     """The box along the axes of the scene around a volume, else around the centres of what is selected and shown; None
     where nothing is, or its box has no room in it. Scene units"""
     if volume is not None:
@@ -118,12 +90,12 @@ def bounds_of(session: SubjectNeeds, volume: Box | Sphere | None) -> tuple[Vecto
     return (_vector(low), _vector(high)) if (high > low).all() else None
 
 
-def _selected_means(session: SubjectNeeds) -> np.ndarray:
+def _selected_means(session: SessionView) -> np.ndarray:
     """Centres of what is selected, as far as it is shown. [N, 3]"""
     gaussians = session.shown_gaussians()
     if gaussians is None or gaussians.rows is None or not session.selection.n_gaussians:
         return np.zeros((0, 3))
-    means = gaussians.means[session.selecting.mask(gaussians)]
+    means = gaussians.means[session.selected(gaussians)]
     return means[np.isfinite(means).all(axis=1)]
 
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import ImVec2, imgui
 
 from app.document.changes.edit_words import edit_title, target_text
 from app.document.changes.reach_words import acting_text, reach_note
-from app.playback.views.orbit_view import OrbitView
 from app.session.clips.clip_commands import ApplyDeletions
-from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import DuplicateEdit, MoveEdit, RemoveEdit, ToggleEdit
+from app.session.session_view import SessionView
 from engine.editing.actions import Delete
 from engine.editing.edit import Edit
 from engine.text import one_line
-from ui.panels.copying import CopyNeeds, draw_copy_entries
+from ui.panels.copying import draw_copy_entries
 from ui.panels.editing.details import draw_details
-from ui.panels.editing.making import MakingNeeds, draw_making
+from ui.panels.editing.making import draw_making
 from ui.panels.editing.world_section import draw_world
 from ui.panels.history_buttons import draw_history
 from ui.panels.state import Dispatch, UiState
@@ -30,20 +27,7 @@ LEAST_ROWS, MOST_ROWS = 1.2, 6.2
 PAYLOAD = "edit"
 
 
-class EditsPanelNeeds(MakingNeeds, CopyNeeds, Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def history(self) -> HistoryStatus: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-
-def draw_edits(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_edits(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Everything that is edited without training."""
     if session.capture is None:
         text_wrapped_dim("What you hide, crop, move or recolour is listed here when a capture is open.")
@@ -71,7 +55,7 @@ def draw_edits(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> Non
     draw_world(session, dispatch, ui)
 
 
-def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_stack(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """One row per edit, the last one on top: it acts on what the others have left."""
     edits = session.edits.edits
     if not edits:
@@ -102,7 +86,7 @@ def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> No
     imgui.set_item_tooltip("Writes clips again without what is deleted everywhere, once you have confirmed it")
 
 
-def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
+def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
     is_chosen, start = ui.editing.chosen == edit.edit_id, imgui.get_cursor_screen_pos()
     flags = imgui.SelectableFlags_.allow_overlap
     if imgui.selectable("##edit", is_chosen, flags, ImVec2(0, ROW_HEIGHT))[0]:
@@ -148,7 +132,7 @@ def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: E
     imgui.dummy(ImVec2(0, 0))
 
 
-def _drag_row(session: EditsPanelNeeds, dispatch: Dispatch, edit: Edit, position: int) -> None:
+def _drag_row(session: SessionView, dispatch: Dispatch, edit: Edit, position: int) -> None:
     """A row that is dragged onto another one takes its place."""
     if not session.edits.can_edit:
         return
@@ -162,7 +146,7 @@ def _drag_row(session: EditsPanelNeeds, dispatch: Dispatch, edit: Edit, position
         imgui.end_drag_drop_target()
 
 
-def _draw_menu(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
+def _draw_menu(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
     can_edit, n_edits = session.edits.can_edit, len(session.edits.edits)
     for label, command, is_possible in (
         ("Switch off" if edit.is_on else "Switch on", ToggleEdit(edit.edit_id), True),

@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import ImVec4, imgui
 
-from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import GoToStep
+from app.session.session_view import SessionView
 from engine.text import one_line
-from ui.panels.copying import CopyNeeds, draw_copy_entries
+from ui.panels.copying import draw_copy_entries
 from ui.panels.history_buttons import draw_history
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import elided, text_wrapped_dim
 from ui.style import theme
-
-
-class HistoryNeeds(CopyNeeds, Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def history(self) -> HistoryStatus: ...
 
 
 class HistoryPanel:
@@ -32,7 +20,7 @@ class HistoryPanel:
     def __init__(self) -> None:
         self._seen = -1
 
-    def draw(self, session: HistoryNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """The first step on top; what was taken back follows the present one, paler."""
         if session.capture is None:
             text_wrapped_dim("What you do to a project is listed here, step by step, when a capture is open.")
@@ -56,7 +44,7 @@ class HistoryPanel:
         imgui.end_child()
 
 
-def _draw_step(session: HistoryNeeds, dispatch: Dispatch, ui: UiState, row: int, name: str, present: int) -> bool:
+def _draw_step(session: SessionView, dispatch: Dispatch, ui: UiState, row: int, name: str, present: int) -> bool:
     """Whether it is in sight."""
     imgui.push_id(row)
     if imgui.selectable("##step", row == present)[0] and row != present:

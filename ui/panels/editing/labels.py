@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Literal, Protocol
+from typing import Literal
 
 from imgui_bundle import imgui
 
 from app.document.project_document import MAX_TEXT_CHARACTERS
-from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import SetLabel
+from app.session.session_view import SessionView
 from engine.text import one_line
 from ui.panels.state import Dispatch, UiState
 
 WIDTH = 210.0
 
 
-class LabelNeeds(Protocol):
-    """What is read of a session."""
-
-    @property
-    def edits(self) -> EditsStatus: ...
-
-
-def with_label(session: LabelNeeds, kind: Literal["clip", "camera"], name: str, title: str) -> str:
+def with_label(session: SessionView, kind: Literal["clip", "camera"], name: str, title: str) -> str:
     """A title with the user's own name behind it. name: See app.document.project_document.Label."""
     label = session.edits.label(kind, name)
     return f"{title}  {one_line(label)}" if label else title
 
 
 def draw_label_field(
-    session: LabelNeeds, dispatch: Dispatch, ui: UiState, kind: Literal["clip", "camera"], name: str
+    session: SessionView, dispatch: Dispatch, ui: UiState, kind: Literal["clip", "camera"], name: str
 ) -> None:
     """What is typed counts at once, as one step of the history."""
     imgui.set_next_item_width(WIDTH)

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
 from app.document.changes.reach_words import reach_note
-from app.playback.timeline import Timeline
 from app.session.commands import MarkBox, MarkRegion
 from app.session.editing.edit_commands import AddEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_scope, extent_text
 from app.session.editing.selection_commands import ClearSelection
+from app.session.session_view import SessionView
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.edit import Box, Everything, Scope, Sphere, Target
 from engine.editing.reach import Reach, reach_of
-from ui.panels.editing.edit_subject import SubjectNeeds, bounds_of, invert_selection, meant, pivot_of
+from ui.panels.editing.edit_subject import bounds_of, invert_selection, meant, pivot_of
 from ui.panels.state import EDITS, Dispatch, UiState
 from ui.panels.widgets import segment, text_warning, text_wrapped_dim
 
@@ -25,14 +25,7 @@ FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """What new edits begin with."""
 
 
-class MakingNeeds(SubjectNeeds, Protocol):
-    """What this module reads of a session."""
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-
-First = Callable[[MakingNeeds, Box | Sphere | None], Action]
+First = Callable[[SessionView, Box | Sphere | None], Action]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +83,7 @@ MAKINGS = (
 PER_ROW = 3
 
 
-def make_edit(session: MakingNeeds, dispatch: Dispatch, ui: UiState, making: Making) -> None:
+def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Making) -> None:
     """Put an edit on the stack and show it; the session says why where nothing is selected."""
     volume, words = meant(session, ui)
     target: Target | None = volume
@@ -111,7 +104,7 @@ def make_edit(session: MakingNeeds, dispatch: Dispatch, ui: UiState, making: Mak
             dispatch(ClearSelection())
 
 
-def mark_moving(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def mark_moving(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Let everything move in what was drawn, or in the box around what is selected: a region of the gate, in clips that
     are trained from now on."""
     volume, _ = meant(session, ui)
@@ -122,13 +115,13 @@ def mark_moving(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(MarkBox("dynamic", *bounds))
 
 
-def _reach(session: MakingNeeds, volume: Box | Sphere | None, scope: Scope, *, is_inverted: bool = False) -> Reach:
+def _reach(session: SessionView, volume: Box | Sphere | None, scope: Scope, *, is_inverted: bool = False) -> Reach:
     """Where a new edit would act."""
-    picked = () if volume is not None else session.selecting.selection.counts
+    picked = () if volume is not None else session.selection.counts
     return reach_of(picked, scope, session.edits.clips, is_inverted=is_inverted)
 
 
-def draw_making(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """What new edits act on, where they are to hold, and a button for each kind."""
     volume, words = meant(session, ui)
     if words:

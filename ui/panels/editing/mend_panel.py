@@ -7,7 +7,6 @@ while it is up.
 from __future__ import annotations
 
 import time
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -16,10 +15,11 @@ from app.psnr_words import psnr_note
 from app.session.commands import TrainClip
 from app.session.mending.mend_commands import CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
+from app.session.session_view import SessionView
 from app.status import JobStatus
 from engine.mending.figures import METHODS, StretchFigures
 from engine.text import duration_text
-from ui.panels.copying import CopyNeeds, draw_copy_entries
+from ui.panels.copying import draw_copy_entries
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import draw_job_bar, primary_button, text_warning, text_wrapped, text_wrapped_dim
 from ui.style import theme
@@ -41,30 +41,13 @@ METHOD_WORDS = {
 AUTO_HINT = "One after the other, the cheapest first, until half of the excess flicker is gone"
 
 
-class MendingNeeds(Protocol):
-    """What this window reads of `Mending`."""
-
-    @property
-    def page(self) -> MendPage | None: ...
-
-    @property
-    def progress(self) -> JobStatus | None: ...
-
-
-class HasMending(CopyNeeds, Protocol):
-    """A session with one."""
-
-    @property
-    def mending(self) -> MendingNeeds: ...
-
-
-def is_asking_to_mend(session: HasMending) -> bool:
+def is_asking_to_mend(session: SessionView) -> bool:
     """Whether the window asks how to mend: then Escape closes it."""
     page = session.mending.page
     return page is not None and page.state == "asking"
 
 
-def draw_mending(session: HasMending, dispatch: Dispatch, ui: UiState) -> None:
+def draw_mending(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Draw the window while something is mended."""
     page = session.mending.page
     if page is None:
@@ -90,7 +73,7 @@ def _window_rect() -> Rect:
     return Rect(low.x, low.y, low.x + size.x, low.y + size.y)
 
 
-def _draw_page(session: HasMending, page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_page(session: SessionView, page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
     clips = " and ".join(str(index) for index in page.clip_indices)
     text_wrapped(
         f"{page.words[0].upper()}{page.words[1:]}, {'clip' if len(page.clip_indices) == 1 else 'clips'} {clips}"
@@ -105,7 +88,7 @@ def _draw_page(session: HasMending, page: MendPage, dispatch: Dispatch, ui: UiSt
         _draw_result(page, page.record, dispatch, ui)
 
 
-def _draw_choice(session: HasMending, page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_choice(session: SessionView, page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
     if page.why_not:
         text_warning(page.why_not)
     else:

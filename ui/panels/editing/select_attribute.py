@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.session.editing.attributes import ATTRIBUTES, Attribute
 from app.session.editing.selection_commands import SelectByAttribute
+from app.session.session_view import SessionView
 from engine.editing.selection.ranges import Spread
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import primary_button, text_wrapped_dim
@@ -20,13 +19,7 @@ HEIGHT = 72.0
 GRAB_PX = 8.0
 
 
-class AttributeNeeds(Protocol):
-    """What is read here."""
-
-    def attribute_spread(self, attribute: str) -> Spread | None: ...
-
-
-def draw_attribute(session: AttributeNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_attribute(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Choice of the attribute, its histogram, its range, and the button."""
     tool = ui.selecting
     chosen = ATTRIBUTES[tool.attribute]

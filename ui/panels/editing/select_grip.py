@@ -11,8 +11,8 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.session.editing.selection_commands import SelectAnchor, SelectVolume
+from app.session.session_view import SessionView
 from engine.editing.selection.set_algebra import SelectMode
-from ui.panels.actions.action import ActionNeeds
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.viewport.editing.select_tool import SelectTool
@@ -31,7 +31,7 @@ class SelectGrip:
 
     def follow(
         self,
-        session: ActionNeeds,
+        session: SessionView,
         dispatch: Dispatch,
         ui: UiState,
         pointer: Pointer,
@@ -70,7 +70,7 @@ class SelectGrip:
 
     def _finish(
         self,
-        session: ActionNeeds,
+        session: SessionView,
         dispatch: Dispatch,
         tool: SelectTool,
         pointer: Pointer,

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.modes.arrays import AnchorArrays
-from app.playback.views.orbit_view import OrbitView
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
@@ -19,7 +17,7 @@ from app.session.editing.selection_commands import (
     ShrinkSelection,
 )
 from app.session.editing.selection_status import SelectionStatus
-from engine.editing.selection.ranges import Spread
+from app.session.session_view import SessionView
 from engine.editing.selection.set_algebra import SELECT_MODES
 from ui.panels.editing.edit_subject import invert_selection
 from ui.panels.editing.select_attribute import draw_attribute
@@ -33,30 +31,7 @@ GAP = 4.0
 CLAMPED = imgui.SliderFlags_.always_clamp
 
 
-class SelectionPanelNeeds(Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def selection(self) -> SelectionStatus: ...
-
-    def shown_anchors(self) -> AnchorArrays | None: ...
-
-    def attribute_spread(self, attribute: str) -> Spread | None: ...
-
-
-class HasAnchors(Protocol):
-    """Knows the anchors of the shown frame."""
-
-    def shown_anchors(self) -> AnchorArrays | None: ...
-
-
-def near_distance(session: HasAnchors, tool: SelectTool) -> float:
+def near_distance(session: SessionView, tool: SelectTool) -> float:
     """How far apart neighbours are at most, scene units; 0 while anchors are not known."""
     anchors = session.shown_anchors()
     return 0.0 if anchors is None else tool.near_share * anchors.spacing
@@ -67,7 +42,7 @@ def select_moving(dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SelectByAttribute("motion", 1.0, 1.0, ui.selecting.how()))
 
 
-def draw_selection(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_selection(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Everything of it, from top to bottom."""
     status, tool = session.selection, ui.selecting
     if session.capture is None:
@@ -139,7 +114,7 @@ def _draw_options(tool: SelectTool, ui: UiState) -> None:
         imgui.set_item_tooltip(tooltip)
 
 
-def _draw_changes(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_changes(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     status, tool = session.selection, ui.selecting
     buttons: tuple[tuple[str, str, Callable[[], Any], bool], ...] = (
         ("All", "Ctrl+A", SelectAll, True),

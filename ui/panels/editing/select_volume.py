@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.views.orbit_view import OrbitView
 from app.session.editing.selection_commands import SelectVolume
+from app.session.session_view import SessionView
 from engine.editing.actions import Vector
 from engine.editing.edit import Box, Sphere
 from ui.panels.state import Dispatch, UiState
@@ -20,14 +19,7 @@ FIRST_SHARE = 0.15
 LARGEST = 1e6
 
 
-class VolumeNeeds(Protocol):
-    """What is read here."""
-
-    @property
-    def view(self) -> OrbitView: ...
-
-
-def draw_volume_numbers(session: VolumeNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_volume_numbers(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Numbers of the volume, and what is done with them."""
     tool, width = ui.selecting, (imgui.get_content_region_avail().x - 4) / 2
     for name in ("box", "sphere"):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 from imgui_bundle import imgui
 
 from app.playback.views.orbit_view import OrbitView
 from app.playback.views.scene_axes import UP_AXES
-from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import SetScale, SetUp
+from app.session.session_view import SessionView
 from engine.editing.actions import Vector
 from ui.panels.editing.fields import label_before
 from ui.panels.state import Dispatch, UiState
@@ -19,23 +18,13 @@ from ui.panels.widgets import text_wrapped_dim
 SCALES = (1e-9, 1e9)
 
 
-class WorldNeeds(Protocol):
-    """What this section reads of a session."""
-
-    @property
-    def edits(self) -> EditsStatus: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-
 def view_up(view: OrbitView) -> Vector:
     """What is up in the picture of a view."""
     x, y, z = (float(value) for value in -view.pose().rotation[1])
     return x, y, z
 
 
-def draw_world(session: WorldNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_world(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Folded away until it is wanted."""
     if not imgui.collapsing_header("World: up and scale"):
         ui.mark("edits.world")

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Protocol
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.timeline import Timeline
-from app.playback.views.orbit_view import OrbitView
-from engine.camera.rig import CameraRig
-from engine.capture.exclusions import Exclusions, Stroke
+from app.session.session_view import SessionView
+from engine.capture.exclusions import Stroke
 from ui.panels.state import Rect, UiState
 from ui.panels.widgets import chip
 from ui.style import theme
@@ -24,23 +21,7 @@ WHOLE_SPACING = 22.0
 """Between the lines over a picture that is excluded as a whole, units."""
 
 
-class ExcludedNeeds(Protocol):
-    """What is read of a session."""
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def exclusions(self) -> Exclusions: ...
-
-
-def exclusion_of(session: ExcludedNeeds, camera_index: int, frame_index: int) -> str:
+def exclusion_of(session: SessionView, camera_index: int, frame_index: int) -> str:
     """That a picture is excluded as a whole, in words; empty where it is not."""
     name, found = session.rig.names[camera_index], session.exclusions
     if name in found.cameras:
@@ -58,7 +39,7 @@ class ExcludedDrawing:
         self._key: Hashable = None
         self._lines = np.zeros((0, 4))
 
-    def draw(self, draw: imgui.ImDrawList, session: ExcludedNeeds, ui: UiState, pane: Rect) -> None:
+    def draw(self, draw: imgui.ImDrawList, session: SessionView, ui: UiState, pane: Rect) -> None:
         """Over one picture, clipped by the caller; nothing over a free view."""
         camera = session.view.look_through
         if camera is None or camera >= len(session.rig.names):
@@ -74,7 +55,7 @@ class ExcludedDrawing:
             chip(draw, pane.x0 + 10, pane.y0 + 44, brush_hint(tool, session.rig.names[camera]), color=ON_PICTURE.yellow)
 
     def _draw_masks(
-        self, draw: imgui.ImDrawList, session: ExcludedNeeds, tool: MaskTool, camera: int, frame: int, pane: Rect
+        self, draw: imgui.ImDrawList, session: SessionView, tool: MaskTool, camera: int, frame: int, pane: Rect
     ) -> None:
         name = session.rig.names[camera]
         masks = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions.action import ActionNeeds
+from app.session.session_view import SessionView
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 
@@ -12,7 +12,7 @@ DRAG = "mask"
 """Of Pointer.drag: the brush has taken the press."""
 
 
-def follow_brush(session: ActionNeeds, dispatch: Dispatch, ui: UiState, pointer: Pointer, pane: Rect) -> None:
+def follow_brush(session: SessionView, dispatch: Dispatch, ui: UiState, pointer: Pointer, pane: Rect) -> None:
     """Take up what the pointer did since the last frame. The brush is laid down when the camera is left.
 
     Args:

@@ -6,13 +6,13 @@ from imgui_bundle import imgui
 
 from app.session.commands import LookThrough
 from app.session.exclusions.exclusion_commands import ExcludeCameras, ExcludeFrames, RemoveMasks
-from ui.panels.excluding.excluded_drawing import ExcludedNeeds
+from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.excluding.mask_tool import SCOPES
 
 
 def draw_exclusion_menu(
-    session: ExcludedNeeds, dispatch: Dispatch, ui: UiState, camera_index: int, frame_index: int
+    session: SessionView, dispatch: Dispatch, ui: UiState, camera_index: int, frame_index: int
 ) -> None:
     """A camera, a frame, a frame of a camera; a painted part of its pictures."""
     name, found = session.rig.names[camera_index], session.exclusions

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import imgui
 
 from app.playback.modes.view_modes import COLOR, MODES
+from app.session.session_view import SessionView
 from app.status import BLINK_HZ, CAPTURED, version_name
-from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import COMPARE_WORDS, set_compare, set_other
 from ui.panels.picture.comparison import shown_compare
 from ui.panels.slider import slider
 from ui.panels.state import Dispatch, UiState
-from ui.panels.training.clip_versions import VersionNeeds, version_text
+from ui.panels.training.clip_versions import version_text
 from ui.panels.widgets import box_flags, box_words
 
 SLIDER_WIDTH = 120.0
 
 
-class CompareNeeds(ActionNeeds, VersionNeeds, Protocol):
-    """What the box reads."""
-
-
-def compare_words(session: CompareNeeds) -> str:
+def compare_words(session: SessionView) -> str:
     """What the box says."""
     shown = shown_compare(session)
     return "Compare" if shown == "off" else COMPARE_WORDS[shown]
 
 
-def draw_compare_box(session: CompareNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
+def draw_compare_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: float) -> None:
     """All ways to compare, and everything to compare with, in one box. width: Units."""
     shown = shown_compare(session)
     imgui.set_next_item_width(width)
@@ -47,7 +41,7 @@ def draw_compare_box(session: CompareNeeds, dispatch: Dispatch, ui: UiState, wid
     imgui.end_combo()
 
 
-def _draw_others(session: CompareNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_others(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     overlays = session.overlays
     imgui.text_disabled("Compare with")
     others = [(CAPTURED, "Captured picture"), *((mode.name, mode.label) for mode in MODES.values())]
@@ -64,7 +58,7 @@ def _draw_others(session: CompareNeeds, dispatch: Dispatch, ui: UiState) -> None
     ui.mark("viewport.blink_hz")
 
 
-def _draw_versions(session: CompareNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_versions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Earlier versions of the clip under the playhead; nothing where it has none."""
     clip, overlays = session.timeline.clip, session.overlays
     versions = () if clip is None else session.clip_versions(clip.clip_index)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from typing import Protocol
 
 from imgui_bundle import imgui
 
 from app.playback.modes.view_modes import COLOR, MODES
-from app.playback.views.orbit_view import OrbitView
+from app.session.session_view import SessionView
 from app.status import CAPTURED, Overlays, VersionStatus, version_number
 from ui.panels.state import UiState
 from ui.viewport.hud_text import RENDERED
@@ -19,23 +18,13 @@ HOLD_KEY = imgui.Key.b
 """While it is held, the other picture covers the rendered one."""
 
 
-class ComparisonNeeds(Protocol):
-    """What a comparison depends on."""
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-
-def shown_compare(session: ComparisonNeeds) -> str:
+def shown_compare(session: SessionView) -> str:
     """The comparison on screen: none with a captured picture from a free view, where no camera took one."""
     overlays = session.overlays
     return "off" if overlays.compare_with == CAPTURED and session.view.look_through is None else overlays.compare
 
 
-def is_held(session: ComparisonNeeds, ui: UiState) -> bool:
+def is_held(session: SessionView, ui: UiState) -> bool:
     """Does the user hold the key that shows the other picture alone?"""
     io = imgui.get_io()
     is_free = not (io.want_text_input or ui.is_popup_open or io.key_ctrl or io.key_alt or io.key_shift)
@@ -43,7 +32,7 @@ def is_held(session: ComparisonNeeds, ui: UiState) -> bool:
     return is_free and has_other and imgui.is_key_down(HOLD_KEY)
 
 
-def covered_share(session: ComparisonNeeds, ui: UiState, *, is_held: bool) -> float:
+def covered_share(session: SessionView, ui: UiState, *, is_held: bool) -> float:
     """How much of the rendered picture's width the other one covers, from the left. Asks to be drawn again in time."""
     overlays = session.overlays
     if is_held:

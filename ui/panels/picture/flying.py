@@ -8,7 +8,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.session.commands import LookThrough
-from ui.panels.actions.action import ActionNeeds
+from app.session.session_view import SessionView
 from ui.panels.picture.gestures import FLY_KEYS
 from ui.panels.state import Dispatch, UiState
 
@@ -31,7 +31,7 @@ class Flying:
         self.is_flying = False
         """Are keys held?"""
 
-    def follow(self, session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> bool:
+    def follow(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> bool:
         """Move the view on by one frame. Whether it moves."""
         io, view = imgui.get_io(), session.view
         wanted = np.zeros(3) if _are_keys_taken(ui) else _direction()

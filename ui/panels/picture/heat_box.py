@@ -6,7 +6,7 @@ from imgui_bundle import imgui
 
 from app.residuals.heat_map import HEAT_KINDS
 from app.session.commands import ShowHeat
-from ui.panels.actions.action import ActionNeeds
+from app.session.session_view import SessionView
 from ui.panels.slider import slider
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import box_flags, box_words
@@ -14,12 +14,12 @@ from ui.panels.widgets import box_flags, box_words
 _CLAMPED = imgui.SliderFlags_.always_clamp
 
 
-def heat_words(session: ActionNeeds) -> str:
+def heat_words(session: SessionView) -> str:
     """What the box says."""
     return HEAT_KINDS[session.overlays.heat].label if session.overlays.heat else "Heat"
 
 
-def draw_heat_box(session: ActionNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
+def draw_heat_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: float) -> None:
     """Which residual is shown over the picture, and how strongly. width: Units."""
     overlays = session.overlays
     imgui.set_next_item_width(width)

@@ -5,7 +5,6 @@ there is none where there is none.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import moderngl
 from imgui_bundle import ImVec2, imgui
@@ -13,12 +12,13 @@ from imgui_bundle import ImVec2, imgui
 from app.playback.modes.color_maps import SIGNED
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatKind, HeatMap
+from app.session.session_view import SessionView
 from ui.panels.picture.color_bar import COLOR_BAR_SIZE, bar_number, draw_color_bar
 from ui.panels.picture.hud import BELOW_NAME, wrapped
 from ui.panels.state import Rect, UiState
 from ui.panels.widgets import chip
 from ui.style import theme
-from ui.viewport.anchor_heat_layer import ANCHOR_RANGES, AnchorHeatNeeds, anchor_column
+from ui.viewport.anchor_heat_layer import ANCHOR_RANGES, anchor_column
 from ui.viewport.heat_image import HeatImage, value_at
 
 COLOR_MAP_OF = {"sequential": "inferno", "signed": SIGNED}
@@ -28,12 +28,6 @@ LEAST_BESIDE = 300.0
 """Plates of the HUD need at least this width."""
 BUSY_REDRAW_S = 0.1
 LINE = 25.0
-
-
-class HeatNeeds(AnchorHeatNeeds, Protocol):
-    """What a heat map is drawn from."""
-
-    def heat(self, kind: str) -> HeatMap | None: ...
 
 
 class HeatOverlay:
@@ -62,7 +56,7 @@ class HeatOverlay:
             return Rect(area.x0, area.y0, area.x1, self._said.y0)
         return Rect(area.x0, area.y0, self._said.x0, area.y1)
 
-    def draw(self, session: HeatNeeds, ui: UiState, pane: Rect) -> None:
+    def draw(self, session: SessionView, ui: UiState, pane: Rect) -> None:
         """Draw over a picture that fills the pane; nothing where no heat map is chosen or no camera is looked through.
 
         Asks for what is missing. Words and colour bar are drawn by `draw_words`.
@@ -97,7 +91,7 @@ class HeatOverlay:
         if self._draw_words is not None:
             self._draw_words()
 
-    def _draw_anchors(self, session: HeatNeeds, ui: UiState, pane: Rect) -> None:
+    def _draw_anchors(self, session: SessionView, ui: UiState, pane: Rect) -> None:
         """What the points of anchors mean; the points themselves belong to the scene."""
         heat = session.anchor_heat(anchor_column(session.overlays.heat))
         if heat is None or heat.is_stale or heat.n_cameras < heat.n_cameras_all:

@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.modes.color_maps import SIGNED
 from app.playback.modes.view_modes import MODES, range_of
 from app.playback.prefetch_order import Course
-from app.playback.timeline import Timeline
-from app.playback.views.orbit_view import OrbitView
-from app.status import ClipStatus, Overlays, RegionsStatus, WantedFrame
+from app.session.session_view import SessionView
 from engine.camera.rig import CameraRig
 from engine.text import camera_text
 from ui.panels.picture.color_bar import COLOR_BAR_SIZE, draw_color_bar
@@ -40,36 +37,6 @@ BELOW_NAME = 44.0
 """What names a picture at its top takes so much."""
 LEGEND_WIDTH = 760.0
 """In a picture at least this wide, units, the legend stands beside what is being chosen."""
-
-
-class HudNeeds(Protocol):
-    """What the words over the picture depend on."""
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def clip_states(self) -> Sequence[ClipStatus]: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def holdout(self) -> tuple[int, ...]: ...
-
-    @property
-    def loading(self) -> tuple[int, int] | None: ...
-
-    @property
-    def regions(self) -> RegionsStatus: ...
-
-    def wanted_frame(self) -> WantedFrame | None: ...
 
 
 def wrapped(text: str, width: float, measure: Callable[[str], float], *, between: str = " ") -> list[str]:
@@ -100,7 +67,7 @@ class Hud:
 
     def draw(
         self,
-        session: HudNeeds,
+        session: SessionView,
         ui: UiState,
         area: Rect,
         scene: Scene,
@@ -126,7 +93,7 @@ class Hud:
         if not is_tool_used or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
             self._draw_legend(session, scene, free, *legend_at)
 
-    def _text(self, session: HudNeeds, scene: Scene) -> HudText | None:
+    def _text(self, session: SessionView, scene: Scene) -> HudText | None:
         wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
         shown_frame = shown.source.frame_index
         if wanted is None:
@@ -197,7 +164,9 @@ class Hud:
         ui.mark_rect("viewport.free", free)
         return free
 
-    def _draw_color_bars(self, session: HudNeeds, ui: UiState, scene: Scene, free: Rect, value: float | None) -> None:
+    def _draw_color_bars(
+        self, session: SessionView, ui: UiState, scene: Scene, free: Rect, value: float | None
+    ) -> None:
         """What the colours of the picture on screen mean, at its lower right above the plates, and at its lower left
         those of the picture that it is compared with."""
         width, height = COLOR_BAR_SIZE
@@ -223,7 +192,7 @@ class Hud:
             draw_color_bar(imgui.get_window_draw_list(), plate, map_name, low, high, unit, pointed)
             ui.mark_rect(name, plate)
 
-    def _draw_legend(self, session: HudNeeds, scene: Scene, free: Rect, right: float, y: float) -> None:
+    def _draw_legend(self, session: SessionView, scene: Scene, free: Rect, right: float, y: float) -> None:
         """From its upper right corner down, as far as there is room above the plates."""
         draw = imgui.get_window_draw_list()
         for shape, color, words in legend_rows(session, scene):
@@ -260,7 +229,7 @@ def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: Color) -> None:
     draw.path_stroke(theme.u32(color), 2.0)
 
 
-def legend_rows(session: HudNeeds, scene: Scene) -> list[tuple[str, Color, str]]:
+def legend_rows(session: SessionView, scene: Scene) -> list[tuple[str, Color, str]]:
     """Shape, colour and words of what is marked."""
     counts = scene.counts
     rows = [("disc", (*hue, 1.0), words) for hue, words in MODES[scene.shown.source.shown_as.mode].legend]

@@ -7,7 +7,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from app.session.paths.path_commands import ChooseCameraKey
-from ui.panels.actions.action import ActionNeeds
+from app.session.session_view import SessionView
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.viewport.path_layer import PathLayer
@@ -32,7 +32,7 @@ class KeyGrip:
 
     def follow(
         self,
-        session: ActionNeeds,
+        session: SessionView,
         dispatch: Dispatch,
         ui: UiState,
         layer: PathLayer,
@@ -73,7 +73,7 @@ class KeyGrip:
         choose_key(dispatch, ui, index, is_going=imgui.is_mouse_double_clicked(imgui.MouseButton_.left))
 
     def _drag(
-        self, session: ActionNeeds, dispatch: Dispatch, ui: UiState, pointer: Pointer, view: SceneView, density: float
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, pointer: Pointer, view: SceneView, density: float
     ) -> None:
         path, index, (x, y) = session.paths.path, ui.paths.dragged, _pointer()
         if path is None or index is None or index >= len(path.keys) or not session.paths.can_edit:

@@ -6,14 +6,14 @@ from imgui_bundle import ImVec4, imgui
 
 from app.playback.modes.view_modes import ALL, COLOR, CONTENTS, MODES
 from app.session.commands import SetContent, SetMode
-from ui.panels.actions.action import ActionNeeds
+from app.session.session_view import SessionView
 from ui.panels.actions.modes import mode_key
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import box_flags, box_words
 from ui.style import theme
 
 
-def mode_words(session: ActionNeeds) -> str:
+def mode_words(session: SessionView) -> str:
     """What the box says: the mode, or the part of a clip and then the mode."""
     overlays = session.overlays
     words = MODES[overlays.mode].label
@@ -22,7 +22,7 @@ def mode_words(session: ActionNeeds) -> str:
     return CONTENTS[overlays.content].label + ("" if overlays.mode == COLOR else f", {words.lower()}")
 
 
-def draw_mode_box(session: ActionNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
+def draw_mode_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: float) -> None:
     """A box of modes, and below them of parts of a clip. width: Units."""
     overlays = session.overlays
     imgui.set_next_item_width(width)

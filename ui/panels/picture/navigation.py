@@ -11,7 +11,7 @@ from app.playback.views.orbit_view import MAX_FOV_Y, MIN_FOV_Y
 from app.playback.views.scene_axes import AXIS_VIEWS, UP_AXES
 from app.playback.views.view_place import ViewPlace
 from app.session.commands import LookThrough
-from ui.panels.actions.action import ActionNeeds
+from app.session.session_view import SessionView
 from ui.panels.actions.bookmarks import go_to_bookmark
 from ui.panels.actions.navigation import frame_all, frame_selection, toggle_orthographic, up_words
 from ui.panels.picture.gestures import PRESETS
@@ -32,7 +32,7 @@ class ViewPopup:
         self._name = ""
         self._has_frame = False
 
-    def draw_button(self, session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw_button(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """The button of the toolbar, and what it opens."""
         if imgui.button(f"{Icon.COMPASS}##look") or ui.is_view_popup_wanted:
             ui.is_view_popup_wanted = False
@@ -48,7 +48,7 @@ class ViewPopup:
             self._draw_bookmarks(session, dispatch, ui)
             imgui.end_popup()
 
-    def _draw_lens(self, session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_lens(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         view = session.view
         imgui.text_disabled("Field of view")
         text_right("of the camera" if view.look_through is not None else f"{math.degrees(view.fov_y):.0f} degrees")
@@ -74,7 +74,7 @@ class ViewPopup:
         imgui.set_item_tooltip("Takes back leaning (Shift+\\)")
         imgui.separator()
 
-    def _draw_bookmarks(self, session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_bookmarks(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         bookmarks = session.bookmarks
         imgui.text_disabled("Bookmarks")
         text_right("Ctrl+1 to Ctrl+9")
@@ -102,7 +102,7 @@ class ViewPopup:
         imgui.end_child()
 
 
-def _draw_axes(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_axes(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     view = session.view
     third = (imgui.get_content_region_avail().x - 16) / 3
     for i, name in enumerate(AXIS_VIEWS):
@@ -149,7 +149,7 @@ def _draw_axes(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     imgui.separator()
 
 
-def _draw_list(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_list(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     removed = None
     for index, item in enumerate(session.bookmarks.items):
         imgui.push_id(index)

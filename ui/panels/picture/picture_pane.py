@@ -5,14 +5,12 @@ What is drawn off screen, and when, is ui.viewport.scene's business.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.views.pointing import point_beside
+from app.session.session_view import SessionView
 from app.status import version_number
-from ui.panels.actions.action import ActionNeeds
 from ui.panels.editing.edit_grip import EditGrip
 from ui.panels.editing.edit_subject import subject_of
 from ui.panels.editing.handle_drawing import draw_edit_hint, draw_handles, draw_points
@@ -24,26 +22,21 @@ from ui.panels.excluding.mask_grip import follow_brush
 from ui.panels.key_words import key_words
 from ui.panels.picture.comparison import covered_share, is_held, kind_words, missing_words, other_label, shown_compare
 from ui.panels.picture.gizmo import draw_gizmo, gizmo_rect
-from ui.panels.picture.heat_overlay import HeatNeeds, HeatOverlay
-from ui.panels.picture.hud import BELOW_NAME, Hud, HudNeeds
+from ui.panels.picture.heat_overlay import HeatOverlay
+from ui.panels.picture.hud import BELOW_NAME, Hud
 from ui.panels.picture.key_grip import KeyGrip
 from ui.panels.picture.panes import Panes, arrange
 from ui.panels.picture.pointer import MOVING_S, Pointer
 from ui.panels.regions import draw_chosen_sphere
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.training.clip_versions import VersionNeeds
 from ui.panels.widgets import chip, elided
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
 from ui.viewport.hud_text import RENDERED, captured_words, pane_text
 from ui.viewport.region_layer import ShownRegions
-from ui.viewport.scene import Scene, SceneNeeds, SceneView
+from ui.viewport.scene import Scene, SceneView
 
 TOOLTIP_AWAY = 22.0
-
-
-class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, HeatNeeds, VersionNeeds, Protocol):
-    """What the picture, and everything that lies over it, is made from."""
 
 
 class PicturePane:
@@ -66,13 +59,13 @@ class PicturePane:
         self.scene.release()
         self.heat.release()
 
-    def shows_playhead(self, session: PictureNeeds) -> bool:
+    def shows_playhead(self, session: SessionView) -> bool:
         """Is the frame under the playhead on screen, in every picture that is compared?"""
         wanted = session.wanted_frame()
         return wanted is None or (self.scene.shown.is_of(wanted) and self._captured_frame in (None, wanted.frame_index))
 
     def draw(
-        self, session: PictureNeeds, dispatch: Dispatch, ui: UiState, area: Rect, *, is_active: bool = True
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, area: Rect, *, is_active: bool = True
     ) -> None:
         """Draw into an area of the window, which the newest item covers, and take up what the pointer did there.
 
@@ -132,7 +125,7 @@ class PicturePane:
     # ---- picture ---------------------------------------------------------------------------------------------
 
     def _draw_picture(
-        self, session: PictureNeeds, dispatch: Dispatch, ui: UiState, area: Rect, panes: Panes, *, is_active: bool
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, area: Rect, panes: Panes, *, is_active: bool
     ) -> None:
         draw = imgui.get_window_draw_list()
         draw.push_clip_rect(area.low, area.high, True)
@@ -200,7 +193,7 @@ class PicturePane:
         self.heat.draw_words()
         draw.pop_clip_rect()
 
-    def _scene_view(self, session: PictureNeeds, pane: Rect) -> SceneView:
+    def _scene_view(self, session: SessionView, pane: Rect) -> SceneView:
         density = imgui.get_io().display_framebuffer_scale.x
         size = (max(round(pane.width * density), 16), max(round(pane.height * density), 16))
         view = session.view
@@ -214,7 +207,7 @@ class PicturePane:
             set_back=view.set_back,
         )
 
-    def _pick(self, session: PictureNeeds, pane: Rect, x: float, y: float) -> np.ndarray | None:
+    def _pick(self, session: SessionView, pane: Rect, x: float, y: float) -> np.ndarray | None:
         """The place of the scene that is seen at a point of the window; None where there is nothing."""
         density = imgui.get_io().display_framebuffer_scale.x
         view = self._scene_view(session, pane)
@@ -226,7 +219,7 @@ class PicturePane:
             return None
         return self.scene.value_at((pointer.x - pane.x0) / pane.width, (pointer.y - pane.y0) / pane.height)
 
-    def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+    def _point_at_camera(self, session: SessionView, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
         is_choosing = ui.regions.is_active or ui.selecting.is_active or ui.masks.is_active
         is_free = imgui.is_item_hovered() and not is_choosing and self.scene.path.pointed_key is None
@@ -243,7 +236,7 @@ class PicturePane:
             imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
 
     def _select(
-        self, session: PictureNeeds, dispatch: Dispatch, ui: UiState, view: SceneView, pane: Rect, density: float
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, view: SceneView, pane: Rect, density: float
     ) -> None:
         anchors = session.shown_anchors() if ui.selecting.is_active else None
         spacing = 0.0 if anchors is None else anchors.spacing
@@ -259,7 +252,7 @@ class PicturePane:
             spacing,
         )
 
-    def _aim(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+    def _aim(self, session: SessionView, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """Lead the sphere that is being chosen: to the middle at first, then by the pointer, until a click fixes it."""
         tool, pointer = ui.regions, imgui.get_io().mouse_pos
         is_click = self.pointer.take_click()
@@ -282,7 +275,7 @@ class PicturePane:
         tool.is_placed |= is_click
 
     def _draw_captured(
-        self, session: PictureNeeds, draw: imgui.ImDrawList, ui: UiState, view: SceneView, panes: Panes
+        self, session: SessionView, draw: imgui.ImDrawList, ui: UiState, view: SceneView, panes: Panes
     ) -> None:
         area = panes.captured
         assert area is not None

@@ -13,7 +13,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.views.orbit_view import OrbitView
 from app.session.commands import LookThrough
-from ui.panels.actions.action import ActionNeeds
+from app.session.session_view import SessionView
 from ui.panels.picture.flying import Flying
 from ui.panels.picture.gestures import Button, Gesture, modifier_words
 from ui.panels.picture.gizmo import gizmo_rect, tip_under
@@ -91,7 +91,7 @@ class Pointer:
 
     def navigate(
         self,
-        session: ActionNeeds,
+        session: SessionView,
         dispatch: Dispatch,
         ui: UiState,
         panes: Panes,
@@ -133,7 +133,7 @@ class Pointer:
 
     # ---- the wheel -------------------------------------------------------------------------------------------
 
-    def _turn_wheel(self, session: ActionNeeds, dispatch: Dispatch, ui: UiState, pick: Pick) -> None:
+    def _turn_wheel(self, session: SessionView, dispatch: Dispatch, ui: UiState, pick: Pick) -> None:
         io, tool, view = imgui.get_io(), ui.regions, session.view
         across, steps = io.mouse_wheel_h, io.mouse_wheel
         if across == 0.0 and steps == 0.0:
@@ -176,7 +176,7 @@ class Pointer:
     # ---- buttons ---------------------------------------------------------------------------------------------
 
     def _press(
-        self, session: ActionNeeds, dispatch: Dispatch, ui: UiState, panes: Panes, area: Rect, pick: Pick
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, panes: Panes, area: Rect, pick: Pick
     ) -> None:
         io = imgui.get_io()
         self.pressed_at = (io.mouse_pos.x, io.mouse_pos.y)
@@ -201,7 +201,7 @@ class Pointer:
             self._is_click_taken = False
 
     def _drag(
-        self, session: ActionNeeds, dispatch: Dispatch, ui: UiState, panes: Panes, area: Rect, pick: Pick
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, panes: Panes, area: Rect, pick: Pick
     ) -> None:
         io, tool = imgui.get_io(), ui.regions
         is_over = imgui.is_item_deactivated()
@@ -241,7 +241,7 @@ class Pointer:
         return self._has_moved
 
     def _move_view(
-        self, session: ActionNeeds, dispatch: Dispatch, ui: UiState, pick: Pick, dx: float, dy: float
+        self, session: SessionView, dispatch: Dispatch, ui: UiState, pick: Pick, dx: float, dy: float
     ) -> None:
         """A stretch of a drag. The first one finds what the view turns about: what was under the press."""
         view, gesture = session.view, self._gesture
@@ -285,12 +285,12 @@ def _modifiers() -> str:
     return modifier_words(is_ctrl=io.key_ctrl, is_shift=io.key_shift, is_alt=io.key_alt)
 
 
-def _leave_camera(session: ActionNeeds, dispatch: Dispatch) -> None:
+def _leave_camera(session: SessionView, dispatch: Dispatch) -> None:
     if session.view.look_through is not None:
         dispatch(LookThrough(None))
 
 
-def _is_on_wipe(session: ActionNeeds, panes: Panes, pointer: ImVec2) -> bool:
+def _is_on_wipe(session: SessionView, panes: Panes, pointer: ImVec2) -> bool:
     if session.overlays.compare != "wipe" or panes.captured is None:
         return False
     x = panes.rendered.x0 + panes.rendered.width * session.overlays.wipe_position

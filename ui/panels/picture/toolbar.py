@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.views.views import COUNTS
 from app.session.commands import LookThrough, ShowViews, ToggleOverlay
+from app.session.session_view import SessionView
 from ui.panels.actions.compare import cloud_overlay
-from ui.panels.picture.compare_box import CompareNeeds, compare_words, draw_compare_box
+from ui.panels.picture.compare_box import compare_words, draw_compare_box
 from ui.panels.picture.heat_box import draw_heat_box, heat_words
 from ui.panels.picture.mode_box import draw_mode_box, mode_words
 from ui.panels.picture.navigation import ViewPopup
@@ -25,10 +24,6 @@ GAP = 8.0
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 
 
-class ToolbarNeeds(CompareNeeds, Protocol):
-    """What the row reads."""
-
-
 STYLES = ((True, True), (False, True), (False, False))
 """Whether buttons have words, and whether boxes have arrows however short their word is; the roomiest first."""
 HIDDEN_FIRST = ("views", "heat", "compare", "mark")
@@ -39,7 +34,7 @@ BOX = 150.0
 """Boxes become so wide where there is room."""
 
 
-def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, popup: ViewPopup) -> None:
+def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: ViewPopup) -> None:
     """The row of choices over the picture; what has no room is in a menu at its end."""
     imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + GAP, imgui.get_cursor_pos_y() + 6))
     room = imgui.get_content_region_avail().x - GAP
@@ -101,7 +96,7 @@ def _button_width(label: str) -> float:
     return imgui.calc_text_size(label).x + 2 * imgui.get_style().frame_padding.x
 
 
-def _draw_more(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, hidden: tuple[str, ...]) -> None:
+def _draw_more(session: SessionView, dispatch: Dispatch, ui: UiState, hidden: tuple[str, ...]) -> None:
     """The button at the end of the row, and what it shows."""
     if imgui.button(f"{Icon.MORE}##more"):
         imgui.open_popup("more")
@@ -133,12 +128,12 @@ def _put_popup_below() -> None:
     imgui.set_next_window_pos(ImVec2(low.x, high.y + 6), imgui.Cond_.appearing)
 
 
-def _camera_words(session: ToolbarNeeds) -> str:
+def _camera_words(session: SessionView) -> str:
     shown = session.view.look_through
     return "Free" if shown is None else session.rig.names[shown]
 
 
-def _draw_camera_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
+def _draw_camera_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: float) -> None:
     shown, names = session.view.look_through, session.rig.names
     imgui.align_text_to_frame_padding()
     imgui.set_next_item_width(width)
@@ -159,7 +154,7 @@ def _draw_camera_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, wid
     imgui.set_item_tooltip("Look through a capture camera ([ and ])")
 
 
-def _draw_show(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, *, is_wordy: bool) -> None:
+def _draw_show(session: SessionView, dispatch: Dispatch, ui: UiState, *, is_wordy: bool) -> None:
     if imgui.button(f"{Icon.EYE}  Show" if is_wordy else f"{Icon.EYE}##show"):
         imgui.open_popup("overlays")
     ui.mark("viewport.overlays")
@@ -167,7 +162,7 @@ def _draw_show(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, *, is_wor
     _draw_overlay_menu(session, dispatch, ui)
 
 
-def _draw_mark(session: ToolbarNeeds, ui: UiState, *, is_wordy: bool) -> None:
+def _draw_mark(session: SessionView, ui: UiState, *, is_wordy: bool) -> None:
     imgui.begin_disabled(not session.regions.can_mark)
     if segment(f"{Icon.REGION}  Mark" if is_wordy else Icon.REGION, ui.regions.is_active):
         if ui.regions.is_active:
@@ -181,7 +176,7 @@ def _draw_mark(session: ToolbarNeeds, ui: UiState, *, is_wordy: bool) -> None:
         imgui.set_tooltip(words)
 
 
-def _draw_layouts(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_layouts(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """How many views."""
     width, shown = imgui.get_frame_height(), session.views.n_shown
     for n in COUNTS:
@@ -192,7 +187,7 @@ def _draw_layouts(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> Non
         imgui.same_line(0, 2)
 
 
-def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_overlay_menu(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if not imgui.begin_popup("overlays"):
         return
     rows = (

@@ -3,33 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.views.views import Views
 from app.session.commands import ActivateView
+from app.session.session_view import SessionView
 from ui.panels.guard import Guard, draw_failed
 from ui.panels.picture.hud import Hud
 from ui.panels.picture.navigation import ViewPopup
 from ui.panels.picture.panes import view_areas
-from ui.panels.picture.picture_pane import PictureNeeds, PicturePane
-from ui.panels.picture.toolbar import TOOLBAR_HEIGHT, ToolbarNeeds, draw_toolbar
+from ui.panels.picture.picture_pane import PicturePane
+from ui.panels.picture.toolbar import TOOLBAR_HEIGHT, draw_toolbar
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.welcome.recent_rows import RecentRows
-from ui.panels.welcome.welcome import WelcomeNeeds, draw_welcome
+from ui.panels.welcome.welcome import draw_welcome
 from ui.style import theme
 from ui.viewport.scene import Scene
 
 SMALLEST_PICTURE = 32.0
 """With less room than this, there is nothing to draw."""
-
-
-class ViewportNeeds(PictureNeeds, ToolbarNeeds, WelcomeNeeds, Protocol):
-    """What the viewport shows."""
-
-    @property
-    def views(self) -> Views: ...
 
 
 class ViewportPanel:
@@ -74,7 +66,7 @@ class ViewportPanel:
         """What stands over the active view's picture."""
         return self.active.hud
 
-    def has_news(self, session: ViewportNeeds) -> bool:
+    def has_news(self, session: SessionView) -> bool:
         """Did a picture arrive that the window does not show yet? Cheap; asked at every tick."""
         if session.capture is None:
             return False
@@ -84,7 +76,7 @@ class ViewportPanel:
                 has_news |= pane.scene.has_news(session)  # each of them asks again for what it wants
         return has_news
 
-    def shows_playhead(self, session: ViewportNeeds) -> bool:
+    def shows_playhead(self, session: SessionView) -> bool:
         """Is the frame under the playhead on screen, in every picture?"""
         for index, pane in self._shown(session):
             with session.views.drawn(index):
@@ -92,12 +84,12 @@ class ViewportPanel:
                     return False
         return True
 
-    def _shown(self, session: ViewportNeeds) -> list[tuple[int, PicturePane]]:
+    def _shown(self, session: SessionView) -> list[tuple[int, PicturePane]]:
         """Views on screen and their pictures; one that cannot be drawn keeps nobody waiting."""
         panes = enumerate(self._panes[: session.views.n_shown])
         return [(index, pane) for index, pane in panes if not self._guard.is_failing(_name(index))]
 
-    def draw(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Toolbar and pictures."""
         status = session.regions
         ui.regions.follow(session.rig, len(status.regions), can_mark=status.can_mark)
@@ -114,7 +106,7 @@ class ViewportPanel:
         if below.width >= SMALLEST_PICTURE and below.height >= SMALLEST_PICTURE:
             self._draw_views(session, dispatch, ui, below)
 
-    def _draw_views(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
+    def _draw_views(self, session: SessionView, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
         views = session.views
         self._active = views.active_index
         draw = imgui.get_window_draw_list()
@@ -129,7 +121,7 @@ class ViewportPanel:
             if is_active and views.n_shown > 1:
                 draw.add_rect(part.low, part.high, theme.u32(theme.ON_PICTURE.sky), 0.0, 2.0)
 
-    def _draw_view(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState, index: int, area: Rect) -> None:
+    def _draw_view(self, session: SessionView, dispatch: Dispatch, ui: UiState, index: int, area: Rect) -> None:
         pane, is_active, name = self._panes[index], index == session.views.active_index, _name(index)
 
         def draw() -> None:

@@ -5,20 +5,17 @@ there. Everything in it is a way to go there.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.playback.timeline import Timeline
-from app.playback.views.orbit_view import OrbitView
 from app.session.commands import LookThrough, SetFrame
 from app.session.mending.mend_commands import AskMend
+from app.session.session_view import SessionView
 from app.status import CELL_COLUMNS, CELL_RANGES, LOW_IS_BAD, ResidualStatus, SeamStatus
 from engine.camera.rig import CameraRig
-from engine.capture.clip import Clip
 from engine.text import camera_text, duration_text
 from ui.gl import ImageTexture
-from ui.panels.excluding.excluded_drawing import ExcludedNeeds, exclusion_of
+from ui.panels.excluding.excluded_drawing import exclusion_of
 from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.picture.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.residuals.matrix import Matrix
@@ -27,7 +24,7 @@ from ui.panels.timeline.columns import provisional_text, shown_ratio
 from ui.panels.timeline.gutter import NOTES
 from ui.panels.timeline.rows import SEAMS
 from ui.panels.timeline.seam_lane import ratio_text, seam_color
-from ui.panels.welcome.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.welcome.thumbnails import Thumbnails
 from ui.panels.widgets import elided, segment, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -44,28 +41,6 @@ N_WORST = 24
 N_SEAMS = 8
 ROW_HEIGHT = 46.0
 PICTURE_SIZE = (58.0, 36.0)
-
-
-class ResidualsNeeds(ThumbnailNeeds, ExcludedNeeds, Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def timeline(self) -> Timeline: ...
-
-    @property
-    def view(self) -> OrbitView: ...
-
-    @property
-    def rig(self) -> CameraRig: ...
-
-    @property
-    def clips(self) -> Sequence[Clip]: ...
-
-    @property
-    def residual_status(self) -> ResidualStatus: ...
 
 
 def figure_text(value: float, column: str) -> str:
@@ -142,7 +117,7 @@ class ResidualsPanel:
         self._thumbnails.release()
         self._matrix.release()
 
-    def draw(self, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Progress, seams, matrix, worst pictures."""
         if session.capture is None:
             text_wrapped_dim("How far renders are from what was captured is shown here when a capture is open.")
@@ -165,7 +140,7 @@ class ResidualsPanel:
         self._draw_matrix(status, session, dispatch, ui)
         self._draw_worst(status, session, dispatch, ui)
 
-    def _draw_seams(self, status: ResidualStatus, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_seams(self, status: ResidualStatus, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if not status.seams:
             return
         imgui.separator_text("Seams between clips, worst first")
@@ -202,7 +177,7 @@ class ResidualsPanel:
             ui.mark(f"residuals.column.{column}")
             imgui.set_item_tooltip(COLUMN_MEANINGS[column])
 
-    def _draw_matrix(self, status: ResidualStatus, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_matrix(self, status: ResidualStatus, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         at = (session.timeline.frame_index, session.view.look_through)
         hovered, pressed = self._matrix.draw(status, self.column, session.rig, session.clips, at, ui)
         imgui.open_popup_on_item_click("cell menu", imgui.PopupFlags_.mouse_button_right)
@@ -237,7 +212,7 @@ class ResidualsPanel:
         draw_color_bar(imgui.get_window_draw_list(), bar, "inferno", best, worst, UNITS[self.column], value)
         imgui.dummy(ImVec2(width, COLOR_BAR_SIZE[1]))
 
-    def _draw_worst(self, status: ResidualStatus, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_worst(self, status: ResidualStatus, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         imgui.separator_text("Worst pictures")
         key = (status.revision, self.column, id(session.capture))
         if key != self._worst_key:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from app.psnr_words import psnr_label
+from app.session.session_view import SessionView
 from app.status import ClipStatus
 from engine.capture.clip import Clip
 from ui.panels.editing.labels import with_label
 from ui.panels.state import Rect
 from ui.panels.timeline.clip_words import clip_title, state_note, state_words
 from ui.panels.timeline.columns import MIN_GROUP_WIDTH, STATES, group_size, largest_of_groups, runs_of
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import CLIPS
 from ui.panels.timeline.stage import Stage, hatch
 from ui.panels.timeline.time_range import TimeScale
@@ -27,7 +27,7 @@ WARNED = ("failed", "stale", "damaged", "stopped")
 GOING = ("preparing", "training", "paused", "stopped")
 
 
-def clips_in_sight(session: TimelineNeeds, scale: TimeScale) -> tuple[int, int]:
+def clips_in_sight(session: SessionView, scale: TimeScale) -> tuple[int, int]:
     """The first clip of which something is shown, and one past the last."""
     n_clips = min(len(session.clips), len(session.clip_states))
     if n_clips == 0:
@@ -37,7 +37,7 @@ def clips_in_sight(session: TimelineNeeds, scale: TimeScale) -> tuple[int, int]:
     return first, min(max(spans.index_of(int(scale.shown.stop) - 1), first) + 2, n_clips)
 
 
-def draw_clip_lane(stage: Stage, session: TimelineNeeds) -> None:
+def draw_clip_lane(stage: Stage, session: SessionView) -> None:
     """Bands or runs of what is in sight, and the note of the clip under the pointer."""
     first, stop = clips_in_sight(session, stage.scale)
     if first == stop:
@@ -54,7 +54,7 @@ def draw_clip_lane(stage: Stage, session: TimelineNeeds) -> None:
         _draw_note(session, stage.scale.frame_at(stage.pointer[0]))
 
 
-def _draw_runs(stage: Stage, session: TimelineNeeds, in_sight: tuple[int, int]) -> None:
+def _draw_runs(stage: Stage, session: SessionView, in_sight: tuple[int, int]) -> None:
     """Runs of one state. There may be hundreds of them, hardly wider than a line: those are drawn with one call."""
     row, scale, draw, rects = stage.rows[CLIPS], stage.scale, stage.draw, stage.ui.rects
     y0, y1 = row.y0, row.y1
@@ -72,7 +72,7 @@ def _draw_runs(stage: Stage, session: TimelineNeeds, in_sight: tuple[int, int]) 
 
 
 def state_runs(
-    session: TimelineNeeds, stage: Stage, in_sight: tuple[int, int], smallest: float
+    session: SessionView, stage: Stage, in_sight: tuple[int, int], smallest: float
 ) -> list[tuple[int, int, str]]:
     """First clip, last clip and state of every run. Clips that are narrower than `smallest` count together, as the one
     among them that matters most."""
@@ -86,7 +86,7 @@ def state_runs(
     ]
 
 
-def _band(stage: Stage, session: TimelineNeeds, first: int, last: int) -> Rect:
+def _band(stage: Stage, session: SessionView, first: int, last: int) -> Rect:
     """What is in sight of a band, so that its words are, too."""
     row, scale = stage.rows[CLIPS], stage.scale
     x0 = max(scale.left_of(session.clips[first].start) + 1, scale.x0)
@@ -111,7 +111,7 @@ def _draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: 
     _draw_lines(draw, band, title, words if _fits(words, band) else icon, theme.TEXT)
 
 
-def _draw_band(draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip: Clip, status: ClipStatus) -> None:
+def _draw_band(draw: imgui.ImDrawList, band: Rect, session: SessionView, clip: Clip, status: ClipStatus) -> None:
     state, color = status.state, theme.status_color(status.state)
     draw.add_rect_filled(band.low, band.high, theme.u32(theme.RAISED), 3)
     if state == "trained":
@@ -130,7 +130,7 @@ def _draw_band(draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip:
     _draw_words(draw, band, session, clip, status)
 
 
-def _draw_words(draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip: Clip, status: ClipStatus) -> None:
+def _draw_words(draw: imgui.ImDrawList, band: Rect, session: SessionView, clip: Clip, status: ClipStatus) -> None:
     state = status.state
     icon = theme.CLIP_ICONS.get(state, "")
     if band.width < MIN_WORDS_WIDTH:
@@ -169,7 +169,7 @@ def _draw_lines(draw: imgui.ImDrawList, band: Rect, title: str, words: str, colo
         draw.add_text(ImVec2(beside, y), theme.u32(color), words)
 
 
-def _draw_note(session: TimelineNeeds, frame_index: int) -> None:
+def _draw_note(session: SessionView, frame_index: int) -> None:
     """The reason of a clip's state, where the pointer is over its band."""
     clip = session.timeline.clip_of(frame_index)
     status = None if clip is None else session.clip_states[clip.clip_index]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
+from app.session.session_view import SessionView
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import CACHE, CAMERA, CLIPS, LANES, MARKERS, OVERVIEW, QUALITY, RULER, SEAMS
 from ui.panels.timeline.stage import SMALL_TEXT, small_text, small_width
 from ui.panels.timeline.units import unit_note
@@ -25,7 +25,7 @@ NOTES = {
 }
 
 
-def draw_gutter(rows: dict[str, Rect], x: float, session: TimelineNeeds, ui: UiState) -> None:
+def draw_gutter(rows: dict[str, Rect], x: float, session: SessionView, ui: UiState) -> None:
     """One name per row.
 
     Args:
@@ -52,7 +52,7 @@ def draw_gutter(rows: dict[str, Rect], x: float, session: TimelineNeeds, ui: UiS
             small_text(draw, x + 2, y, text, color)
 
 
-def _draw_unit(cell: Rect, session: TimelineNeeds, ui: UiState) -> None:
+def _draw_unit(cell: Rect, session: SessionView, ui: UiState) -> None:
     """The unit of the ruler, and the button of the lanes beside it."""
     draw, view = imgui.get_window_draw_list(), ui.timeline
     imgui.set_cursor_screen_pos(cell.low)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import SetFrame
+from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.timeline.jump_text import HINT, parse_jump
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.style import theme
 
 POPUP = "go to"
 WIDTH = 260.0
 
 
-def draw_jump_box(session: TimelineNeeds, dispatch: Dispatch, ui: UiState, track: Rect) -> None:
+def draw_jump_box(session: SessionView, dispatch: Dispatch, ui: UiState, track: Rect) -> None:
     """Opens where it is wanted, just above the track. Enter goes there; the box stays where there is something to say
     of that, until Enter comes again or Escape."""
     view, timeline = ui.timeline, session.timeline

@@ -6,12 +6,12 @@ from imgui_bundle import imgui
 
 from app.session.commands import SetFrame
 from app.session.mending.mend_commands import AskMend
+from app.session.session_view import SessionView
 from engine.capture.clip import Clip
 from ui.panels.clips.menu import draw_cutting
 from ui.panels.editing.labels import draw_label_field
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title, state_words
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.seam_lane import seam_at
 from ui.panels.timeline.stage import Stage
 from ui.panels.training.clip_training_menu import draw_clip_training
@@ -20,7 +20,7 @@ from ui.style.theme import Icon
 POPUP = "clip menu"
 
 
-def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:
+def draw_clip_menu(stage: Stage, session: SessionView, dispatch: Dispatch) -> None:
     """Opens after a click with the right button on the item drawn last, the track; draws the menu while it is open."""
     ui = stage.ui
     imgui.open_popup_on_item_click(POPUP, imgui.PopupFlags_.mouse_button_right)
@@ -51,7 +51,7 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
     imgui.end_popup()
 
 
-def _draw_time(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_time(clip: Clip, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
     if _item(ui, "go", f"{Icon.PLAY}  Go to its first frame"):
         dispatch(SetFrame(clip.start))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
+from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.timeline.clip_lane import draw_clip_lane
 from ui.panels.timeline.gutter import WIDTH as GUTTER_WIDTH
@@ -11,7 +12,6 @@ from ui.panels.timeline.gutter import draw_gutter
 from ui.panels.timeline.jump_box import draw_jump_box
 from ui.panels.timeline.marker_box import draw_marker_box
 from ui.panels.timeline.menu import draw_clip_menu
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.overview import draw_overview
 from ui.panels.timeline.path_lane import draw_path_lane
 from ui.panels.timeline.pointer import handle_track
@@ -36,7 +36,7 @@ from ui.panels.timeline.transport import draw_transport
 from ui.style import theme
 
 
-def draw_timeline(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_timeline(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Transport row, then the rows of time."""
     if session.capture is None:
         imgui.text_disabled("Frames and clips appear here when a capture is open.")
@@ -47,7 +47,7 @@ def draw_timeline(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> No
     _draw_rows(session, dispatch, ui)
 
 
-def _draw_rows(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_rows(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     left, right = origin.x + GUTTER_WIDTH, origin.x + max(size.x, GUTTER_WIDTH + 1.0)
     folded = ui.timeline.folded if session.paths.paths else ui.timeline.folded | {CAMERA}
@@ -75,7 +75,7 @@ def _draw_rows(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _stage(
-    session: TimelineNeeds,
+    session: SessionView,
     ui: UiState,
     track: Rect,
     rows: dict[str, Rect],
@@ -86,7 +86,7 @@ def _stage(
     return Stage(imgui.get_window_draw_list(), scale, track, rows, pointer, ui)
 
 
-def _draw_track(stage: Stage, session: TimelineNeeds) -> None:
+def _draw_track(stage: Stage, session: SessionView) -> None:
     draw, track, timeline = stage.draw, stage.track, session.timeline
     draw.add_rect_filled(track.low, track.high, theme.u32(theme.BACKDROP), 4)
     draw.push_clip_rect(track.low, track.high, True)

@@ -8,10 +8,10 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.session.paths.path_commands import ChooseCameraKey, TimeCameraKey
+from app.session.session_view import SessionView
 from engine.camera.camera_path import CameraPath
 from ui.panels.key_words import key_words
 from ui.panels.state import Dispatch, Rect
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import CAMERA
 from ui.panels.timeline.stage import Stage
 from ui.style import theme
@@ -25,7 +25,7 @@ EASY = 2.0
 """By how much a diamond is easier to hit than it looks."""
 
 
-def draw_path_lane(stage: Stage, session: TimelineNeeds) -> None:
+def draw_path_lane(stage: Stage, session: SessionView) -> None:
     """A line from the first to the last key, a diamond per key; a loop goes on, fainter, till it is back."""
     status, row, scale = session.paths, stage.rows[CAMERA], stage.scale
     path = status.path
@@ -71,7 +71,7 @@ def keys_in_sight(stage: Stage, path: CameraPath) -> range:
     return range(int(first), int(stop))
 
 
-def key_at(stage: Stage, session: TimelineNeeds) -> int | None:
+def key_at(stage: Stage, session: SessionView) -> int | None:
     """Number of the key under the pointer."""
     path = session.paths.path
     if path is None or stage.pointer is None or not stage.is_pointed_at(CAMERA):
@@ -82,7 +82,7 @@ def key_at(stage: Stage, session: TimelineNeeds) -> int | None:
     return nearest if distance <= CHOSEN_HALF + EASY else None
 
 
-def handle_keys_of_path(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> bool:
+def handle_keys_of_path(stage: Stage, session: SessionView, dispatch: Dispatch) -> bool:
     """For the item drawn last, the track: whether the pointer has to do with a key, and with nothing else."""
     tool, status = stage.ui.paths, session.paths
     if imgui.is_item_activated():

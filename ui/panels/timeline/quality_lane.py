@@ -10,9 +10,9 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.psnr_words import psnr_words
+from app.session.session_view import SessionView
 from ui.panels.timeline.clip_lane import clips_in_sight
 from ui.panels.timeline.columns import MIN_GROUP_WIDTH, group_size, means_of_groups, runs_of
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import QUALITY
 from ui.panels.timeline.stage import Stage
 from ui.style import theme
@@ -23,7 +23,7 @@ MIN_FRAME_GROUP_WIDTH = 4.0
 """Frames narrower than this count together, units of the screen."""
 
 
-def draw_quality_lane(stage: Stage, session: TimelineNeeds) -> None:
+def draw_quality_lane(stage: Stage, session: SessionView) -> None:
     """The steps in sight, and the figures under the pointer."""
     scale = stage.scale
     stage.draw.add_line_h(scale.x0, scale.x1, _height(stage, MIDDLE_DB), theme.u32(theme.faded(theme.TEXT, 0.12)))
@@ -41,7 +41,7 @@ def draw_quality_lane(stage: Stage, session: TimelineNeeds) -> None:
         _draw_note(session, scale.frame_at(stage.pointer[0]), frames)
 
 
-def _starts(session: TimelineNeeds, places: np.ndarray) -> np.ndarray:
+def _starts(session: SessionView, places: np.ndarray) -> np.ndarray:
     """First frames of clips; of one past the last clip the number of frames."""
     clips = session.clips
     return np.array([clips[place].start if place < len(clips) else clips[-1].stop for place in places.tolist()])
@@ -97,7 +97,7 @@ def _height(stage: Stage, decibels: float) -> float:
     return row.y1 - 2 - (row.height - 4) * float(_shares(decibels))
 
 
-def _draw_note(session: TimelineNeeds, frame_index: int, frames: np.ndarray) -> None:
+def _draw_note(session: SessionView, frame_index: int, frames: np.ndarray) -> None:
     clip = session.timeline.clip_of(frame_index)
     if clip is None:
         return

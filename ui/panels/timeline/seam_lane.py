@@ -12,11 +12,11 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.modes.color_maps import COLOR_MAPS, N_COLORS
+from app.session.session_view import SessionView
 from app.status import SEAM_RATIO_FLAGGED, SEAM_RATIO_RANGE
 from ui.panels.state import Rect
 from ui.panels.timeline.clip_lane import clips_in_sight
 from ui.panels.timeline.columns import group_size, largest_of_groups, provisional_text
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import SEAMS
 from ui.panels.timeline.stage import Stage, small_text
 from ui.style import theme
@@ -51,7 +51,7 @@ def ratio_text(ratio: float) -> str:
     return f"{ratio:.1f}!" if ratio > SEAM_RATIO_FLAGGED else f"{ratio:.1f}"
 
 
-def seams_in_sight(stage: Stage, session: TimelineNeeds) -> list[tuple[int, float]]:
+def seams_in_sight(stage: Stage, session: SessionView) -> list[tuple[int, float]]:
     """Clip behind the seam and ratio (NaN where not all of it is measured) of every mark, from left to right."""
     first, stop = clips_in_sight(session, stage.scale)
     n_clips = min(len(session.clips), len(session.clip_states))
@@ -70,7 +70,7 @@ def seams_in_sight(stage: Stage, session: TimelineNeeds) -> list[tuple[int, floa
     return list(zip((first + worst).tolist(), largest.tolist(), strict=True))
 
 
-def draw_seam_lane(stage: Stage, session: TimelineNeeds) -> None:
+def draw_seam_lane(stage: Stage, session: SessionView) -> None:
     """The marks in sight, and what is known of the one under the pointer."""
     row = stage.rows[SEAMS]
     marks = seams_in_sight(stage, session)
@@ -89,7 +89,7 @@ def draw_seam_lane(stage: Stage, session: TimelineNeeds) -> None:
         _draw_note(session, *pointed)
 
 
-def _provisional(session: TimelineNeeds, clip_index: int) -> str:
+def _provisional(session: SessionView, clip_index: int) -> str:
     seams = session.residual_status.seams[clip_index - 1 : clip_index]
     return "".join(provisional_text(seam) for seam in seams if seam.clip_index == clip_index)
 
@@ -112,7 +112,7 @@ def _draw_mark(stage: Stage, mark: Rect, ratio: float, text: str, room: float) -
         small_text(draw, mark.x1 + 3, mark.y0 + 1, text, color)
 
 
-def seam_at(stage: Stage, session: TimelineNeeds) -> tuple[int, float] | None:
+def seam_at(stage: Stage, session: SessionView) -> tuple[int, float] | None:
     """The mark under the pointer: the clip behind it and its ratio."""
     if not stage.is_pointed_at(SEAMS) or stage.pointer is None:
         return None
@@ -124,7 +124,7 @@ def seam_at(stage: Stage, session: TimelineNeeds) -> tuple[int, float] | None:
     return (clip_index, ratio) if distance <= REACH else None
 
 
-def _draw_note(session: TimelineNeeds, clip_index: int, ratio: float) -> None:
+def _draw_note(session: SessionView, clip_index: int, ratio: float) -> None:
     words = f"Seam between clips {clip_index - 1} and {clip_index}, at frame {session.clips[clip_index].start}"
     text = _provisional(session, clip_index) if np.isnan(ratio) else ratio_text(ratio)
     if text:

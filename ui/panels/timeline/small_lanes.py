@@ -7,9 +7,9 @@ from imgui_bundle import ImVec2, imgui
 
 from app.document.project_document import Marker
 from app.playback.timeline import Timeline
+from app.session.session_view import SessionView
 from ui.panels.state import Rect
 from ui.panels.timeline.columns import merged_spans
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import CACHE, MARKERS
 from ui.panels.timeline.stage import SMALL_TEXT, Stage, small_text, small_width
 from ui.panels.widgets import elided
@@ -22,7 +22,7 @@ MIN_MARKER_DISTANCE = 3.0
 MAX_NAME_WIDTH = 220.0
 
 
-def draw_cache_lane(stage: Stage, session: TimelineNeeds) -> None:
+def draw_cache_lane(stage: Stage, session: SessionView) -> None:
     """A strip under every frame that can be shown at once."""
     row, scale = stage.rows[CACHE], stage.scale
     middle = (row.y0 + row.y1) / 2

@@ -8,10 +8,10 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.timeline import SPEEDS, Timeline
 from app.session.commands import FollowTraining, TogglePlay
+from app.session.session_view import SessionView
 from ui.panels.actions.time import go_to_frame
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title
-from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.units import FRAMES, SECONDS, format_time
 from ui.panels.widgets import text_right
 from ui.style import theme
@@ -27,7 +27,7 @@ def speed_text(speed: float) -> str:
     return f"{Fraction(speed).limit_denominator(8)}x"
 
 
-def draw_transport(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_transport(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Buttons, the frame's number, what is played, and the clip at the right end."""
     timeline = session.timeline
     width = imgui.get_content_region_avail().x
@@ -70,7 +70,7 @@ def played_words(timeline: Timeline) -> str:
     return "  ".join(f"{name} {frame_index}" for name, frame_index in ends if frame_index is not None)
 
 
-def _draw_buttons(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
     if _icon_button(ui, "first", Icon.FIRST, "First frame (Home)"):
         go_to_frame(timeline, dispatch, 0)

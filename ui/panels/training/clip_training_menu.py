@@ -2,42 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
-
 from imgui_bundle import imgui
 
 from app.session.clips.clip_commands import TrainStale
 from app.session.commands import AskTrainSettings, RemoveFromQueue, TrainAll, TrainClip, TrainClips
-from app.status import ClipStatus, ProjectStatus, QueueStatus, TrainingStatus
+from app.session.session_view import SessionView
+from app.status import ClipStatus
 from engine.text import duration_text
 from ui.panels.copying import draw_copy_menu
 from ui.panels.state import Dispatch, UiState
-from ui.panels.training.clip_versions import VersionNeeds, draw_versions_menu
+from ui.panels.training.clip_versions import draw_versions_menu
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
 
 GOING = ("preparing", "training", "paused")
 """States of the clip that trains."""
-
-
-class ClipMenuNeeds(VersionNeeds, Protocol):
-    """What the entries read."""
-
-    @property
-    def clip_states(self) -> Sequence[ClipStatus]: ...
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    @property
-    def queue(self) -> QueueStatus: ...
-
-    @property
-    def reference_index(self) -> int: ...
-
-    @property
-    def project_status(self) -> ProjectStatus | None: ...
 
 
 def train_label(status: ClipStatus) -> str:
@@ -50,7 +29,7 @@ def train_label(status: ClipStatus) -> str:
 
 
 def draw_clip_training(
-    session: ClipMenuNeeds, dispatch: Dispatch, ui: UiState, clip_index: int, *, is_by_key: bool = False
+    session: SessionView, dispatch: Dispatch, ui: UiState, clip_index: int, *, is_by_key: bool = False
 ) -> None:
     """Entries: train or retry, from here, all, with other settings, out of the queue, earlier versions.
 
@@ -94,7 +73,7 @@ def draw_clip_training(
     draw_versions_menu(session, dispatch, ui, clip_index)
 
 
-def _unfinished(session: ClipMenuNeeds, coming: set[int], first: int) -> tuple[int, ...]:
+def _unfinished(session: SessionView, coming: set[int], first: int) -> tuple[int, ...]:
     """Clips from one on that are not finished and not on their way."""
     states = enumerate(session.clip_states[first:], first)
     done = ("trained", "damaged", *GOING)

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import imgui
 
 from app.psnr_words import psnr_label
 from app.session.clips.clip_commands import CompareVersion
 from app.session.commands import RemoveVersion, RestoreVersion
+from app.session.session_view import SessionView
 from app.status import VersionStatus
 from engine.text import size_text
-from ui.panels.copying import CopyNeeds, draw_copy_menu
+from ui.panels.copying import draw_copy_menu
 from ui.panels.state import Dispatch, UiState
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
 
 MAX_DIFFERENCES = 6
-
-
-class VersionNeeds(CopyNeeds, Protocol):
-    """What the menu reads."""
-
-    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
 
 
 def version_text(version: VersionStatus) -> str:
@@ -40,7 +33,7 @@ def difference_lines(version: VersionStatus) -> list[str]:
     return lines if more <= 0 else [*lines[:MAX_DIFFERENCES], f"and {more} more settings"]
 
 
-def draw_versions_menu(session: VersionNeeds, dispatch: Dispatch, ui: UiState, clip_index: int) -> None:
+def draw_versions_menu(session: SessionView, dispatch: Dispatch, ui: UiState, clip_index: int) -> None:
     """A menu inside a menu; disabled where the clip has no earlier versions."""
     versions = session.clip_versions(clip_index)
     label = f"{Icon.CLOCK_BACK}  Earlier versions" + (f" ({len(versions)})" if versions else "")

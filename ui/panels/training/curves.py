@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.status import ClipStatus, TrainingStatus
+from app.session.session_view import SessionView
 from ui.panels.state import UiState
 from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.panels.training.curve_view import MAX_CHOSEN, CurveView, value_at, value_range
@@ -38,18 +37,6 @@ MENU_HEIGHT = 260.0
 HELP = "Wheel: zoom. Drag: move. Double click: everything."
 
 Points = Sequence[tuple[int, float]]
-
-
-class CurveNeeds(Protocol):
-    """What the plots read."""
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    @property
-    def clip_states(self) -> Sequence[ClipStatus]: ...
-
-    def clip_curves(self, clip_index: int) -> tuple[Points, Points] | None: ...
 
 
 @dataclass(frozen=True)
@@ -79,7 +66,7 @@ def seen_part(steps: np.ndarray, values: np.ndarray, limits: tuple[float, float]
     return np.ascontiguousarray(steps[rows]), np.ascontiguousarray(values[rows])
 
 
-def draw_curves(session: CurveNeeds, ui: UiState) -> None:
+def draw_curves(session: SessionView, ui: UiState) -> None:
     """A row to choose with, the plot of PSNR and the plot of the loss."""
     view, status = ui.curves, session.training
     shown = view.shown(status.curve_clip_index, len(session.clip_states))
@@ -108,7 +95,7 @@ def draw_curves(session: CurveNeeds, ui: UiState) -> None:
         ui.redraw_within(0.0)  # the other plot shows it, too
 
 
-def _histories(session: CurveNeeds, shown: Sequence[int]) -> dict[int, tuple[Points, Points]]:
+def _histories(session: SessionView, shown: Sequence[int]) -> dict[int, tuple[Points, Points]]:
     """Loss and PSNR of each; empty until they are read. One that is missing is asked for at a time."""
     found: dict[int, tuple[Points, Points]] = {index: ((), ()) for index in shown}
     for index in shown:
@@ -119,7 +106,7 @@ def _histories(session: CurveNeeds, shown: Sequence[int]) -> dict[int, tuple[Poi
     return found
 
 
-def _draw_choice(session: CurveNeeds, shown: Sequence[int], ui: UiState) -> None:
+def _draw_choice(session: SessionView, shown: Sequence[int], ui: UiState) -> None:
     view = ui.curves
     label = "Clips" if not view.chosen else f"Clips {', '.join(str(index) for index in shown)}"
     if imgui.small_button(f"{label}###curve clips"):

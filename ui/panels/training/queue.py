@@ -5,12 +5,11 @@ A row is moved by its arrows, by dragging, or by keys once it is chosen; see ui.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import MoveInQueue, RemoveFromQueue, SetLiveView, StopAfterClip, TrainAll, TrainClip
-from app.status import QueueStatus, SequenceForecast, TrainingStatus, UsageStatus
+from app.session.session_view import SessionView
+from app.status import QueueStatus, SequenceForecast, UsageStatus
 from engine.text import duration_text, size_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, text_right, text_wrapped_dim
@@ -27,19 +26,6 @@ LIVE_WORDS = {
     "low": ("Low", "Shows what was learned about every 10 s"),
     "live": ("Live", "Shows what was learned about every 2 s"),
 }
-
-
-class QueueNeeds(Protocol):
-    """What this part reads."""
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    @property
-    def queue(self) -> QueueStatus: ...
-
-    @property
-    def usage(self) -> UsageStatus: ...
 
 
 # ---- words -----------------------------------------------------------------------------------------------------
@@ -83,7 +69,7 @@ def usage_text(usage: UsageStatus) -> str:
 # ---- parts of the panel ----------------------------------------------------------------------------------------
 
 
-def draw_train_all(session: QueueNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_train_all(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The button that trains everything that is left, and what that takes; nothing where at most one clip is."""
     queue = session.queue
     everything, queued = queue.everything, queue.queued
@@ -106,7 +92,7 @@ def draw_train_all(session: QueueNeeds, dispatch: Dispatch, ui: UiState) -> None
         imgui.pop_text_wrap_pos()
 
 
-def draw_queue(session: QueueNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_queue(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Progress of the whole sequence, the clips that wait, and those that failed."""
     queue, queued = session.queue, session.queue.queued
     if queued is not None and (queued.n_clips > 1 or queue.n_done or queue.waiting):
@@ -122,7 +108,7 @@ def draw_queue(session: QueueNeeds, dispatch: Dispatch, ui: UiState) -> None:
         _draw_failed(clip_index, reason, dispatch, ui)
 
 
-def _draw_whole(session: QueueNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_whole(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     queue = session.queue
     imgui.progress_bar(min(max(queue.progress, 0.0), 1.0), ImVec2(-1, 6), "")
     ui.mark("queue.progress")
@@ -218,7 +204,7 @@ def _draw_failed(clip_index: int, reason: str, dispatch: Dispatch, ui: UiState) 
     imgui.pop_id()
 
 
-def draw_live_view(session: QueueNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_live_view(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """How often the clip that trains is shown anew."""
     imgui.align_text_to_frame_padding()
     imgui.text("Live view")

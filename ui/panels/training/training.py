@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
-
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.psnr_words import psnr_label, psnr_note
 from app.session.commands import PauseTraining, ResumeTraining, SetFrame, StopTraining, TrainNextClip
-from app.status import ClipStatus, PlanStatus, TrainingStatus
+from app.session.session_view import SessionView
+from app.status import ClipStatus, TrainingStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text
-from ui.panels.clips.section import ClipSectionNeeds, draw_clip_section, draw_stale
+from ui.panels.clips.section import draw_clip_section, draw_stale
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import STATE_WORDS, state_note
 from ui.panels.training.clip_quality import draw_clip_quality
-from ui.panels.training.clip_training_menu import ClipMenuNeeds, draw_clip_training
-from ui.panels.training.curves import CurveNeeds, draw_curves
+from ui.panels.training.clip_training_menu import draw_clip_training
+from ui.panels.training.curves import draw_curves
 from ui.panels.training.plan import draw_plan
-from ui.panels.training.queue import QueueNeeds, draw_live_view, draw_queue, draw_train_all, draw_usage
+from ui.panels.training.queue import draw_live_view, draw_queue, draw_train_all, draw_usage
 from ui.panels.widgets import primary_button, text_right, text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -33,29 +31,7 @@ Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
 
 
-class TrainingNeeds(QueueNeeds, CurveNeeds, ClipMenuNeeds, ClipSectionNeeds, Protocol):
-    """What this panel reads."""
-
-    @property
-    def capture(self) -> object | None: ...
-
-    @property
-    def training(self) -> TrainingStatus: ...
-
-    @property
-    def clips(self) -> Sequence[Clip]: ...
-
-    @property
-    def clip_states(self) -> Sequence[ClipStatus]: ...
-
-    @property
-    def plan(self) -> PlanStatus | None: ...
-
-    @property
-    def reference_index(self) -> int: ...
-
-
-def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Buttons, progress, queue, curves, quality over the clips, then one row per clip."""
     if session.capture is None:
         text_wrapped_dim("Training starts from here when a capture is open.")
@@ -81,7 +57,7 @@ def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> No
     _draw_clips(session, dispatch, ui)
 
 
-def next_label(session: TrainingNeeds) -> str:
+def next_label(session: SessionView) -> str:
     """What starts the next clip, with its icon: a clip that was stopped goes on where that was."""
     index, step = session.training.next_clip_index, session.training.resume_step
     if index is None:
@@ -94,7 +70,7 @@ def next_label(session: TrainingNeeds) -> str:
     return f"{Icon.TRAIN}  Train next clip"
 
 
-def _draw_buttons(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     status = session.training
     width = imgui.get_content_region_avail().x
     if status.state in ("idle", "failed"):
@@ -188,7 +164,7 @@ def clip_note(status: ClipStatus) -> str:
     return "\n".join(lines)
 
 
-def _draw_clips(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_clips(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
     flags |= imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x
     if not imgui.begin_table("clips", 3, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, LEAST_TABLE))):
@@ -208,7 +184,7 @@ def _draw_clips(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None
     imgui.end_table()
 
 
-def _draw_clip_row(session: TrainingNeeds, clip: Clip, status: ClipStatus, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_clip_row(session: SessionView, clip: Clip, status: ClipStatus, dispatch: Dispatch, ui: UiState) -> None:
     imgui.table_next_row()
     imgui.table_next_column()
     imgui.push_id(clip.clip_index)

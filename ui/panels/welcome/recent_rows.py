@@ -4,16 +4,16 @@ where it lies, when it was open.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.modes.arrays import Picture
 from app.project.recents import RecentProject
 from app.session.commands import ForgetRecent, OpenCapture, OpenProject
+from app.session.session_view import RecentView
 from engine.text import one_line
 from ui.gl import ImageTexture
 from ui.panels.state import Dispatch, Rect, UiState
@@ -24,26 +24,6 @@ from ui.style.theme import Icon
 
 ROW_HEIGHT, PICTURE_WIDTH, PADDING = 62.0, 96.0, 4.0
 BUTTON = 28.0
-
-
-class ProjectPicturesRead(Protocol):
-    """Small pictures of projects."""
-
-    @property
-    def found(self) -> Mapping[Path, Picture]: ...
-
-
-class RecentList(Protocol):
-    """What was opened lately."""
-
-    @property
-    def entries(self) -> Sequence[RecentProject]: ...
-
-    @property
-    def missing(self) -> frozenset[Path]: ...
-
-    @property
-    def pictures(self) -> ProjectPicturesRead: ...
 
 
 def open_recent(entry: RecentProject) -> OpenProject | OpenCapture:
@@ -68,14 +48,14 @@ class RecentRows:
             texture.release()
         self._textures.clear()
 
-    def draw(self, recent: RecentList, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, recent: RecentView, dispatch: Dispatch, ui: UiState) -> None:
         """One row per project: Enter or a click opens it, the cross takes it out of the list."""
         for index, entry in enumerate(recent.entries):
             imgui.push_id(index)
             self._draw_row(index, entry, recent, dispatch, ui)
             imgui.pop_id()
 
-    def _draw_row(self, index: int, entry: RecentProject, recent: RecentList, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_row(self, index: int, entry: RecentProject, recent: RecentView, dispatch: Dispatch, ui: UiState) -> None:
         is_gone = entry.folder in recent.missing
         start, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x - BUTTON - 6
         flags = imgui.SelectableFlags_.disabled if is_gone else imgui.SelectableFlags_.none
@@ -98,7 +78,7 @@ class RecentRows:
         imgui.dummy(ImVec2(0, 0))
         self._draw_inside(entry, recent, ui, Rect(start.x, start.y, start.x + width, start.y + ROW_HEIGHT))
 
-    def _draw_inside(self, entry: RecentProject, recent: RecentList, ui: UiState, row: Rect) -> None:
+    def _draw_inside(self, entry: RecentProject, recent: RecentView, ui: UiState, row: Rect) -> None:
         is_gone = entry.folder in recent.missing
         draw, dim = imgui.get_window_draw_list(), theme.u32(theme.TEXT_DIM)
         x = row.x0 + PADDING

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.modes.arrays import Picture
+from app.session.session_view import SessionView
 from ui.gl import ImageTexture
 from ui.panels.state import Rect, UiState
 from ui.style import theme
@@ -17,12 +16,6 @@ from ui.style.theme import Icon
 WIDTH_PX = 160
 MOST = 256
 ASK_AGAIN_S = 0.1
-
-
-class ThumbnailNeeds(Protocol):
-    """What small pictures are made from."""
-
-    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None: ...
 
 
 class Thumbnails:
@@ -53,7 +46,7 @@ class Thumbnails:
             texture.release()
         self._textures.clear()
 
-    def draw(self, session: ThumbnailNeeds, camera_index: int, frame_index: int, box: Rect, ui: UiState) -> None:
+    def draw(self, session: SessionView, camera_index: int, frame_index: int, box: Rect, ui: UiState) -> None:
         """Draw what a camera took into a box, cut to its shape; a camera's sign until it is there."""
         texture = self._get(session, camera_index, frame_index, ui)
         draw = imgui.get_window_draw_list()
@@ -65,7 +58,7 @@ class Thumbnails:
         white = theme.u32(theme.rgb(255, 255, 255))
         draw.add_image_rounded(imgui.ImTextureRef(texture.texture.glo), box.low, box.high, low, high, white, 3)
 
-    def _get(self, session: ThumbnailNeeds, camera_index: int, frame_index: int, ui: UiState) -> ImageTexture | None:
+    def _get(self, session: SessionView, camera_index: int, frame_index: int, ui: UiState) -> ImageTexture | None:
         key = (camera_index, frame_index)
         known = self._textures.get(key)
         if known is not None:

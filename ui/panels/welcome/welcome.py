@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import OpenCapture
-from app.status import JobStatus
+from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.welcome.recent_rows import RecentList, RecentRows
+from ui.panels.welcome.recent_rows import RecentRows
 from ui.panels.widgets import draw_job_bar, pop_bold, primary_button, push_bold, text_right, text_wrapped_dim
 from ui.style import theme
 from ui.style.progress_words import job_words
@@ -24,17 +22,7 @@ HINTS_WIDTH = 560.0
 """In a card at least this wide both hints stand in one line."""
 
 
-class WelcomeNeeds(Protocol):
-    """What the first screen reads."""
-
-    @property
-    def jobs(self) -> Sequence[JobStatus]: ...
-
-    @property
-    def recent(self) -> RecentList: ...
-
-
-def draw_welcome(session: WelcomeNeeds, dispatch: Dispatch, ui: UiState, area: Rect, rows: RecentRows) -> None:
+def draw_welcome(session: SessionView, dispatch: Dispatch, ui: UiState, area: Rect, rows: RecentRows) -> None:
     """A card in the middle of the area. rows: Owns the pictures of recent projects."""
     x, y = area.center
     width, height = min(CARD_SIZE[0], area.width - 24), min(CARD_SIZE[1], area.height - 24)
@@ -84,7 +72,7 @@ def draw_welcome(session: WelcomeNeeds, dispatch: Dispatch, ui: UiState, area: R
     imgui.pop_style_color()
 
 
-def _draw_recent(session: WelcomeNeeds, dispatch: Dispatch, ui: UiState, rows: RecentRows) -> None:
+def _draw_recent(session: SessionView, dispatch: Dispatch, ui: UiState, rows: RecentRows) -> None:
     """The list, as high as there is room for; it scrolls."""
     if session.recent.entries:
         imgui.text_disabled("Opened lately")

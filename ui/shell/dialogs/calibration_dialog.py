@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.calibration.job import CalibrationRequest
 from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
 from app.session.commands import CalibrateVideos, CloseQuestion, Command, KeepCalibration, OpenCapture, StopCalibration
+from app.session.session_view import SessionView
 from app.status import JobStatus
 from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance, Lens, Up
 from ui.panels.state import Dispatch, UiState
@@ -45,23 +45,6 @@ ABOUT = (
 )
 
 
-class CalibratingNeeds(Protocol):
-    """What the dialog reads of `Calibrating`."""
-
-    @property
-    def page(self) -> CalibrationPage | None: ...
-
-    @property
-    def progress(self) -> JobStatus | None: ...
-
-
-class HasCalibrating(Protocol):
-    """A session with one."""
-
-    @property
-    def calibrating(self) -> CalibratingNeeds: ...
-
-
 class CalibrationDialog:
     """Owns what was chosen so far."""
 
@@ -74,7 +57,7 @@ class CalibrationDialog:
         self._pair, self._metres = (0, 1), 1.0
         self._out = ""
 
-    def draw(self, session: HasCalibrating, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog while there is a folder to be calibrated."""
         page = session.calibrating.page
         keys = self._modal.begin(None if page is None else TITLE, TITLE, SIZE)

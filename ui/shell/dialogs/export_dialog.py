@@ -5,8 +5,6 @@ Enter exports where nothing is wrong, Escape closes. What is asked follows from 
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from imgui_bundle import ImVec2, imgui
 
 from app.export.export_choices import FRAMES_CHOICES, ExportChoices, ExportContext, FramesChoice
@@ -16,12 +14,13 @@ from app.export.jobs.question import Question
 from app.export.jobs.table import KINDS
 from app.export.picked_frames import PickedFrames
 from app.session.commands import CloseQuestion, Command, StartExport
+from app.session.exporting import ExportPage
+from app.session.session_view import SessionView
 from engine.text import one_line
-from ui.panels.copying import COMMAND, CopyNeeds, draw_copy_entries
-from ui.panels.exports import ExportingFacts
+from ui.panels.copying import COMMAND, draw_copy_entries
 from ui.panels.state import EXPORTS, Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, segment, text_wrapped_dim
-from ui.shell.dialogs.export_place import LABEL_WIDTH, REFRESH_S, ExportPlace, Suggests, draw_plan, label
+from ui.shell.dialogs.export_place import LABEL_WIDTH, REFRESH_S, ExportPlace, draw_plan, label
 from ui.shell.dialogs.modal import Modal
 from ui.style import theme
 from ui.style.theme import Icon
@@ -37,43 +36,17 @@ MAX_RADIOS = 6
 """More answers than this go into a box, and names whatever their number."""
 
 
-class ExportingNeeds(ExportingFacts, Suggests, Protocol):
-    """What the dialog reads of Exporting."""
-
-    @property
-    def page(self) -> ExportPageFacts | None: ...
-
-    def plan(self, choices: ExportChoices) -> ExportPlan | None: ...
-
-
-class ExportPageFacts(Protocol):
-    """See app.session.exporting.ExportPage."""
-
-    @property
-    def context(self) -> ExportContext: ...
-
-    @property
-    def choices(self) -> ExportChoices: ...
-
-
-class HasExporting(CopyNeeds, Protocol):
-    """A session with one."""
-
-    @property
-    def exporting(self) -> ExportingNeeds: ...
-
-
 class ExportDialog:
     """Owns what was chosen so far."""
 
     def __init__(self) -> None:
         self._modal = Modal()
-        self._page: ExportPageFacts | None = None
+        self._page: ExportPage | None = None
         self._choices = ExportChoices()
         self._place = ExportPlace()
         self._is_box_open = False
 
-    def draw(self, session: HasExporting, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog while an export is asked for."""
         exporting = session.exporting
         page = exporting.page
@@ -207,7 +180,7 @@ class ExportDialog:
             self._choices = self._choices.with_step(step)
 
     def _draw_buttons(
-        self, session: HasExporting, page: ExportPageFacts, plan: ExportPlan | None, ui: UiState, *, is_agreed: bool
+        self, session: SessionView, page: ExportPage, plan: ExportPlan | None, ui: UiState, *, is_agreed: bool
     ) -> Command | None:
         is_possible = plan is not None and not plan.problems
         imgui.begin_disabled(not is_possible)

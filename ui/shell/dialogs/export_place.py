@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import portable_file_dialogs as native
 
 from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
+from app.session.session_view import ExportingView
 from ui.panels.exports import bytes_text, files_text
 from ui.panels.state import UiState
 from ui.panels.widgets import text_wrapped, text_wrapped_dim
@@ -18,14 +19,6 @@ from ui.style.theme import Icon
 
 LABEL_WIDTH = 130.0
 REFRESH_S = 0.1
-
-
-class Suggests(Protocol):
-    """Something that knows places for exports."""
-
-    def suggest(self, choices: ExportChoices) -> str | None:
-        """One of these; None while it is looked for."""
-        ...
 
 
 class ExportPlace:
@@ -46,7 +39,7 @@ class ExportPlace:
         self._suggested, self.is_looking = choices.out, not choices.out
         self._has_native = has_native_dialog()
 
-    def suggested(self, exporting: Suggests, before: ExportChoices, now: ExportChoices) -> ExportChoices:
+    def suggested(self, exporting: ExportingView, before: ExportChoices, now: ExportChoices) -> ExportChoices:
         """The choices with another name, where they have changed so that they need one and it was found."""
         if (now.kind, now.answers) != (before.kind, before.answers) and now.out == self._suggested:
             self.is_looking = True

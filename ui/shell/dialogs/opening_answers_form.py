@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
 from app.project.capture_report import CaptureReport
 from app.project.opening_answers import OpeningAnswers
 from app.session.questions import OpeningPage
+from app.session.session_view import OpeningView
 from app.status import OpeningForecast
 from engine.capture.pixels.frame_fit import FrameFit
 from engine.text import duration_text
@@ -31,14 +31,6 @@ _FIT_CHOICES: dict[FrameFit, str] = {
     "cropped_middle": "Cropped on both sides",
 }
 """What may have become of frames of another shape than their calibration."""
-
-
-class ForecastNeeds(Protocol):
-    """What the form asks of the session."""
-
-    def forecast(self, answers: OpeningAnswers) -> tuple[OpeningForecast | None, bool]: ...
-
-    def problem(self, answers: OpeningAnswers) -> str: ...
 
 
 class AnswersForm:
@@ -81,7 +73,7 @@ class AnswersForm:
             fit=self._fit,
         )
 
-    def draw(self, needs: ForecastNeeds, ui: UiState, *, is_fixed: bool) -> None:
+    def draw(self, needs: OpeningView, ui: UiState, *, is_fixed: bool) -> None:
         """Draw the questions and the forecast. is_fixed: Enter was pressed, which accepts and changes nothing."""
         assert self._page is not None
         report = self._page.report

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -15,6 +14,7 @@ from app.playback.modes.arrays import Picture
 from app.project.capture_report import CaptureReport, RefusedFolder
 from app.session.commands import CloseQuestion, OpenCapture
 from app.session.questions import OpeningPage
+from app.session.session_view import OpeningView, SessionView
 from engine.doctor.finding import Finding
 from engine.text import one_line
 from ui.gl import ImageTexture
@@ -23,7 +23,7 @@ from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.welcome.thumbnails import crop_to
 from ui.panels.widgets import elided, elided_path, pop_bold, primary_button, push_bold, text_wrapped, text_wrapped_dim
 from ui.shell.dialogs.modal import Modal
-from ui.shell.dialogs.opening_answers_form import AnswersForm, ForecastNeeds
+from ui.shell.dialogs.opening_answers_form import AnswersForm
 from ui.shell.dialogs.refused_folder import draw_refused
 from ui.style import theme
 from ui.style.theme import Icon
@@ -39,29 +39,6 @@ WORD_WIDTH = 92.0
 INDENT = 23.0
 """Of what belongs to words behind a sign."""
 MORE = 'Once it is open, "Examine the capture" looks at the pictures, too.'
-
-
-class OpeningNeeds(ForecastNeeds, Protocol):
-    """What the dialog reads of `CaptureOpening`."""
-
-    @property
-    def page(self) -> OpeningPage | None: ...
-
-    @property
-    def refused(self) -> RefusedFolder | None: ...
-
-    @property
-    def pictures(self) -> Mapping[int, Picture]: ...
-
-    @property
-    def findings(self) -> Sequence[Finding] | None: ...
-
-
-class HasOpening(Protocol):
-    """A session with one."""
-
-    @property
-    def opening(self) -> OpeningNeeds: ...
 
 
 class OpeningDialog:
@@ -84,7 +61,7 @@ class OpeningDialog:
             texture.release()
         self._textures.clear()
 
-    def draw(self, session: HasOpening, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog, if there is something to be asked or told."""
         opening = session.opening
         shown = opening.page or opening.refused
@@ -112,7 +89,7 @@ class OpeningDialog:
             dispatch(answer)
 
     def _draw_page(
-        self, page: OpeningPage, opening: OpeningNeeds, ui: UiState, *, is_agreed: bool
+        self, page: OpeningPage, opening: OpeningView, ui: UiState, *, is_agreed: bool
     ) -> OpenCapture | CloseQuestion | None:
         self._form.begin(page)
         height = -(BUTTON.y + 18)
@@ -150,7 +127,7 @@ class OpeningDialog:
             )
         return None
 
-    def _draw_report(self, report: CaptureReport, folder: Path, opening: OpeningNeeds, ui: UiState) -> None:
+    def _draw_report(self, report: CaptureReport, folder: Path, opening: OpeningView, ui: UiState) -> None:
         width = imgui.get_content_region_avail().x
         push_bold(ui, ui.fonts.body_size + 2)
         imgui.text(elided(report.path.name or str(report.path), width))

@@ -5,10 +5,8 @@ A dialog is up as long as the session has the question. Enter says yes, Escape n
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
@@ -35,7 +33,7 @@ from app.session.questions import (
     SettingsQuestion,
     StartOverQuestion,
 )
-from app.status import JobStatus
+from app.session.session_view import SessionView
 from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
@@ -58,16 +56,6 @@ MAX_ROWS = 6
 """Of the list of projects; it scrolls."""
 
 
-class QuestionNeeds(Protocol):
-    """What the dialogs read."""
-
-    @property
-    def question(self) -> Question | None: ...
-
-    @property
-    def jobs(self) -> Sequence[JobStatus]: ...
-
-
 class QuestionDialogs:
     """Owns which row is chosen; the question itself is the session's."""
 
@@ -77,7 +65,7 @@ class QuestionDialogs:
         self._settings, self._starting_over = SettingsDialog(), StartOverDialog()
         self._recovery, self._saving = RecoveryDialog(), SaveAsDialog()
 
-    def draw(self, session: QuestionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog of the session's question, if there is one."""
         question = session.question
         is_new, self._asked = question is not self._asked, question
@@ -134,7 +122,7 @@ class QuestionDialogs:
         if answer is not None:
             dispatch(answer)
 
-    def leave(self, session: QuestionNeeds, dispatch: Dispatch) -> None:
+    def leave(self, session: SessionView, dispatch: Dispatch) -> None:
         """What Escape does, for a question that cannot be drawn: it would be asked for ever."""
         if session.question is not None:
             dispatch(_closing(session.question))

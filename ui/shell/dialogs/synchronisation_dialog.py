@@ -6,12 +6,12 @@ Enter goes on where there is something to correct; Escape closes, and stops a me
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
 from app.session.commands import ApplyOffsets, CloseQuestion, Command, OpenCapture
+from app.session.session_view import SessionView
 from app.status import JobStatus
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import primary_button, text_wrapped, text_wrapped_dim
@@ -29,23 +29,6 @@ ABOUT = (
 )
 
 
-class SynchronisingNeeds(Protocol):
-    """What the dialog reads of `Synchronising`."""
-
-    @property
-    def page(self) -> SynchronisationPage | None: ...
-
-    @property
-    def progress(self) -> JobStatus | None: ...
-
-
-class HasSynchronising(Protocol):
-    """A session with one."""
-
-    @property
-    def synchronising(self) -> SynchronisingNeeds: ...
-
-
 class SynchronisationDialog:
     """Owns the folder that was typed."""
 
@@ -54,7 +37,7 @@ class SynchronisationDialog:
         self._target_of: Path | None = None
         self._target = ""
 
-    def draw(self, session: HasSynchronising, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog while cameras are synchronised."""
         page = session.synchronising.page
         keys = self._modal.begin(None if page is None else TITLE, TITLE, SIZE)

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided
-from ui.shell.finding.palette_entries import Entry, Found, PaletteNeeds, entries, found
+from ui.shell.finding.palette_entries import Entry, Found, entries, found
 from ui.style import theme
 from ui.style.theme import Icon
 
@@ -41,7 +42,7 @@ class Palette:
         """What is listed, best first."""
         return [hit.entry for hit in self._shown]
 
-    def draw(self, session: PaletteNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Open it where that was asked for, and draw it while it is open."""
         if ui.wishes.is_palette:
             ui.wishes.is_palette = False
@@ -63,7 +64,7 @@ class Palette:
             ui.preferences.note_used(chosen.id)
             chosen.run(session, dispatch, ui)
 
-    def _open(self, session: PaletteNeeds, ui: UiState) -> None:
+    def _open(self, session: SessionView, ui: UiState) -> None:
         self._typed, self._chosen, self._is_new = "", 0, True
         self._offered = entries(session, ui)
         self._find(ui)

@@ -6,16 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from app.session.commands import LookThrough, SetFrame
-from engine.capture.clip import Clip
+from app.session.session_view import SessionView
 from engine.text import one_line
-from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.table import ACTIONS
 from ui.panels.state import Dispatch, UiState
 from ui.panels.welcome.recent_rows import open_recent
-from ui.panels.welcome.welcome import WelcomeNeeds
 from ui.shell.finding.fuzzy import match
 
 MOST_SHOWN = 200
@@ -24,14 +21,7 @@ FOUND_BY_GROUP, CANNOT_BE_RUN = 12.0, 1.0
 """By how much such entries give way to others that match as well."""
 
 
-class PaletteNeeds(ActionNeeds, WelcomeNeeds, Protocol):
-    """What the palette reads."""
-
-    @property
-    def clips(self) -> Sequence[Clip]: ...
-
-
-Run = Callable[[PaletteNeeds, Dispatch, UiState], None]
+Run = Callable[[SessionView, Dispatch, UiState], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +54,7 @@ class Found:
     positions: tuple[int, ...] = ()
 
 
-def entries(session: PaletteNeeds, ui: UiState) -> list[Entry]:
+def entries(session: SessionView, ui: UiState) -> list[Entry]:
     """Everything there is to choose now: actions in the order of their table, then the rest."""
     actions = [
         Entry(
@@ -108,7 +98,7 @@ def found(typed: str, offered: Sequence[Entry], used: Sequence[str]) -> list[Fou
     return [hit[3] for hit in sorted(hits, key=lambda hit: hit[:3])[:MOST_SHOWN]]
 
 
-def _projects(session: PaletteNeeds) -> list[Entry]:
+def _projects(session: SessionView) -> list[Entry]:
     def opening(index: int) -> Run:
         recent = session.recent.entries[index]
         return lambda session, dispatch, ui: dispatch(open_recent(recent))
@@ -125,7 +115,7 @@ def _projects(session: PaletteNeeds) -> list[Entry]:
     ]
 
 
-def _cameras(session: PaletteNeeds) -> list[Entry]:
+def _cameras(session: SessionView) -> list[Entry]:
     def looking(camera_index: int | None) -> Run:
         return lambda session, dispatch, ui: dispatch(LookThrough(camera_index))
 
@@ -139,7 +129,7 @@ def _cameras(session: PaletteNeeds) -> list[Entry]:
     ]
 
 
-def _clips(session: PaletteNeeds) -> list[Entry]:
+def _clips(session: SessionView) -> list[Entry]:
     def going(frame_index: int) -> Run:
         return lambda session, dispatch, ui: dispatch(SetFrame(frame_index))
 
@@ -151,13 +141,13 @@ def _clips(session: PaletteNeeds) -> list[Entry]:
 
 def _layouts(ui: UiState) -> list[Entry]:
     def showing(name: str) -> Run:
-        def show(session: PaletteNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
             ui.wishes.layout = name
 
         return show
 
     def removing(name: str) -> Run:
-        def remove(session: PaletteNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        def remove(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
             ui.wishes.layout_removed = name
 
         return remove

@@ -5,14 +5,13 @@ centres, which stand there at once and show through what lies before them.
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
 from app.playback.modes.arrays import GaussianArrays
-from app.session.editing.selection_status import SelectionStatus
-from engine.editing.selection.seen_from import SeenFrom
+from app.session.session_view import SessionView
 from ui.gl import PointRenderer, Target
 from ui.gl.shaders import load_program
 from ui.style.colors import YELLOW
@@ -25,17 +24,6 @@ MAX_DOTS, FEW_DOTS = 3_000, 300
 HUE = np.array(YELLOW, np.float32)
 DOT_SIZE, RIM = 4.0, 1.2
 """Diameter, and the width of its dark rim; units."""
-
-
-class SelectionNeeds(Protocol):
-    """What is drawn here."""
-
-    @property
-    def selection(self) -> SelectionStatus: ...
-
-    def selected(self, gaussians: GaussianArrays) -> np.ndarray: ...
-
-    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None: ...
 
 
 class SelectionLayer:
@@ -71,7 +59,7 @@ class SelectionLayer:
         """Is there nothing to draw?"""
         return len(self._dots) == 0 and not self.is_share_shown
 
-    def take(self, session: SelectionNeeds, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
+    def take(self, session: SessionView, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
         """Take up what is selected now.
 
         Args:
