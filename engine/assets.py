@@ -21,5 +21,5 @@ def asset_path(*parts: str) -> Path:
     """
     path = _ROOT.joinpath(*parts).resolve()
     if not path.is_relative_to(_ROOT):
-        raise ValueError(f"asset {'/'.join(parts)!r} lies outside assets/")
+        raise ValueError(f"asset {'/'.join(parts)!r} is outside assets/")
     return path

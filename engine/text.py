@@ -55,6 +55,11 @@ def figure_text(value: float) -> str:
     return f"{value:,.{min(n_decimals, 6)}f}"
 
 
+def rate_text(fps: float) -> str:
+    """A frame rate as people write it: 25, 59.94, 23.976."""
+    return f"{round(fps, 3):g}"
+
+
 def size_text(megabytes: float) -> str:
     """An amount of memory or disk, in two or three digits."""
     if megabytes >= 999.5:

@@ -20,7 +20,7 @@ from engine.errors import ProjectError
 from engine.kernels.cache import use_kernel_cache
 from ui.style.ui_scale import parse_scale
 
-DEMO = {"demo": "train the first two clips and leave figures, a picture of the window and a video"}
+DEMO = {"demo": "train the first two clips, then write figures, a picture of the window and a video"}
 SWITCH_INTERVAL_S = 0.0005
 """How long another thread may keep the interpreter from the window's. A frame asks for it some twenty times, and the
 default of 5 ms adds up to a visible stall while a thread imports what draws."""
@@ -45,17 +45,17 @@ def build_parser() -> PlainParser:
     )
     parser.add_argument("path", nargs="?", type=path_argument, help="capture or project folder to open")
     add_follow_links(parser)
-    parser.add_argument("--read-only", action="store_true", help="only look at the project; nothing in it is changed")
+    parser.add_argument("--read-only", action="store_true", help="open the project read-only")
     parser.add_argument("--size", type=_parse_size, metavar="WxH", help="window size in pixels, for example 1440x900")
     parser.add_argument(
         "--ui-scale",
         type=parse_scale,
         default=argparse.SUPPRESS,  # then it is as it was chosen before
         metavar="SCALE",
-        help="size of the interface: auto, or 75%% to 250%%",
+        help="interface size: auto, or 75%% to 250%%",
     )
     add_backend(parser)
-    parser.add_argument("--verbose", action="store_true", help="log more")
+    parser.add_argument("--verbose", action="store_true", help="log more detail")
     return parser
 
 
@@ -71,7 +71,7 @@ def build_demo_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--out", type=path_argument, default=Path("demo_output"), help="folder for the results (default: demo_output)"
     )
-    parser.add_argument("--quick", action="store_true", help="a few steps only; shows that every part works")
+    parser.add_argument("--quick", action="store_true", help="only a few steps, to check that every part works")
     add_backend(parser)
     return parser
 

@@ -57,11 +57,11 @@ class StagedClips:
     def text(self) -> str:
         """What was done, and why something stays."""
         clips = "1 clip was" if len(self.clip_indices) == 1 else f"{len(self.clip_indices)} clips were"
-        said = f"{clips} written again without {self.n_anchors:,} anchors."
+        said = f"{clips} rewritten without {self.n_anchors:,} anchors."
         if self.kept:
             n = len(self.kept)
             said += f" {n} {'edit that deletes stays' if n == 1 else 'edits that delete stay'} in the stack: "
-            said += "anchors that are seen in other frames, or of which only some Gaussians are deleted, cannot go."
+            said += "anchors that are visible in other frames, or only partly deleted, must stay."
         return said
 
 
@@ -94,8 +94,8 @@ def stage(project: Project, deletions: Deletions, report: Report = lambda n_done
     """
     if not deletions.n_anchors:
         raise ProjectError(
-            "No anchor is deleted as a whole in all frames of its clip, so that nothing can be applied permanently.",
-            hint="The edits stay in the stack and hold as before.",
+            "No anchor is fully deleted in all frames of its clip, so nothing can be applied permanently.",
+            hint="The edits stay in the stack and still apply.",
         )
     folder = begin_exchange(project.folder)
     try:
@@ -139,7 +139,9 @@ def _staged(project: Project, folder: Path, deletions: Deletions, report: Report
         report(n_done, len(order))
         state = read_finished(project, clip_index)
         if state.header.fingerprint != deletions.clips[clip_index].fingerprint:
-            raise ProjectError(f"Clip {clip_index} has changed meanwhile.", hint="Look again at what can be applied.")
+            raise ProjectError(
+                f"Clip {clip_index} has changed in the meantime.", hint="Check again what can be applied."
+            )
         acted |= _deleting(state, old_reference, deletions.edits, acted)
         new = _new_state(state, deletions, clip_index, fingerprints)
         fingerprints[state.header.fingerprint] = new.header.fingerprint

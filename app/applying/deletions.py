@@ -108,8 +108,8 @@ def find_deletions(
     edits = project.document.edits if edits is None else edits
     if not any(edit.is_on and isinstance(edit.action, Delete) for edit in edits):
         raise ProjectError(
-            "There is nothing to apply: no edit that is on deletes anything.",
-            hint="Only deleting can be applied permanently; other edits stay in the stack.",
+            "Nothing to apply: no active edit deletes anything.",
+            hint="Only deletions can be applied permanently; other edits stay in the stack.",
         )
     config = project.settings.config()
     if config.field in ("continue", "joint"):

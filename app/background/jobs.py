@@ -135,7 +135,7 @@ class Jobs:
             try:
                 job.deliver()
             except Exception as error:  # the edge of a job: one bad result must not end the window
-                logger.exception("%s: the result could not be taken up", job.context.status.name)
+                logger.exception("%s: the result could not be used", job.context.status.name)
                 if self._on_fault is not None:
                     self._on_fault(job.context.status.name, error)
         return bool(finished)

@@ -64,4 +64,4 @@ def _open(path: Path) -> None:
     loader = ctypes.CDLL(None).dlopen  # ctypes.CDLL(path) itself keeps the lock; a foreign function does not
     loader.argtypes, loader.restype = (ctypes.c_char_p, ctypes.c_int), ctypes.c_void_p
     if not loader(os.fsencode(path), os.RTLD_NOW | os.RTLD_LOCAL):
-        logger.debug("%s could not be opened beforehand", path)
+        logger.debug("%s could not be opened ahead of time", path)

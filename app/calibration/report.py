@@ -11,9 +11,9 @@ from engine.text import printable
 GOOD_ERROR_PX = 1.0
 """Median reprojection error, at a width of 1,000 pixels, up to which nothing is to be done."""
 WHAT_HELPS = (
-    "What helps: a camera between it and its neighbour, or one of the two moved so that they see more of the same; "
-    "posters, boxes or other objects with fine, irregular patterns where both cameras look; somebody who walks through "
-    "all of the scene while all cameras film; even light; no motion blur. Or go on without it."
+    "What helps: a camera between it and its neighbour, or more overlap between the two; posters, boxes or other "
+    "objects with fine, irregular patterns in both views; someone walking through the whole scene while all cameras "
+    "film; even light; no motion blur. Or continue without it."
 )
 
 
@@ -47,8 +47,8 @@ def report_lines(calibration: Calibration, *, keeps_doubtful: bool = False) -> l
 
 def _doubtful_line(found: CalibratedRig, *, keeps_doubtful: bool) -> str:
     named = ", ".join(printable(name) for name, doubt in zip(found.rig.names, found.doubts, strict=True) if doubt)
-    what = "in use all the same; look at them before you train" if keeps_doubtful else "written as excluded"
-    return f"The places of these cameras cannot be trusted, they are {what}: {named}."
+    what = "still in use; check them before training" if keeps_doubtful else "written as excluded"
+    return f"The positions of these cameras are unreliable; they are {what}: {named}."
 
 
 def _camera_line(found: CalibratedRig, row: int) -> str:
@@ -75,10 +75,10 @@ def _missing_line(name: str, reason: str) -> str:
 def _scale_line(found: CalibratedRig) -> str:
     if found.is_metric:
         return "Size: in metres, by the known distance."
-    return "Size: unknown; one unit is not one metre. Give the distance between two cameras to have metres."
+    return "Size: unknown; one unit is not one metre. Give the distance between two cameras to get metres."
 
 
 def _up_line(found: CalibratedRig) -> str:
     if found.up == "floor":
-        return "Up: away from the floor, the largest level surface that was found below the cameras."
-    return "Up: where most cameras have their upper edge."
+        return "Up: away from the floor, the largest level surface found below the cameras."
+    return "Up: the upper edge of most cameras' pictures."

@@ -22,9 +22,7 @@ def check_target(out: Path, *, is_replacing: bool) -> None:
     if out.exists() and not out.is_dir():
         raise CaptureError("This is a file; a capture is a folder.", hint="Name another folder.", path=out)
     if (out / FILE).exists() and not is_replacing:
-        raise CaptureError(
-            f"There is a {FILE} already.", hint="Name another folder, or say that it may be replaced.", path=out
-        )
+        raise CaptureError(f"There is a {FILE} already.", hint="Name another folder, or allow replacing it.", path=out)
 
 
 def write_calibrated(

@@ -110,7 +110,7 @@ def add_backend(command: argparse.ArgumentParser) -> None:
         "--backend",
         default=argparse.SUPPRESS,  # then it is chosen otherwise
         metavar="NAME",
-        help=f"what to compute with: {backend_names()} (default: {AUTO}, the first that works on this machine)",
+        help=f"back end: {backend_names()} (default: {AUTO}, the first that works on this machine)",
     )
 
 
@@ -119,7 +119,7 @@ def add_follow_links(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--follow-links",
         action="store_true",
-        help="read files outside of the capture folder if it names some",
+        help="read files outside the capture folder if the capture names any",
     )
 
 
@@ -139,7 +139,7 @@ def parse_range(text: str, n: int, *, option: str, what: str) -> range:
     except ValueError as error:
         raise ProjectError(f"{option} is '{text}', which is not a range A:B.", hint=allowed) from error
     if not 0 <= start < stop <= n:
-        raise ProjectError(f"{option} is '{text}', which is empty or reaches outside.", hint=allowed)
+        raise ProjectError(f"{option} is '{text}', which is empty or out of range.", hint=allowed)
     return range(start, stop)
 
 

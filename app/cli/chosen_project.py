@@ -44,7 +44,7 @@ def open_for_training(options: argparse.Namespace, say: Callable[[str], None]) -
             project.update(settings)
             found = discard_unfitting(project, stored, settings)
             if found.progress:
-                say(f"The settings are others than before. Discarded: {found.words}")
+                say(f"The settings have changed. Discarded: {found.words}")
     except ProjectError:
         project.close()
         raise
@@ -138,7 +138,7 @@ def _check_changes(project: Project, capture: Capture, settings: ProjectSettings
     except SettingsFixed as error:
         listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)
         raise ProjectError(
-            f"The project was trained with {listed}; that cannot change any more: {training_of(project).words}.",
+            f"The project was trained with {listed}; this can no longer change: {training_of(project).words}.",
             hint="Leave the option out, choose another --project folder, or discard all of that with --start-over.",
             path=project.folder,
         ) from error

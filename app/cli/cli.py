@@ -85,7 +85,7 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
     except Exception as error:  # the edge of the command line: one line, no traceback
         logger.exception("%s failed", options.command)
         where = f" Details are in {log_file}." if log_file else ""
-        return fail(EXIT_FAILED, f"{type(error).__name__}: {error}. This is a fault of the program.{where}")
+        return fail(EXIT_FAILED, f"{type(error).__name__}: {error}. This is a bug in the program.{where}")
 
 
 @contextlib.contextmanager

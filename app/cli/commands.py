@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 if TYPE_CHECKING:
     from app.training.service import Launch
 
-_GOES_ON = "What was learned is kept; the same command goes on from there."
+_GOES_ON = "Progress is kept; the same command resumes from there."
 
 
 class CommandModule(Protocol):
@@ -50,7 +50,7 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "train": Command(
-        "train clips of a capture, or go on where it stopped", "app.cli.train_command", _GOES_ON, has_backend=True
+        "train clips of a capture, or resume training", "app.cli.train_command", _GOES_ON, has_backend=True
     ),
     "eval": Command(
         "measure trained clips against every camera, and the seams between them",
@@ -59,13 +59,13 @@ COMMANDS = {
         has_backend=True,
     ),
     "apply": Command(
-        "take what edits delete out of the clips for good",
+        "remove deleted anchors from the clips for good",
         "app.cli.projects.apply_command",
-        "Edits and clips fit together, before or after.",
+        "Clips and edits are consistent either way.",
         has_backend=True,
     ),
     "mend": Command(
-        "make a seam between two clips smaller, or a stretch that flickers, and measure it",
+        "reduce a seam between two clips, or flicker in a range of frames, and measure it",
         "app.cli.projects.mend_command",
         "All clips are as they were.",
         has_backend=True,
@@ -83,16 +83,16 @@ COMMANDS = {
         has_backend=True,
     ),
     "inspect": Command(
-        "examine and correct a capture, or say what the trained clips of a project weigh",
+        "examine and correct a capture, or show the size of a project's trained clips",
         "app.cli.captures.inspect_command",
     ),
     "calibrate": Command(
-        "find the cameras of a folder of plain videos, and make a capture of it",
+        "calibrate the cameras of a folder of plain videos, making it a capture",
         "app.cli.captures.calibrate_command",
         "Nothing was written.",
     ),
     "synchronise": Command(
-        "find how far each camera of a capture is ahead of the others, and correct it on request",
+        "measure how far each camera is ahead of the others, and optionally correct it",
         "app.cli.captures.synchronise_command",
         "Nothing was changed.",
     ),
@@ -105,24 +105,24 @@ COMMANDS = {
         "list the clips of a project, split and merge them, choose the reference", "app.cli.projects.clips_command"
     ),
     "versions": Command(
-        "list what clips were before they were trained again, bring it back, make room on the disk",
+        "list and restore earlier versions of clips, and free disk space",
         "app.cli.projects.versions_command",
     ),
     "exclude": Command("leave cameras and pictures out of training", "app.cli.projects.exclude_command"),
     "edit": Command(
-        "list and change the edits of a project, and take steps back",
+        "list and change the edits of a project, undo and redo",
         "app.cli.projects.edit_command",
         "Nothing was changed.",
         has_backend=True,
     ),
-    "gate": Command("say what is static in a project and why, and overrule it", "app.cli.projects.gate_command"),
-    "repair": Command("say what is left of a damaged project, and go on with it", "app.cli.projects.repair_command"),
+    "gate": Command("show what is static in a project and why, and overrule it", "app.cli.projects.gate_command"),
+    "repair": Command("show what is left of a damaged project, and repair it", "app.cli.projects.repair_command"),
     "doctor": Command(
-        "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.captures.doctor_command"
+        "check this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.captures.doctor_command"
     ),
-    "bench": Command("measure the kernels on this machine, speed beside error", "app.lab.bench.command"),
+    "bench": Command("measure speed and error of the kernels on this machine", "app.lab.bench.command"),
     "report": Command(
-        "write a page about a project, alone or beside others",
+        "write a report page about a project, alone or next to others",
         "app.lab.report.command",
         "The page was not written.",
         has_backend=True,

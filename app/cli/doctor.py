@@ -163,13 +163,13 @@ def _gl() -> Finding:
         hint = "The window needs OpenGL 3.3; training, eval and render do not."
         return Finding("OpenGL", f"not available. {hint}", is_fine=False)
     is_software = any(word in renderer.lower() for word in ("llvmpipe", "softpipe", "swrast", "software"))
-    how = "drawn by the processor, so the window shows the rasterizer's pictures" if is_software else "graphics card"
+    how = "software drawing, so the window shows the rasterizer's pictures" if is_software else "graphics card"
     return Finding("OpenGL", f"{version}, {renderer}: {how}")
 
 
 def _display() -> Finding:
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        return Finding("Display", "none; `clipgstream` runs its job without a window")
+        return Finding("Display", "none; commands run without a window")
     return Finding("Display", os.environ.get("DISPLAY", "yes"))
 
 

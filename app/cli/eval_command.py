@@ -30,7 +30,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also measure how many pictures are rendered per second, which takes some seconds",
     )
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:

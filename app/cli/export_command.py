@@ -55,7 +55,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--step", type=int, default=1, metavar="N", help="only every N-th of these frames (default: 1)"
     )
     command.add_argument("--json", action="store_true", help="print what was written as JSON on standard output")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
     add_job_arguments(command, jobs)
 
 

@@ -154,7 +154,7 @@ def _frame_ranges(options: argparse.Namespace, n_frames: int) -> range | PickedF
     for part in options.frames.split(","):
         chosen = parse_range(part, n_frames, option="--frames", what="frames")
         if spans and chosen.start < spans[-1][1]:
-            raise ProjectError(f"--frames is '{options.frames}', where ranges do not follow each other.")
+            raise ProjectError(f"--frames is '{options.frames}', whose ranges are not in order.")
         spans.append((chosen.start, chosen.stop))
     return picked_frames(spans, options.step)
 

@@ -14,7 +14,7 @@ from app.export.video.formats import FORMATS, format_of
 from app.project.project_access import open_project
 from app.training.service import Launch
 from engine.errors import ProjectError
-from engine.text import size_text
+from engine.text import rate_text, size_text
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -30,10 +30,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--frames",
         default=":",
         metavar="A:B",
-        help="frames A up to B, B not included (default: all that are trained, or those of the path)",
+        help="frames A up to B, B not included (default: all trained frames, or those of the path)",
     )
     add_job_arguments(command, [VideoJob])
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
@@ -49,10 +49,10 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     for note in written.notes:
         line.say(note)
     if written.depth_unit is not None:
-        line.say(f"One level of the 16 bits is {written.depth_unit:g} scene units; 0 is where nothing is.")
+        line.say(f"One of the 16-bit levels is {written.depth_unit:g} scene units; 0 is where nothing is.")
     width, height = written.size
     pictures = f"{written.n_pictures} picture{'' if written.n_pictures == 1 else 's'} of {width} x {height}"
-    line.say(f"{pictures}, {written.fps:g} per second, {size_text(written.n_bytes / 1e6)}, in {written.out}")
+    line.say(f"{pictures}, {rate_text(written.fps)} per second, {size_text(written.n_bytes / 1e6)}, in {written.out}")
     return EXIT_OK
 
 

@@ -34,9 +34,7 @@ from engine.training.config import parse_overrides
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream train`."""
     command.add_argument("capture", type=path_argument, help="capture folder")
-    command.add_argument(
-        "--project", type=path_argument, required=True, help="project folder; made when it is not there"
-    )
+    command.add_argument("--project", type=path_argument, required=True, help="project folder; created if missing")
     command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
     command.add_argument(
         "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
@@ -46,7 +44,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--again",
         action="store_true",
-        help="train chosen clips also where they are trained or damaged; what they were becomes a version",
+        help="train the chosen clips even if they are trained or damaged; the earlier result becomes a version",
     )
     command.add_argument(
         "--clip-set",
@@ -54,23 +52,23 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="a training setting that the chosen clips alone are to have; may be given several times",
+        help="a training setting for the chosen clips only; may be given several times",
     )
     command.add_argument(
         "--start-over",
         dest="is_starting_over",
         action="store_true",
-        help="first discard everything that is trained in the project, which frees its settings; --plan says what",
+        help="first discard everything trained in the project, so that its settings can change; --plan shows what",
     )
-    command.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
+    command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     command.add_argument(
-        "--plan", action="store_true", help="say what would be trained, why, and what it takes; train nothing"
+        "--plan", action="store_true", help="show what would be trained, why, and what it costs; train nothing"
     )
     command.add_argument(
         "--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output"
     )
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
@@ -170,10 +168,10 @@ def _plan(options: argparse.Namespace) -> int:
     for plan in plans:
         print("\n".join(plan_text(plan)))
     if trained:
-        print(f"Trained already: clip {', '.join(str(clip_index) for clip_index in trained)}")
+        print(f"Already trained: clip {', '.join(str(clip_index) for clip_index in trained)}")
     if damaged:
         listed = ", ".join(str(clip_index) for clip_index in damaged)
-        print(f"Left alone, because they are damaged or need one that is: clip {listed}")
+        print(f"Skipped, because damaged or in need of a damaged clip: clip {listed}")
     if len(plans) > 1:
         sums = totals(plans)
         times = (sums["preparation_s"], sums["training_s"])

@@ -27,7 +27,7 @@ def add_training_settings(command: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="change a training setting, also one of the preset; may be given several times",
+        help="change a training setting; may be given several times",
     )
     command.add_argument("--help-settings", action=SettingsHelp, help="list the training settings and exit")
 

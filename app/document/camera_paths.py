@@ -55,7 +55,7 @@ def to_path(stored: StoredPath) -> CameraPath:
         )
         return CameraPath(stored.name, keys, stored.is_closed)
     except ValueError as error:
-        raise ProjectError(f"A camera path makes no sense: {error}.") from error
+        raise ProjectError(f"A camera path is not valid: {error}.") from error
 
 
 def camera_path_named(paths: Sequence[CameraPath], name: str, folder: Path) -> CameraPath:

@@ -124,7 +124,7 @@ def evaluate_project(
                         on_progress(n_done, n_rows, item)
     except KeyboardInterrupt:
         is_kept = all(kept[i].is_writable for i in scope.clips)
-        words = "kept; the same command goes on from there" if is_kept else "lost: the project cannot be written to"
+        words = "kept; the same command resumes from there" if is_kept else "lost: the project cannot be written to"
         raise KeyboardInterrupt(f"{n_done} of {n_rows} pictures were measured and are {words}.") from None
     rows, pairs = _in_order(opened, scope, kept)
 

@@ -146,7 +146,7 @@ def _train_clip(
             )
         case WorkerDied():
             message = f"The training process ended with code {ending.exit_code}."
-            hint = f"Train again; it goes on from what was kept. Its log is {service.project.log_path(clip_index)}."
+            hint = f"Train again to resume. Its log is {service.project.log_path(clip_index)}."
             return ClipOutcome(clip_index, "failed", step, seconds=seconds, message=message, hint=hint)
         case _:
             return ClipOutcome(clip_index, "stopped", step, seconds=seconds)
@@ -157,12 +157,12 @@ def _left_alone(service: TrainingService, clip_index: int) -> ClipOutcome:
     record = service.catalog[clip_index]
     damaged = clip_index if record.state == "damaged" else record.blocked_by
     assert damaged is not None
-    message = f"Clip {clip_index} was left as it is: "
+    message = f"Clip {clip_index} was skipped: "
     message += (
         service.catalog[damaged].reason if damaged == clip_index else f"it needs clip {damaged}, which is damaged."
     )
     path = service.project.clip_path(damaged)
-    hint = f"Restore the file from a copy, or remove it to train clip {damaged} again - {path}"
+    hint = f"Restore the file from a backup, or remove it to train clip {damaged} again - {path}"
     return ClipOutcome(clip_index, "damaged", message=message, hint=hint, kind="ProjectError")
 
 

@@ -16,7 +16,7 @@ from engine.capture.frames import ImageFrames
 from engine.capture.writers.conversion import convert
 
 ROW_BYTES = {"colmap": 240, "transforms": 720}
-WORLD = "Cameras stand in the world of the Gaussians, in its units; frames stay where they are."
+WORLD = "Cameras are in the coordinates and units of the Gaussians; frames are not copied."
 
 
 def estimate(opened: TrainedProject, job: CamerasJob) -> ExportEstimate:
@@ -60,7 +60,7 @@ def _as_trained(opened: TrainedProject) -> tuple[Layout, tuple[str, ...]]:
     if not n_corrected:
         return layout, ()
     which = "1 camera was" if n_corrected == 1 else f"{n_corrected} cameras were"
-    said = f"{which} refined in training and written so; all others are as in the capture."
+    said = f"{which} refined in training and exported as refined; all others are as in the capture."
     return replace(layout, cameras=cameras), (said,)
 
 

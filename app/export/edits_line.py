@@ -12,7 +12,7 @@ MAX_TITLES = 3
 
 
 def edits_line(edits: Sequence[Edit], *, has_edits: bool = True) -> str:
-    """How many edits of a project go along with an export, and which: "2 edits go along: delete box 1 × 1 × 1, red".
+    """How many edits an export includes, and which: "2 edits are included: delete box 1 × 1 × 1, red".
     Empty where none is on, or the export leaves them out.
 
     Args:
@@ -23,5 +23,5 @@ def edits_line(edits: Sequence[Edit], *, has_edits: bool = True) -> str:
     if not titles or not has_edits:
         return ""
     more = [f"{len(titles) - MAX_TITLES} more"] if len(titles) > MAX_TITLES else []
-    counted = "1 edit goes along" if len(titles) == 1 else f"{len(titles)} edits go along"
+    counted = "1 edit is included" if len(titles) == 1 else f"{len(titles)} edits are included"
     return f"{counted}: {', '.join(titles[:MAX_TITLES] + more)}"

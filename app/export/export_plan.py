@@ -17,7 +17,7 @@ from engine.errors import EngineError, ProjectError
 if TYPE_CHECKING:
     from app.evaluation.headless import TrainedProject
 
-TAKEN = "Another export that runs or waits writes to this place."
+TAKEN = "Another running or waiting export writes to this place."
 _SAME = {".htm": ".html"}
 _OWN_SUFFIXES = (".mp4", ".webm", ".html")
 """They say what a file is."""
@@ -63,7 +63,7 @@ def plan_export(
     elif has_frames and answers.job_type.needs_trained and choices.frames != "all":
         problems += _untrained(context.untrained(answers.frames))
     if not choices.out.strip():
-        problems.append("Say where it is to be written.")
+        problems.append("Say where to write it.")
     if not problems:
         try:
             job = answers.make_job()
@@ -76,7 +76,7 @@ def plan_export(
             if any(overlap(answers.out.resolve(), other.resolve()) for other in taken):
                 raise ProjectError(TAKEN)
             if answers.suffix and answers.out.exists():
-                lines = (*lines, "The file that is there is replaced.")
+                lines = (*lines, "The existing file will be replaced.")
         except EngineError as error:
             problems.append(" ".join(part for part in error.told_apart() if part))
         except (OSError, RuntimeError, ValueError) as error:  # a path that cannot be one
@@ -106,13 +106,13 @@ def _check_name(answers: Answers) -> None:
     if suffix and _SAME.get(given, given) != suffix:
         raise ProjectError(f"The name of this file has to end in {suffix}.")
     if not suffix and _SAME.get(given, given) in _FILE_SUFFIXES:
-        raise ProjectError(f"A folder is written here, but its name ends in {given}.")
+        raise ProjectError(f"This export is a folder, but its name ends in {given}.")
 
 
 def _check_place(answers: Answers, opened: TrainedProject, n_bytes: int) -> None:
     out = answers.out
     if not out.is_absolute():
-        raise ValueError("give the whole path, from the root or from ~")
+        raise ValueError("give the full path, from the root or from ~")
     check_target(out, n_bytes=n_bytes, is_folder=not answers.suffix, opened=opened)
 
 

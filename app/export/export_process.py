@@ -36,7 +36,7 @@ logger = logging.getLogger(__name__)
 LISTEN_S = 0.1
 GRACE_S = 6.0
 """A process that was cancelled tidies up for so long before it is killed: what it loads just now is loaded first."""
-HINT = "Nothing was left behind. Try again; the log may say more."
+HINT = "No files were left. Try again; see the log for details."
 
 
 class Exporter(Protocol):

@@ -53,8 +53,8 @@ def _ending(task: ExportTask, wanted: Wanted) -> ExportDone | ExportStopped | Ex
     except MemoryError:
         return ExportFailed("There is not enough memory.", "Close other programs, or export fewer frames at a time.")
     except Exception as error:  # the edge of the process
-        logger.exception("exporting has failed")
-        return ExportFailed(f"Exporting has failed ({type(error).__name__}: {error}).", "The log has more.")
+        logger.exception("export failed")
+        return ExportFailed(f"Export failed ({type(error).__name__}: {error}).", "See the log for details.")
 
 
 class Wanted:

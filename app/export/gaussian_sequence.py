@@ -180,7 +180,7 @@ class GaussianSequence:
         n_empty = sum(written.n_gaussians == 0 for written in self.files)
         if n_empty:
             files = "One file holds" if n_empty == 1 else f"{n_empty} files hold"
-            lines.append(f"{files} no Gaussians: nothing is in this part of the scene.")
+            lines.append(f"{files} no Gaussians: this part of the scene is empty.")
         return tuple(lines)
 
     def _measured_lines(self) -> list[str]:
@@ -191,13 +191,13 @@ class GaussianSequence:
         said = "against the live picture, in the worst of the cameras it was drawn from"
         if len(good) > _MOST_LINES:
             name = min(good, key=good.__getitem__)
-            lines = [f"{len(good)} files were read back; the worst is {name}: {good[name]:.1f} dB {said}."]
+            lines = [f"{len(good)} files were read back and compared; the worst is {name}: {good[name]:.1f} dB {said}."]
         else:
             lines = [f"{name}: {value:.1f} dB {said}." for name, value in good.items()]
         for name, value in list(bad.items())[:_MOST_LINES]:
             lines.append(
                 f"Warning: {name}: {value:.1f} dB {said}. At least {self._kind.min_psnr_db:.0f} dB were expected of "
-                f"{self._kind.suffix}; look at it before you use it."
+                f"{self._kind.suffix}; check the file before use."
             )
         return lines
 

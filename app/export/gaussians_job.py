@@ -81,7 +81,7 @@ def _frames(scene: SceneFrames, job: GaussiansJob) -> list[int]:
 
 def _kind(job: GaussiansJob) -> Format:
     if job.fields == "full" and job.format != "ply":
-        raise ProjectError(f"'{job.format}' has no fields to choose.", hint="Fields are those of ply; leave them out.")
+        raise ProjectError(f"'{job.format}' has no choice of fields.", hint="Only ply has fields; leave them out.")
     return FULL_PLY if job.fields == "full" else FORMATS[job.format]
 
 

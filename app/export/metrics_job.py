@@ -87,7 +87,7 @@ class _Chosen:
         self.untrained = [index for index in touched if index not in trained]
         if not self.frames:
             raise ProjectError(
-                "None of these frames is trained, so that there are no figures.",
+                "None of these frames is trained, so there are no figures.",
                 hint="Train first, or choose other frames.",
                 path=opened.project.folder,
             )

@@ -49,7 +49,7 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
     has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
     lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames} frames."]
     if has_folder:
-        lines.append(f"The clips go into the folder {job.folder.name}, which has to stay beside the page.")
+        lines.append(f"The clips go into the folder {job.folder.name}, which must stay next to the page.")
         _check_folder(job.folder)
     check_target(job.out, n_bytes=n_bytes)
     return ExportEstimate(len(clips) + 2 if has_folder else 1, n_bytes, tuple(lines))
@@ -63,7 +63,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
         DiskError: The disk refused; nothing is left behind.
         ExportCancelled: From `report`; nothing is left behind.
     """
-    report(ExportProgress(0, 0, message="Looking at the clips"))
+    report(ExportProgress(0, 0, message="Reading clips"))
     expected = estimate(opened, job)
     has_folder = expected.n_files > 1
     scene = _scene(opened, job)
@@ -115,8 +115,7 @@ def _check_folder(folder: Path) -> None:
         check_target(folder, is_folder=True)
     except ProjectError as error:
         raise ProjectError(
-            f"The clips go into the folder {folder.name} beside the page, and there is something under this name "
-            "already.",
+            f"The clips go into the folder {folder.name} next to the page, but this name is already taken.",
             hint=f"Delete {folder.name}, or choose another name for the page.",
             path=folder,
         ) from error

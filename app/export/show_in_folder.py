@@ -20,10 +20,10 @@ def show_in_folder(path: Path) -> None:
         EngineError: It is not there any more, or there is no file manager; says where it is.
     """
     if not path.exists():
-        raise ProjectError("It is not there any more.", path=path)
+        raise ProjectError("The file no longer exists.", path=path)
     command = _command(path)
     if command is None:
-        raise ProjectError("There is no file manager that could show it.", hint="Look for it yourself.", path=path)
+        raise ProjectError("No file manager found.", hint="Open the folder by hand.", path=path)
     try:
         # what it says would be for a terminal, and it must not end with this program
         done = subprocess.run(
@@ -54,4 +54,4 @@ def _command(path: Path) -> list[str] | None:
 
 
 def _failure(path: Path, reason: str) -> EngineError:
-    return ProjectError(f"The file manager could not be opened ({reason}).", hint="Look for it yourself.", path=path)
+    return ProjectError(f"The file manager could not be opened ({reason}).", hint="Open the folder by hand.", path=path)

@@ -38,7 +38,7 @@ def check_target(
     if opened is not None:
         _check_apart(path, opened)
     if is_folder and (path.is_symlink() or path.exists()) and not _is_empty_folder(path):
-        raise ProjectError("There is something under this name already.", hint="Give a new folder.", path=path)
+        raise ProjectError("This name is already taken.", hint="Give a new folder.", path=path)
     if not is_folder and path.is_dir():
         raise ProjectError("This is a folder, not a file.", hint="Give the name of a file.", path=path)
     parent = next((parent for parent in path.absolute().parents if parent.exists()), Path(path.anchor))
@@ -47,10 +47,10 @@ def check_target(
         raise ProjectError(f"{parent} {reason}.", hint="Choose another place.", path=path)
     disk = shutil.disk_usage(parent)
     if disk.total == 0:
-        raise ProjectError(f"{parent} holds no files of users.", hint="Choose another place.", path=path)
+        raise ProjectError(f"{parent} cannot hold files.", hint="Choose another place.", path=path)
     spare_bytes = min(SPARE_BYTES, LEAST_SPARE_BYTES + n_bytes)
     if n_bytes + spare_bytes > disk.free:
-        needed = f"About {_room(n_bytes)} are to be written" if n_bytes else f"{_room(spare_bytes)} have to be free"
+        needed = f"About {_room(n_bytes)} will be written" if n_bytes else f"{_room(spare_bytes)} must be free"
         raise ProjectError(
             f"{needed}, but only {_room(disk.free)} are free.",
             hint="Free some space, choose another place, or export fewer frames.",
@@ -67,7 +67,7 @@ def _check_apart(path: Path, opened: TrainedProject) -> None:
     for what, folder in (("project", opened.project.folder), ("capture", Path(opened.capture.path))):
         if path.resolve().is_relative_to(folder.resolve()):
             raise ProjectError(
-                f"This place lies inside of the {what} that is exported.", hint="Choose another place.", path=path
+                f"This place is inside the {what} that is exported.", hint="Choose another place.", path=path
             )
 
 

@@ -98,12 +98,12 @@ def _checked_reference(project: Project, reference: ClipState | None) -> ClipSta
     config = project.settings.config()
     if config.independent or reference is None:
         raise ProjectError(
-            "The clips of this project share nothing, so that there is nothing to mend them with.",
-            hint="Train them again, with more steps perhaps.",
+            "The clips of this project share nothing, so they cannot be mended.",
+            hint="Train them again, perhaps with more steps.",
         )
     if config.field != "per_clip":
         raise ProjectError(
-            "One field shows several clips of this project, so that none can be mended by itself.",
+            "Several clips of this project share one field, so none can be mended alone.",
             hint="Train with field=per_clip in another project.",
         )
     return reference

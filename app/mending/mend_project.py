@@ -84,8 +84,8 @@ def mend_project(
         number = put_in_place(project, result.record, drafts) if result.record.has_helped else None
         return MendOutcome(result.record, number)
     except ChildFailed as error:
-        text = f"{error}; all clips are as they were."
-        raise ProjectError(text, hint="Try again; the log may say more.") from error
+        text = f"{error}; no clip has changed."
+        raise ProjectError(text, hint="Try again; see the log for details.") from error
     finally:
         for path in [*drafts.values(), *project.live_dir.glob("mended-*.safetensors")]:
             with suppress(OSError):

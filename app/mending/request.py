@@ -34,11 +34,11 @@ class MendRequest(msgspec.Struct, frozen=True):
             ProjectError: There are no such frames, or there is no such boundary or method.
         """
         if self.method not in CHOICES or self.method == "retrain":
-            raise ProjectError(f"There is no way to mend called {self.method}.")
+            raise ProjectError(f"{self.method!r} is not a mending method.")
         if self.after is not None:
             return boundary_stretch(clips, self.after)
         if self.frames is None:
-            raise ProjectError("Nothing to mend was named.", hint="Name a boundary or frames.")
+            raise ProjectError("No frames to mend were named.", hint="Name a boundary or frames.")
         return frames_stretch(clips, *self.frames)
 
 

@@ -432,7 +432,7 @@ _TITLES = (
     "The cloud cannot be shown",
     "The picture could not be drawn",
     "The clip cannot be shown",
-    "What inherited anchors cover cannot be shown",
+    "The covered space cannot be shown",
     "The trails cannot be shown",
 )
 """In the order of the workers."""

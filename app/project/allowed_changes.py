@@ -36,11 +36,12 @@ def check_change(
     if not is_shared_change(before.settings, after.settings):
         return
     if is_training:
-        raise SettingsFixed("A clip is being trained with the settings as they are.", hint="Stop the training first.")
+        raise SettingsFixed("A clip is being trained with the present settings.", hint="Stop the training first.")
     if project.has_finished_clips:
         raise SettingsFixed(
-            f"What all clips share is fixed once a clip is finished: there {_are(training_of(project))}.",
-            hint="Start over with other settings, which discards that, or make a new project of the capture.",
+            "These settings are shared by all clips and fixed once one is finished; there "
+            f"{_are(training_of(project))}.",
+            hint="Start over with other settings, which discards the clips, or make a new project.",
             path=project.folder,
         )
 

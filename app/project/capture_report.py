@@ -16,7 +16,7 @@ from engine.capture.capture_summary import describe
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed
 from engine.capture.pixels.frame_fit import FrameFit
 from engine.errors import CaptureError, EngineError
-from engine.text import duration_text, printable
+from engine.text import duration_text, printable, rate_text
 
 LAYOUTS = {reader.FORMAT: reader.LAYOUT for reader in FORMATS}
 """By format: what its layout is called, in words."""
@@ -27,10 +27,7 @@ LENSES = {
     "fov": "fisheye (FOV)",
     "thin_prism_fisheye": "fisheye with thin prism",
 }
-MINE = (
-    "Copy the files into the folder or, if you know where they lie and trust this capture, open it anyway: its project "
-    "remembers that."
-)
+MINE = "Copy the files into the folder or, if you trust this capture, open it anyway; its project remembers this."
 LEAST_VIDEOS = 2
 """So many videos in a folder without calibration may be cameras of one scene."""
 
@@ -110,10 +107,10 @@ class CaptureReport:
         return (
             ("Layout", self.layout),
             ("Cameras", f"{len(cameras)} camera{many}, {sizes}"),
-            ("Frames", f"{self.n_frames:,} at {self.fps:.6g} per second ({_length_text(seconds)})"),
+            ("Frames", f"{self.n_frames:,} at {rate_text(self.fps)} per second ({_length_text(seconds)})"),
             ("Lenses", f"{lenses}; {view}"),
             ("Poses", f"all known; the cameras are up to {self.rig_extent:.3g} scene units apart"),
-            ("Came along", came_along or "no masks, no point cloud; neither is needed"),
+            ("Extras", came_along or "no masks, no point cloud; neither is needed"),
         )
 
     @property

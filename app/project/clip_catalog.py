@@ -19,8 +19,8 @@ from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.roles import REFERENCE_ROLES
 
 _ROLE_REASONS = {
-    "source": "It was trained on another clip as the reference; it is the reference itself now.",
-    "reference": "It was trained as the reference, which is clip {} now.",
+    "source": "It was trained with another reference clip; now it is the reference itself.",
+    "reference": "It was trained as the reference, which is now clip {}.",
 }
 """Why a clip is out of date that was trained before another clip was made the reference."""
 REPORT_EVERY = 32
@@ -251,15 +251,15 @@ class ClipCatalog:
             if self._is_damaged(first):
                 return Basis(f"Clip {first}, which it was trained on, is damaged.", first)
             if fingerprints[first] is None or fingerprints[first] != header.reference_fingerprint:
-                return Basis(f"Clip {first}, the reference it was trained on, was trained again or is gone.")
+                return Basis(f"Clip {first}, the reference it was trained on, was retrained or is gone.")
         if header.previous_fingerprint is None or before is None:
             return Basis()
         if self._is_damaged(before):
-            return Basis(f"Clip {before}, which it goes on from, is damaged.", before)
+            return Basis(f"Clip {before}, which it continues, is damaged.", before)
         if fingerprints[before] is None or fingerprints[before] != header.previous_fingerprint:
-            return Basis(f"Clip {before}, which it goes on from, was trained again or is gone.")
+            return Basis(f"Clip {before}, which it continues, was retrained or is gone.")
         if bases[before].reason:
-            return Basis(f"Clip {before}, which it goes on from, is out of date.", bases[before].blocked_by)
+            return Basis(f"Clip {before}, which it continues, is out of date.", bases[before].blocked_by)
         return Basis()
 
     def _is_damaged(self, index: int) -> bool:
@@ -341,16 +341,16 @@ class ClipCatalog:
         frames = (header.start, header.start + header.n_frames)
         if header.exclusions == exclusion_key(self._project.document.exclusions, frames):
             return ""
-        return "What is excluded from training has changed since: it was trained with other pictures."
+        return "Exclusions from training have changed since, so it was trained on other pictures."
 
     def _lost_checkpoint(self, kept: ClipHeader | None) -> str:
         """Why the training cannot go on from a checkpoint; empty when it can. kept: None where it is damaged."""
         if kept is None:
-            return "What was learned before the stop cannot be read; training starts from the beginning."
+            return "Progress from before the stop cannot be read; training starts from the beginning."
         reference = None if not self.order else self._good(self.order[0])
         known = kept.reference_fingerprint
         if known is not None and (reference is None or reference.fingerprint != known):
-            return "The reference was trained again after the stop; training starts from the beginning."
+            return "The reference was retrained after the stop; training starts from the beginning."
         return ""
 
 

@@ -156,10 +156,10 @@ def recovery_hint(project: Project, clip_index: int) -> str:
     """What can be done about a damaged clip, as a sentence for an error."""
     version = best_version(project, clip_index)
     if version is None:
-        return f"Restore it from a copy, or train clip {clip_index} again."
+        return f"Restore it from a backup, or train clip {clip_index} again."
     return (
-        f"Bring back what it was before: clipgstream versions PROJECT --clip {clip_index} --restore {version.number}. "
-        f"Or restore it from a copy, or train clip {clip_index} again."
+        f"Restore its earlier version with clipgstream versions PROJECT --clip {clip_index} --restore "
+        f"{version.number}, restore it from a backup, or train clip {clip_index} again."
     )
 
 
@@ -235,11 +235,11 @@ def restore_version(project: Project, clip_index: int, number: int) -> None:
     project.check_writable()
     path = version_path(project, clip_index, number)
     if not path.is_file():
-        raise ProjectError(f"Clip {clip_index} has no version {number} any more.", path=path)
+        raise ProjectError(f"Clip {clip_index} has no version {number}.", path=path)
     header = read_clip_state(path).header
     reason = why_not(project, clip_index, header)
     if reason:
-        raise ProjectError(reason, hint="Remove it, or put the file back where it came from.", path=path)
+        raise ProjectError(reason, hint="Remove it, or put the file back in its place.", path=path)
     set_aside_number = set_aside(project, clip_index, unless=header.fingerprint)
     clip_path = project.clip_path(clip_index)
     try:
@@ -280,7 +280,7 @@ def why_not(project: Project, clip_index: int, header: ClipHeader) -> str:
     start, stop = project.frames_of(clip_index)
     if header.start != start or (stop is not None and header.start + header.n_frames > stop):
         last = header.start + header.n_frames - 1
-        return f"The version is of frames {header.start} to {last}, not of clip {clip_index}."
+        return f"The version covers frames {header.start} to {last}, not of clip {clip_index}."
     base = project.inherited_index(clip_index)
     if header.role != ("reference" if base is None else "source"):
         return "The version was trained before another clip was made the reference."
@@ -289,12 +289,12 @@ def why_not(project: Project, clip_index: int, header: ClipHeader) -> str:
     if current is not None:
         of_project = (current.start, current.n_frames, current.clip_length, current.camera_names)
         if (header.start, header.n_frames, header.clip_length, header.camera_names) != of_project:
-            return "The version belongs to another project: its frames or cameras are others."
+            return "The version belongs to another project with other frames or cameras."
     known = None if base is None else project.headers.read(project.clip_path(base))
     if header.role == "source" and base is not None:
         fingerprint = None if known is None or known.header is None else known.header.fingerprint
         if header.reference_fingerprint != fingerprint:
-            return f"The version was trained on another version of clip {base}, the reference; bring that back first."
+            return f"The version was trained on another version of clip {base}, the reference; restore that first."
     return ""
 
 

@@ -56,7 +56,7 @@ def _read(path: Path, n_bytes: int) -> FoundHeader:
     found = look_at_clip(path)
     if isinstance(found, ClipHeader):
         return FoundHeader(found, "", n_bytes, None if found.metrics is None else _exposure_change(path))
-    reason = "it is not there any more" if found is None else found.reason
+    reason = "it no longer exists" if found is None else found.reason
     return FoundHeader(None, f"The file is damaged ({reason}).", n_bytes)
 
 

@@ -19,4 +19,4 @@ def finish_interrupted(project: Project) -> None:
     try:
         recover(project)
     except (ProjectError, OSError) as error:
-        logger.warning("what was interrupted could not be taken back: %s", error)
+        logger.warning("an interrupted change could not be undone: %s", error)

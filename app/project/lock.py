@@ -153,7 +153,7 @@ class ProcessLock:
         try:
             owner = read_owner(self.path)
             if owner is not None and not owner.is_here:
-                hint = f'Close it there first. If nothing runs there any more, remove the file "{self.path.name}".'
+                hint = f'Close it there first. If nothing runs there, remove the file "{self.path.name}".'
                 raise self._is_taken(owner, hint=hint)
             if owner is not None and not owner.host and owner.is_alive:  # a version before, without a system lock
                 raise self._is_taken(owner)

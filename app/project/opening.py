@@ -168,7 +168,7 @@ def _make_project(
 ) -> Opened:
     if choices.is_read_only:
         raise ProjectError(
-            "There is no project of this capture to look at.",
+            "This capture has no project yet.",
             hint="Open it for writing, which makes one.",
             path=capture.path,
         )
@@ -193,7 +193,7 @@ def _open_project(
     notes: list[Note] = []
     if choices.is_repaired:
         aside = repair_project(folder)
-        notes.append(("info", "The project was repaired", f"What was damaged is kept in {aside}.", ""))
+        notes.append(("info", "The project was repaired", f"Damaged files are kept in {aside}.", ""))
     stored = _read_settings(folder, choices)
     settings = replace(stored, follow_links=stored.follow_links or follow_links)
     if choices.capture is not None:
@@ -242,12 +242,12 @@ def _read_settings(folder: Path, choices: ProjectChoices) -> ProjectSettings:
 def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project:
     """The project, for writing where that is possible and wanted; what there is to say of it goes into `notes`."""
     if not choices.is_journal_used:
-        notes.append(("warn", "The project is open for reading only", "What its journal holds is left out.", ""))
-        why = "It was opened without its damaged journal. Repair it to go on with it."
+        notes.append(("warn", "The project is open read-only", "The journal is ignored.", ""))
+        why = "It was opened without its damaged journal. Repair it to edit or train."
         return open_project(folder, is_writable=False, is_journal_used=False, why_read_only=why)
     if choices.is_read_only:
-        notes.append(("info", "The project is open for reading only", "", "Open it again to change something."))
-        why = "It was opened so. Open it again to change something."
+        notes.append(("info", "The project is open read-only", "", "Open it again to change something."))
+        why = "To change something, open it again."
         project = open_project(folder, is_writable=False, why_read_only=why)
         notes += _missing(project)
         return project
@@ -255,7 +255,7 @@ def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project
         project = open_project(folder)
         notes += _recovered(project)
     except ProjectError as error:  # most likely locked; looking at it does no harm
-        notes.append(("warn", "The project is open for reading only", str(error), "Nothing can be changed in it."))
+        notes.append(("warn", "The project is open read-only", str(error), "Nothing can be changed in it."))
         why = f"{error.message} {error.hint}".strip()
         project = open_project(folder, is_writable=False, why_read_only=why)
     notes += _missing(project)
@@ -265,14 +265,14 @@ def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project
 def _recovered(project: Project) -> list[Note]:
     """What a user has to know whose project was not closed the last time."""
     n = project.store.n_replayed
-    steps = f"{n} step{'s were' if n != 1 else ' was'} taken from the journal, up to: {project.history.undo_name}."
-    told = f"It was not closed the last time. {steps if project.history.undo_name else steps.partition(',')[0] + '.'}"
-    return [("info", "What was edited last was recovered", told, "")] if n else []
+    steps = f"{n} step{'s were' if n != 1 else ' was'} recovered from the journal, up to: {project.history.undo_name}."
+    told = f"It was not closed last time. {steps if project.history.undo_name else steps.partition(',')[0] + '.'}"
+    return [("info", "The latest edits were recovered", told, "")] if n else []
 
 
 def _missing(project: Project) -> list[Note]:
     """What reading the project's document found missing."""
-    return [("warn", "Something of the project is missing", note, "") for note in project.store.notes]
+    return [("warn", "Part of the project is missing", note, "") for note in project.store.notes]
 
 
 def projects_of(
@@ -329,7 +329,7 @@ def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
     if not Path(settings.capture).is_dir():
         lost = LostCapture(
             "The capture of this project is no longer where it was.",
-            hint=f"Put it back, or say where it is: clipgstream train NEW_PLACE --project {folder}",
+            hint=f"Put it back, or give its new place: clipgstream train NEW_PLACE --project {folder}",
             path=settings.capture,
         )
         lost.project = folder

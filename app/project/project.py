@@ -194,7 +194,7 @@ class Project:
             ProjectError: It may not.
         """
         if not self.is_writable:
-            raise ProjectError("The project is open for reading only.", hint=self._why_read_only, path=self.folder)
+            raise ProjectError("The project is open read-only.", hint=self._why_read_only, path=self.folder)
 
     def change(self, document: ProjectDocument, name: str) -> None:
         """Replace the document, on disk first, as a step of its history. name: See Changed.

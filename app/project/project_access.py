@@ -80,7 +80,7 @@ def check_settings(settings: ProjectSettings, capture: Capture) -> None:
             f"The clip length is {settings.clip_length}; the capture allows 1 to {capture.n_frames} frames."
         )
     if not 0 <= settings.seed < 2**32:
-        raise ProjectError(f"The seed is {settings.seed}; it has to lie between 0 and {2**32 - 1}.")
+        raise ProjectError(f"The seed is {settings.seed}; it must be between 0 and {2**32 - 1}.")
     unknown = [name for name in settings.holdout if name not in capture.rig.names]
     if unknown:
         raise ProjectError(

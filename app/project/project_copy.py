@@ -38,7 +38,7 @@ def copy_project(project: Project, target: Path, report: Callable[[float, str], 
     check_folders(project.folder, "copied")
     target = target.absolute()
     if target.resolve().is_relative_to(project.folder.resolve()):
-        raise ProjectError("A copy cannot lie in the project itself.", hint="Choose another folder.", path=target)
+        raise ProjectError("A copy cannot be inside the project itself.", hint="Choose another folder.", path=target)
     files = sorted(_files(project.folder))
     n_bytes = max(sum(size for _, size in files), 1)
     done = 0
@@ -53,7 +53,7 @@ def copy_project(project: Project, target: Path, report: Callable[[float, str], 
             _write_document(project.history, partial, target)
     except FileExistsError as error:
         raise ProjectError(
-            "There is something under this name already.", hint="Choose a new or an empty folder.", path=target
+            "This name is already taken.", hint="Choose a new or an empty folder.", path=target
         ) from error
     except OSError as error:
         raise disk_error(error, what="The copy of the project", path=target) from error

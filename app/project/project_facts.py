@@ -156,7 +156,7 @@ def find_projects(given: Sequence[Path], *, besides: Path) -> list[tuple[Path, b
         inside = [folder] if is_project else list(_below(folder, SEARCH_DEPTH))
         if not inside:
             raise ProjectError(
-                f"This folder is not a project and holds none: there is no {PROJECT_FILE} in it or below.",
+                f"This folder is not a project and holds none: no {PROJECT_FILE} in it or below.",
                 hint="Give --compare a project folder, or a folder of projects.",
                 path=folder,
             )

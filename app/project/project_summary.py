@@ -12,6 +12,7 @@ from app.project.clip_bytes import COMPONENT_NAMES
 from app.project.opening import open_capture_of
 from app.project.project_facts import ClipFacts, read_facts
 from engine.errors import CaptureError, ProjectError
+from engine.text import rate_text
 
 SCHEMA = 1
 _MB = 1e6
@@ -74,7 +75,7 @@ def project_lines(found: dict[str, Any]) -> list[str]:
     n_frames = sum(clip["n_frames"] for clip in clips)
     lines = [
         f"{found['path']}: {len(clips)} trained clips, {n_frames} frames, {found['n_bytes'] / _MB:.2f} MB, of which "
-        f"{100 * found['reference_share']:.0f} % is what others inherit from"
+        f"{100 * found['reference_share']:.0f} % are the reference clip"
     ]
     heads = ["kB", *(f"{clip['role']} {clip['clip_index']}" for clip in clips), "all"]
     columns = [*(clip["components"] for clip in clips), found["components"]]
@@ -91,20 +92,22 @@ def project_lines(found: dict[str, Any]) -> list[str]:
     lines += [f"Damaged, and not counted ({clip['reason']}): {clip['path']}" for clip in found["damaged"]]
     covered = [f"clip {clip['clip_index']} {_covered(clip['coverage'])}" for clip in clips if clip["coverage"]]
     if covered:
-        lines.append(f"Of what moves, within reach of an anchor: {'; '.join(covered)}.")
+        lines.append(f"Moving points within reach of an anchor: {'; '.join(covered)}.")
     if found["bytes_per_frame"] is not None:
         line = f"Clips after the reference take {found['bytes_per_frame'] / 1e3:.1f} kB per frame"
         if found["mb_per_minute"] is None:
-            lines.append(f"{line}; the capture is not there to say its frame rate.")
+            lines.append(f"{line}; the capture is missing, so its frame rate is unknown.")
         else:
-            lines.append(f"{line}: {found['mb_per_minute']:.1f} MB per minute at {found['fps']:g} frames per second.")
+            lines.append(
+                f"{line}: {found['mb_per_minute']:.1f} MB per minute at {rate_text(found['fps'])} frames per second."
+            )
     return lines
 
 
 def _covered(coverage: dict[str, Any]) -> str:
     said = f"{100 * coverage['share']:.1f} % with {coverage['n_residual']:,} residual anchors"
     if coverage["n_left_out"]:
-        said += f", {coverage['n_left_out']:,} points beyond the budget left to those beside them"
+        said += f", {coverage['n_left_out']:,} points beyond the budget left to their neighbours"
     return said
 
 

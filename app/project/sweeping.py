@@ -27,4 +27,4 @@ def sweep(folder: Path) -> None:
     found += [path for path in folder.rglob(f"{PARTIAL_PREFIX}*") if is_left_over(path, is_process_alive)]
     n_gone = sum(map(discard, found))
     if n_gone:
-        logger.info("removed %d left-overs from %s", n_gone, folder)
+        logger.info("removed %d leftover files from %s", n_gone, folder)

@@ -142,10 +142,10 @@ class AnchorHeats:
         neighbour = timeline.clip_of(frame_index - 1)
         before = None if neighbour is None else self._playback.request(neighbour, frame_index - 1)
         if column == "E" and neighbour is None:
-            return _nothing(column, clip.clip_index, frame_index, "Frame 0 has no frame before it.")
+            return _nothing(column, clip.clip_index, frame_index, "Frame 0 has no previous frame.")
         if column == "E" and before is None:
             assert neighbour is not None
-            note = f"There is no render of the frame before: {self._why_none(neighbour.clip_index)}."
+            note = f"The previous frame is not rendered: {self._why_none(neighbour.clip_index)}."
             return _nothing(column, clip.clip_index, frame_index, note)
         moment = _Moment(opened.generation, main, before, opened.capture, self._cameras(opened))
         known = self._cache.get(moment)

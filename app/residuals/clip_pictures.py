@@ -67,7 +67,7 @@ class ClipPictures:
                 known = self._files.read(request, process_backend()).trained
                 if known is None:
                     raise ProjectError(
-                        f"Clip {request.clip_index} does not say what the cameras make of its colours.",
+                        f"Clip {request.clip_index} does not hold the cameras' colours.",
                         hint="Train this clip again.",
                         path=request.path,
                     )

@@ -115,7 +115,7 @@ class Heat:
         frame_index = timeline.frame_index
         needs_before = kind in ("R", "G", "E")
         if needs_before and frame_index == 0:
-            return "Frame 0 has no frame before it."
+            return "Frame 0 has no previous frame."
         main = other = None
         if kind != "G":
             main = self._playback.request(clip, frame_index)
@@ -132,8 +132,8 @@ class Heat:
             assert neighbour is not None
             other = self._playback.request(neighbour, other_frame)
             if other is None:
-                whose = "the neighbour's picture" if kind == "clips" else "the frame before"
-                return f"There is no render of {whose}: {self._why_none(neighbour.clip_index)}."
+                whose = "the neighbour's picture" if kind == "clips" else "the previous frame"
+                return f"No render of {whose}: {self._why_none(neighbour.clip_index)}."
         return HeatRequest(
             opened.generation, kind, clip.clip_index, frame_index, camera_index, main, other, opened.capture
         )
@@ -201,7 +201,7 @@ class Heat:
         if neighbour.is_held_beyond if is_before else neighbour.is_held_ahead:
             image = self._pictures.frame(capture, other, camera)
             own = "ends before" if is_before else "begins after"
-            note = f"Clip {other.clip_index} {own} this frame: its {last} one stands in, which shows no more than R"
+            note = f"Clip {other.clip_index} {own} this frame; its {last} frame stands in, which shows no more than R"
         else:
             clip_time = neighbour.beyond if is_before else neighbour.ahead
             image = self._pictures.render(capture, other, camera, clip_time)

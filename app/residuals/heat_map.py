@@ -51,7 +51,7 @@ def _kinds() -> dict[str, HeatKind]:
             LEVEL_UNIT,
             "sequential",
             _CHANGE_RANGE,
-            "How much the render differs from the frame before, mean of the channels.",
+            "How much the render differs from the previous frame, mean of the channels.",
         ),
         HeatKind(
             "G",
@@ -59,7 +59,7 @@ def _kinds() -> dict[str, HeatKind]:
             LEVEL_UNIT,
             "sequential",
             _CHANGE_RANGE,
-            "How much the captured picture differs from the frame before, mean of the channels.",
+            "How much the captured picture differs from the previous frame, mean of the channels.",
         ),
         HeatKind(
             "E",
@@ -67,7 +67,7 @@ def _kinds() -> dict[str, HeatKind]:
             LEVEL_UNIT,
             "sequential",
             _CHANGE_RANGE,
-            "What changes in the render beyond what changes in the captured picture: R less G, where that is above 0.",
+            "Change of the render beyond that of the captured picture: R minus G where positive.",
         ),
         HeatKind(
             "error",
@@ -83,7 +83,7 @@ def _kinds() -> dict[str, HeatKind]:
             LEVEL_UNIT,
             "signed",
             (-_ERROR_RANGE, _ERROR_RANGE),
-            "Luminance of the render less that of the captured picture: positive where the render is too bright.",
+            "Luminance of the render minus that of the captured picture; positive where the render is too bright.",
         ),
         HeatKind(
             "flip",
@@ -91,7 +91,7 @@ def _kinds() -> dict[str, HeatKind]:
             "1",
             "sequential",
             (0.0, 0.5),
-            "What a viewer notices when render and captured picture alternate: 0 nothing, 1 everything.",
+            "What a viewer notices when render and captured picture alternate, from 0 to 1.",
         ),
         HeatKind(
             "clips",
@@ -99,7 +99,7 @@ def _kinds() -> dict[str, HeatKind]:
             LEVEL_UNIT,
             "sequential",
             _CHANGE_RANGE,
-            "How far two neighbouring clips are apart at the same instant, at the frames where they meet.",
+            "How far two neighbouring clips differ at the same instant, at the frames where they meet.",
         ),
     )
     return {kind.name: kind for kind in kinds}

@@ -10,7 +10,7 @@ from engine.children.kind import ChildFailed, ChildKind
 from engine.children.process import MAX_EVENTS_PER_POLL, ChildProcess
 from engine.errors import EngineError
 
-KEPT = "What was measured is kept; measuring resumes when a clip is trained or the project is opened again."
+KEPT = "Measurements are kept; measuring resumes when a clip is trained or the project is opened again."
 MEASURING: ChildKind[MeasureJob, Event, None] = ChildKind(
     place="app.residuals.measuring_process:MEASURING",
     work="app.residuals.measuring_worker:main",

@@ -25,8 +25,8 @@ def action_called(action: Action | str, values: Mapping[str, Any]) -> tuple[Acti
     if not isinstance(action, str):
         if values:
             raise ProjectError(
-                f"{type(action).__name__} is given with {shown(next(iter(values)))} beside it.",
-                hint="Put it into the action, or give the action by its name.",
+                f"{type(action).__name__} is given together with {shown(next(iter(values)))}.",
+                hint="Put it into the action, or name the action.",
             )
         return action, False
     known = ACTIONS | _OPPOSITES

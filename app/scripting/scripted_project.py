@@ -188,7 +188,7 @@ class ScriptedProject:
         try:
             document = document_of(plain_document(self.document) | dict(entries))
         except EntryError as error:
-            raise ProjectError(f"The document makes no sense ({error}).") from error
+            raise ProjectError(f"The document is not valid ({error}).") from error
         self.change(document, f"change {', '.join(name.replace('_', ' ') for name in entries)}")
 
     def undo(self) -> str:
@@ -370,7 +370,7 @@ class ScriptedProject:
 
         self._check_open()
         if (boundary is None) == (frames is None) or (frames is not None and frames.step != 1):
-            raise ProjectError("Name what is to be mended: a boundary, or frames without gaps.")
+            raise ProjectError("Name what to mend: a boundary, or frames without gaps.")
         span = None if frames is None else (frames.start, frames.stop)
         request = MendRequest(after=boundary, frames=span, method=method)
         tell = (lambda progress: None) if on_progress is None else on_progress

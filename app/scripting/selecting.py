@@ -55,7 +55,7 @@ def select(
     loaded = ClipFiles().read(request, process_backend())
     gaussians = decode_frame(loaded, request).gaussians
     if gaussians.rows is None:
-        raise ProjectError(f"The Gaussians of clip {clip.clip_index} cannot be told apart.", hint="Train it again.")
+        raise ProjectError(f"The Gaussians of clip {clip.clip_index} cannot be identified.", hint="Train it again.")
     wanted: list[SelectionCommand] = [SelectAll()]
     if volume is not None:
         wanted.append(SelectVolume(volume, How("intersect")))
@@ -68,7 +68,9 @@ def select(
         is_left = ~selection.mask(gaussians.rows)
         selection = selection.with_mask(gaussians.rows, is_left, keeps_others=False)
     if not len(selection):
-        raise ProjectError(f"Nothing is selected in frame {frame_index}.", hint="Ask for more, or for another frame.")
+        raise ProjectError(
+            f"Nothing is selected in frame {frame_index}.", hint="Widen the condition, or choose another frame."
+        )
     return selection.target()
 
 
@@ -86,7 +88,7 @@ def _condition(text: str) -> SelectByAttribute:
     found = _CONDITION.fullmatch(text)
     if found is None:
         raise ProjectError(
-            f"The condition {shown(text.strip())} makes no sense.", hint=f"Write opacity<0.05; attributes are {known}."
+            f"The condition {shown(text.strip())} is not valid.", hint=f"Write opacity<0.05; attributes are {known}."
         )
     name, sign, said = found.groups()
     if name not in ATTRIBUTES or name in _MEASURED:

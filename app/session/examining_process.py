@@ -54,7 +54,7 @@ def examine_apart(capture: Capture, report: ReportProgress) -> Diagnosis:
     try:
         return run_child(EXAMINING, job, report=see, alive=lambda: report(seen))
     except ChildFailed as error:
-        raise CaptureError(f"{error}.", hint="Try again; the log may say more.", path=capture.path) from error
+        raise CaptureError(f"{error}.", hint="Try again; see the log for details.", path=capture.path) from error
 
 
 def examine_here(job: ExamineJob, parent: Parent[Progress]) -> Diagnosis:

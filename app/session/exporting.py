@@ -140,7 +140,7 @@ class Exporting:
         if opened is None:
             return
         if not trained:
-            raise ProjectError("There is nothing to export yet: no clip is trained.", hint="Train a clip first.")
+            raise ProjectError("Nothing to export yet: no clip is trained.", hint="Train a clip first.")
         context = _context(opened, timeline, trained, paths)
         last = self._settings.last_export
         if last.kind not in KINDS:
@@ -175,7 +175,7 @@ class Exporting:
         if self._planner.has_failed(wish):
             error = self._planner.take_error()
             reason = "" if error is None else f": {error[1]}"
-            return ExportPlan(choices, problems=(f"This could not be looked at{reason}.",))
+            return ExportPlan(choices, problems=(f"This could not be estimated{reason}.",))
         self._planner.request(wish)
         return None
 

@@ -36,14 +36,14 @@ def region_text(region: GateRegion) -> str:
 def effect_text(started: Sequence[int], *, gate: str) -> str:
     """In which clips regions take effect. started: Clips whose training has started."""
     if gate == "off":
-        return "Without effect here: the clips of this project are trained without a gate (gate=off)."
-    text = "Marks apply to clips whose training starts from now on."
+        return "No effect here: this project is trained without a gate (gate=off)."
+    text = "Marks apply to clips trained from now on."
     if not started:
         return text
     names = _clip_names(sorted(started))
     if len(started) == 1:
-        return f"{text} {names} has started already: it stays as it is until it is trained again."
-    return f"{text} {names} have started already: they stay as they are until they are trained again."
+        return f"{text} {names} has already started and does not change until retrained."
+    return f"{text} {names} have already started and do not change until retrained."
 
 
 def _clip_names(indices: Sequence[int]) -> str:

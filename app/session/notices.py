@@ -65,12 +65,12 @@ class Notices:
         return self.add("error", title, *error.told_apart())
 
     def add_failure(self, title: str, error: Exception) -> Notice:
-        """A failure of any kind; one that the user cannot act on is a fault of the program, and is logged."""
+        """A failure of any kind; one that the user cannot act on is a bug in the program, and is logged."""
         if isinstance(error, EngineError):
             return self.add_error(title, error)
         logger.error("%s", title, exc_info=error)
         detail = f"{type(error).__name__}: {error}"
-        return self.add("error", title, detail, "This is a fault of the program; the log has more.")
+        return self.add("error", title, detail, "This is a bug in the program; see the log for details.")
 
     def has_told(self, error: Exception) -> bool:
         """Whether a notice names this cause already."""

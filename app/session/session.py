@@ -216,7 +216,7 @@ class Session(SessionFace):
         try:
             self._obey(command)
         except EngineError as error:
-            self.notices.add_error(TITLES.get(type(command), "That did not work"), error)
+            self.notices.add_error(TITLES.get(type(command), "The command failed"), error)
         self._refresh()
 
     def _obey(self, command: commands.Command) -> None:
@@ -395,7 +395,7 @@ class Session(SessionFace):
         found = discard_unfitting(self.opened.project, before, after)
         if found.progress:
             words = found.progress_words
-            self.notices.add("info", "Settings changed", f"{words[0].upper()}{words[1:]} is discarded.")
+            self.notices.add("info", "Settings changed", f"{words[0].upper()}{words[1:]} was discarded.")
 
     def _show_notes(self, document: ProjectDocument) -> None:
         """Let the timeline show the document's markers, and views stand upright as it says."""
@@ -477,7 +477,7 @@ class Session(SessionFace):
         self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
-            self.notices.add("warn", "The capture is odd but usable", sentence)
+            self.notices.add("warn", "The capture is usable, with warnings", sentence)
         for note in found.notes:
             self.notices.add(*note)
         if self._is_preloading:
@@ -580,10 +580,10 @@ class Session(SessionFace):
             told.append((failure.title, failure.error))
         unselected = self.selecting.take_error()
         if unselected is not None:
-            told.append(("That cannot be selected", unselected))
+            told.append(("The selection cannot be made", unselected))
         unkept = self.document.take_error()
         if unkept is not None:
-            told.append(("What was edited could not be read or kept", unkept))
+            told.append(("Edits could not be read or saved", unkept))
         for title, error in told:
             if not self.notices.has_told(error):
                 self.notices.add_failure(title, error)

@@ -113,7 +113,7 @@ def _read_previous(project: Project, clip_index: int) -> ClipState:
     before = project.previous_index(clip_index)
     if not project.is_trained(before):
         raise ProjectError(
-            f"Clip {clip_index} goes on where clip {before} ends, which is not trained.",
+            f"Clip {clip_index} continues clip {before}, which is not trained.",
             hint=f"Train clip {before} first.",
         )
     return read_finished(project, before)

@@ -61,7 +61,7 @@ class FolderWatch:
 
     def _gone(self, how: str) -> ProjectGone:
         return ProjectGone(
-            f"The project folder is gone: {how}. Training ended; nothing more was written.",
+            f"The project folder is gone: {how}. Training has ended.",
             hint="Put it back, and train again.",
             path=self._folder,
         )

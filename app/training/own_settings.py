@@ -50,7 +50,7 @@ def with_own(project: Project, own: Mapping[str, Any]) -> dict[str, SettingValue
     if refused:
         raise ProjectError(
             f"All clips of a project share {', '.join(refused)}.",
-            hint=f"For one clip, these can be others: {', '.join(ALLOWED)}.",
+            hint=f"For one clip, these can differ: {', '.join(ALLOWED)}.",
         )
     return config_of({**project.settings.overrides, **own}).difference()
 

@@ -141,7 +141,7 @@ class TrainingRun:
         self._is_snapshot_wanted = False
         self._snapshots = SnapshotWriter(Path(job.project) / "live", job.clip_index)
         self._snapshot_refusals = Refusals("The live view could not be written", send)
-        self._checkpoint_refusals = Refusals("What was learned so far could not be kept", send)
+        self._checkpoint_refusals = Refusals("Progress could not be saved", send)
         self._curve_refusals = Refusals("The curves could not be written", send)
         self._folder: FolderWatch | None = None
         self._finished: CompactClip | None = None
@@ -198,7 +198,7 @@ class TrainingRun:
                 is_restored = True
                 self._take_up_curves()
                 self._recall_times(training.steps_done)
-                logger.info("clip %d goes on at step %d", job.clip_index, training.steps_done)
+                logger.info("clip %d resumes at step %d", job.clip_index, training.steps_done)
             except ProjectError as error:
                 said = str(ProjectError(error.message, path=checkpoint))
                 self._send(WarningRaised(f"Clip {job.clip_index} starts from the beginning", said))
@@ -293,10 +293,10 @@ class TrainingRun:
         if not self._retries.failed(is_kept=is_kept):
             raise error
         if is_first:
-            where = "All of it is kept as a checkpoint" if is_kept else "It is in memory only"
+            where = "It is saved as a checkpoint" if is_kept else "It is in memory only"
             title = f"Clip {self._job.clip_index} is trained, but could not be written"
-            self._send(WarningRaised(title, f"{error} {where}, and writing is tried again."))
-            self._send(StageReported("Waiting for room on the disk", 1.0))
+            self._send(WarningRaised(title, f"{error} {where}, and writing will be tried again."))
+            self._send(StageReported("Waiting for disk space", 1.0))
         return True
 
     def _finished_clip(self, training: Training) -> CompactClip:
@@ -336,7 +336,7 @@ class TrainingRun:
         try:
             self._project.keep_curves(self._job.clip_index)
         except OSError as error:
-            logger.warning("the curves could not be put in their place (%s)", error.strerror)
+            logger.warning("the curves could not be stored (%s)", error.strerror)
         with suppress(OSError):
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
         remove_stages(self._project.prep_dir, self._job.clip_index)
@@ -517,7 +517,7 @@ class TrainingRun:
             message, hint = "There is not enough memory.", "Use a smaller scale or fewer points."
         else:
             message = f"{type(error).__name__}: {error}"
-            hint = "This is a fault of the program; the log has the details."
+            hint = "This is a bug in the program; the log has the details."
         training = self._training
         is_whole = not self._is_in_step or isinstance(error, NonFiniteLoss)  # such a step has changed nothing
         has_learned = training is not None and (training.steps_done > 0 or isinstance(error, NonFiniteLoss))
@@ -534,9 +534,9 @@ class TrainingRun:
             is_good = False
         step = training.steps_done
         if is_good and (self._checkpoint_step() == step or self._write_checkpoint(training)):
-            return f"Step {step} is kept; training again with the same command goes on from there."
+            return f"Step {step} is kept; training again with the same command resumes from there."
         kept = self._checkpoint_step()
         why = "could not be kept" if is_good else "holds numbers that are not finite"
         if kept is None:
             return f"Step {step} {why}; training again starts from the beginning."
-        return f"Step {step} {why}; training again with the same command goes on from step {kept}."
+        return f"Step {step} {why}; training again with the same command resumes from step {kept}."

@@ -52,9 +52,9 @@ logger = logging.getLogger(__name__)
 
 Launch = Callable[[TrainJob, Project], Worker]
 STAGE_WORDS = {
-    "static": "Learning what stands still",
-    "joint": "Learning what moves",
-    "source": "Learning what is new",
+    "static": "Learning the static scene",
+    "joint": "Learning motion",
+    "source": "Learning new content",
 }
 CLOSE_TIMEOUT_S = 5.0
 

@@ -38,7 +38,7 @@ class Entry(NamedTuple):
 AUTO = "auto"
 """The first of the table that works on this machine."""
 BACKENDS = {
-    "cpu": Entry("engine.backends.cpu.backend:CpuBackend", "compiled kernels"),
+    "cpu": Entry("engine.backends.cpu.backend:CpuBackend", "compiled kernels on the CPU"),
     "reference": Entry(
         "engine.backends.reference.backend:ReferenceBackend", "plain torch, many times slower", has_devices=True
     ),
@@ -98,8 +98,8 @@ def _best() -> Backend:
         try:
             return backend_called(name)
         except (ProjectError, ImportError) as error:
-            logger.info("back end %s is left out: %s", name, error)
-    raise ProjectError("No back end works on this machine.", hint="`clipgstream doctor` says what is missing.")
+            logger.info("back end %s is skipped: %s", name, error)
+    raise ProjectError("No back end works on this machine.", hint="`clipgstream doctor` shows what is missing.")
 
 
 def _entry(name: str) -> tuple[Entry, str]:

@@ -74,7 +74,7 @@ def calibrate(
         try:
             return run_child(CALIBRATING, job, report=report, alive=alive, stall_s=stall_s, folder=scratch)
         except ChildFailed as error:
-            raise PreparationError(f"{error}.", hint="Try again; the log may say more.", path=folder) from error
+            raise PreparationError(f"{error}.", hint="Try again; see the log for details.", path=folder) from error
         except EngineError as error:
             error.path = folder
             raise
@@ -88,7 +88,7 @@ def check_distance(options: CalibrationOptions, names: list[str], folder: Path) 
     hint = f"Cameras are {', '.join(names[:8])}{' and more' if len(names) > 8 else ''}."
     for name in (known.first, known.second):
         if name not in names:
-            raise CaptureError(f"There is no camera '{name}'.", hint=hint, path=folder)
+            raise CaptureError(f"Camera '{name}' does not exist.", hint=hint, path=folder)
     if known.first == known.second or not (np.isfinite(known.metres) and known.metres > 0):
         text = f"The distance from {known.first} to {known.second} is {known.metres:g} m."
         raise CaptureError(text, hint="Give a distance above 0 between two cameras.", path=folder)

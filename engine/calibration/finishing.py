@@ -41,7 +41,7 @@ def finished(
     scale, is_metric = _scale(solution.cameras, tracks.points, names, options, warnings)
     up, origin, up_from = find_up(solution.cameras, tracks.points, options.up)
     if up_from != options.up:
-        warnings.append("No floor was found below the cameras; up is where most of them have their upper edge.")
+        warnings.append("No floor was found below the cameras; up is the upper edge of most cameras' pictures.")
     cameras, points = upright(solution.cameras, tracks.points, up, origin, scale)
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
     agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
@@ -71,15 +71,17 @@ def _doubts(names: list[str], n_sightings: np.ndarray, agreed: Agreement, strain
     for row, n in enumerate(n_sightings.tolist()):
         partners = [names[other] for other in np.flatnonzero(agreed.is_firm[row])]
         if is_placed[row] and strained[row]:
-            doubts.append("its lens was bent to make its place fit: its matches miss, its principal point is far off")
+            doubts.append(
+                "its lens was distorted to make its position fit: its matches miss and its principal point is far off"
+            )
         elif is_placed[row]:
             doubts.append(f"only {n} points" if n < WEAK_SIGHTINGS else "")
         elif not partners:
-            doubts.append(f"no camera agrees with its place; {_strongest(row, names, agreed)}")
+            doubts.append(f"no camera agrees with its position; {_strongest(row, names, agreed)}")
         elif len(partners) < MIN_AGREEING:
-            doubts.append(f"one camera agrees with its place ({partners[0]}); {MIN_AGREEING} are needed")
+            doubts.append(f"one camera agrees with its position ({partners[0]}); {MIN_AGREEING} are needed")
         else:
-            doubts.append(f"those that agree with its place ({', '.join(partners)}) do not agree with the others")
+            doubts.append(f"those that agree with its position ({', '.join(partners)}) do not agree with the others")
     return doubts
 
 
@@ -94,7 +96,7 @@ def _failure(agreed: Agreement) -> str:
     n, n_placed = len(agreed.is_placed), int(agreed.is_placed.sum())
     if n_placed >= max(MIN_CAMERAS, (1 - MAX_DOUBTFUL) * n):
         return ""
-    return f"Matches contradict the places of {n - n_placed} of {n} cameras, so none of them can be trusted."
+    return f"Matches contradict the positions of {n - n_placed} of {n} cameras, so none of them can be trusted."
 
 
 def _pairs(names: list[str], agreed: Agreement) -> tuple[PairCounts, ...]:

@@ -8,14 +8,14 @@ from typing import Literal
 Lens = Literal["simple", "opencv", "fisheye"]
 Up = Literal["floor", "cameras"]
 LENSES: dict[str, str] = {
-    "simple": "one number for how straight lines bend: most lenses",
-    "opencv": "four numbers, two of them for lenses that sit askew: wide-angle and inexpensive lenses",
+    "simple": "one distortion number: most lenses",
+    "opencv": "four numbers, two of them for decentred lenses: wide-angle and inexpensive lenses",
     "fisheye": "four numbers for very wide lenses, such as those of action cameras",
 }
 """Lens models by name, and what each is for."""
 UPS: dict[str, str] = {
-    "floor": "the largest level surface below the cameras; where there is none, the cameras",
-    "cameras": "the direction in which most cameras have their upper edge",
+    "floor": "the largest level surface below the cameras; if none is found, the cameras",
+    "cameras": "the upper edge of most cameras' pictures",
 }
 """Ways to find out which way is up."""
 

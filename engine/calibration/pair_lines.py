@@ -10,8 +10,8 @@ MAX_LINES = 12
 FEW_MATCHES = 30
 """Fewer than so many do not join two cameras."""
 WHAT_TO_DO = (
-    "Put neighbouring cameras closer together, less than about 20 degrees apart, so that they see the same things, "
-    "with fine, irregular patterns on them; docs/calibration.md says what to film. Or calibrate with a board in "
+    "Put neighbouring cameras closer together, less than about 20 degrees apart, so that they see the same finely "
+    "patterned things; docs/calibration.md explains what to film. Or calibrate with a board in "
     "another program and open its files: TOML of Caliscope, Pose2Sim or anipose, intri.yml and extri.yml of EasyMocap, "
     "COLMAP, transforms.json (docs/capture_formats.md)."
 )
@@ -41,7 +41,7 @@ def pair_lines(pairs: Sequence[PairCounts]) -> list[str]:
     for pair in most:
         line = f"  {pair.first:<{width}}  {pair.second:<{width}}  {pair.n_matches:6,} matches"
         if pair.n_explained is not None:
-            line += f", {pair.n_explained / max(pair.n_matches, 1):4.0%} explained"
+            line += f", {100 * pair.n_explained / max(pair.n_matches, 1):3.0f} % explained"
         lines.append(line)
     n_joined, n_more = sum(pair.n_matches >= FEW_MATCHES for pair in pairs), len(pairs) - len(most)
     lines.append(

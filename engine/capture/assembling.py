@@ -27,6 +27,7 @@ from engine.capture.frames import IndexedFrames
 from engine.capture.pixels.frame_fit import FIT_WORDS, FrameFit, OtherSize
 from engine.capture.times.timed_frames import at_common_moments, own_times
 from engine.errors import CaptureError
+from engine.text import rate_text
 
 THREADS = 4
 """Videos and images looked at side by side: FFmpeg works, or waits for the disk, without the interpreter."""
@@ -129,16 +130,16 @@ def assemble(
     unknown = [name for name in default_holdout if name not in {camera.name for camera in cameras}]
     if unknown:
         text = f"Held out is {shortened(unknown)}, which the capture does not have."
-        found.append(CaptureError(text, hint="Use names of its cameras.", path=said_in))
+        found.append(CaptureError(text, hint="Use its camera names.", path=said_in))
     raise_problems(found, folder)
     if scaled:
         said.append(f"Frames have another size than their calibration, which is scaled to them: {shortened(scaled)}.")
     if misfits and fit is None:
         most_px = max(entry.misfit_px for entry in entries)
         said.append(
-            f"Frames have another shape than their calibration: {shortened(misfits)}. They are taken as scaled. If "
-            f"they were cropped, that is wrong by up to {most_px:.3g} px at the border: say so when you open them, or "
-            "by clipgstream inspect --fit."
+            f"Frames have another shape than their calibration: {shortened(misfits)}. Unless you choose "
+            f"otherwise when opening or with clipgstream inspect --fit, they count as scaled; if they were cropped, "
+            f"that is wrong by up to {most_px:.3g} px at the border."
         )
     elif misfits:
         said.append(
@@ -146,7 +147,9 @@ def assemble(
         )
     lying = [name for name, seen in files.items() if seen.is_lying]
     if lying:
-        said.append(f"Not turned for display as they ask, because only as stored they fit: {shortened(lying)}.")
+        said.append(
+            f"Not rotated for display as their files ask, because only the stored orientation fits: {shortened(lying)}."
+        )
     offsets = [camera.offset_frames for camera in cameras]
     frame_times_s: Sequence[np.ndarray | None] | None = [camera.frame_times_s for camera in cameras]
     if all(times_s is None for times_s in frame_times_s):
@@ -179,7 +182,7 @@ def _check_numbers(camera: DescribedCamera, size: tuple[int, int]) -> list[Captu
         text = f'Camera "{camera.name}" has NaN or infinity in the parameters of its lens.'
         found.append(CaptureError(text, hint=hint, path=camera.said_in))
     elif np.abs(camera.lens.params).max(initial=0.0) > MAX_LENS or camera.lens.max_radius() < MIN_LENS_RADIUS:
-        text = f'The lens of camera "{camera.name}" bends all rays back on themselves.'
+        text = f'The lens of camera "{camera.name}" folds back on itself.'
         found.append(CaptureError(text, hint="Calibrate again, with fewer parameters.", path=camera.said_in))
     if camera.color_matrix is not None and not np.isfinite(camera.color_matrix).all():
         text = f'Camera "{camera.name}" has NaN or infinity in its colour matrix.'
@@ -192,14 +195,14 @@ def _rate(fps: float | None, files: dict[str, SeenFiles], said: list[str]) -> fl
     rates = {name: seen.rate for name, seen in files.items() if seen.rate > 0}
     if fps is None:
         if not rates:
-            said.append(f"Nothing says how many frames per second there are; {DEFAULT_FPS:g} are taken.")
+            said.append(f"The capture states no frame rate; {DEFAULT_FPS:g} per second is assumed.")
             return DEFAULT_FPS
         fps = float(np.median(list(rates.values())))
     others = [f"{name} {rate:g}" for name, rate in rates.items() if abs(rate - fps) > RATE_TOLERANCE * fps]
     if others:
         said.append(
-            f"The capture has {fps:g} frames per second, but these videos state another rate: {shortened(others)}. "
-            "Frames are taken one by one."
+            f"The capture has {rate_text(fps)} frames per second, but these videos state another rate: "
+            f"{shortened(others)}. Frames are taken one by one."
         )
     return fps
 
@@ -222,11 +225,11 @@ def _on_one_clock(
     counts = np.array([entry.source.n_frames for entry in entries])
     start, stop = int(max(0, (-own).max())), int((counts - own).min())
     if stop <= start:
-        text = "No frame is left that all cameras have."
+        text = "No frame is common to all cameras."
         raise CaptureError(text, hint="Check the offsets and lengths of the cameras.", path=folder)
     if len(set(counts.tolist())) > 1:
         listed = shortened([f"{entry.name} {count}" for entry, count in zip(entries, counts, strict=True)])
-        said.append(f"Cameras differ in length ({listed} frames); the {stop - start} frames that all have are used.")
+        said.append(f"Cameras differ in length ({listed} frames); the {stop - start} frames they share are used.")
     missed_s = np.abs(own - offsets) / fps
     if missed_s.max(initial=0.0) * fps > 0.01:
         said.append(

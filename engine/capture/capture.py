@@ -354,7 +354,7 @@ def _make_capture(
     first, stop = (0, layout.n_frames) if frames is None else frames
     if not 0 <= first < stop <= layout.n_frames:
         raise CaptureError(
-            f"Frames {first}:{stop} were asked for, of which the capture does not have all.",
+            f"Frames {first}:{stop} are not all in the capture.",
             hint=f"It has frames 0 to {layout.n_frames - 1}; write 0:{layout.n_frames} for all of them.",
             path=folder,
         )
@@ -469,8 +469,8 @@ def check_shapes(layout: Layout) -> list[CaptureError]:
         problems.append(
             CaptureError(
                 f'Camera "{entry.name}" has {sizes[0]} frames, its calibration is for {sizes[1]}.',
-                hint="Say whether they were scaled or cropped, when you open the folder in the window or by "
-                "clipgstream inspect --fit. Or export the calibration for this size.",
+                hint="Choose whether they were scaled or cropped when opening the folder, or with clipgstream inspect "
+                "--fit. Or export the calibration for this size.",
                 path=entry.source.path,
             )
         )
@@ -489,9 +489,9 @@ def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
         hints = [probe.hint for probe in close] + [f"{what[0].upper()}{what[1:]}." for _, what in calibrations]
         hint = " Or: ".join(dict.fromkeys(hint for hint in hints if hint))
     else:
-        found, hint = "nothing of a known layout was recognised", ""
+        found, hint = "no known layout was recognised", ""
     if inside:
-        hint = f"Open {inside[0]} inside it, which is one."
+        hint = f"Open {inside[0]} inside it, which is a capture."
     elif not hint:
         hint = (
             "docs/capture_formats.md lists the layouts that are read. Videos of cameras without calibration: "

@@ -30,7 +30,7 @@ class ExcludedFrames(Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if self.stop <= self.first:
-            raise ValueError(f"frames {self.first} to before {self.stop} are none")
+            raise ValueError(f"frames {self.first} up to {self.stop} are an empty range")
 
 
 class Stroke(Struct, frozen=True, forbid_unknown_fields=True):
@@ -66,7 +66,7 @@ class PaintedMask(Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if self.stop <= self.first:
-            raise ValueError(f"frames {self.first} to before {self.stop} are none")
+            raise ValueError(f"frames {self.first} up to {self.stop} are an empty range")
 
 
 class Exclusions(Struct, frozen=True, forbid_unknown_fields=True):

@@ -66,7 +66,7 @@ def read_json_list(path: Path) -> list[Any]:
     found = _parsed(path, parse_json)
     if isinstance(found, list):
         return found
-    hint = "It may be another file of that name; export the capture again."
+    hint = "It may be a different file with the same name; export the capture again."
     raise CaptureError("The file holds no list of cameras.", hint=hint, path=path)
 
 
@@ -150,7 +150,7 @@ def size_problem(text: str, width: object, height: object, path: Path) -> Captur
     """What to say where `parse_size` gives None. text: what has them, such as "w and h are"."""
     return CaptureError(
         f"{text} {shown(width)} and {shown(height)}.",
-        hint=f"Give whole numbers from 1 to {MAX_SIDE:,}, together at most {MAX_PIXELS:,} pixels.",
+        hint=f"Give whole numbers from 1 to {MAX_SIDE:,}, at most {MAX_PIXELS:,} pixels.",
         path=path,
     )
 

@@ -222,7 +222,7 @@ class VideoFrames:
         times = sorted(pts for pts, _ in packets)
         if len(times) != self._n_frames:
             raise CaptureError(
-                f"The container promises {self._n_frames} frames, {len(times)} are in it.",
+                f"The container announces {self._n_frames} frames but holds {len(times)}.",
                 hint="Copy or export this video again, for example as H.264 in mp4.",
                 path=self.path,
             )

@@ -133,5 +133,5 @@ def _text(file: BinaryIO, path: Path, n: int, fields: list[tuple[str, str]], col
         try:
             values[row] = [float(words[column]) for column in columns]
         except ValueError as error:
-            raise damaged(path, "a point has something else than numbers") from error
+            raise damaged(path, "a point has values that are not numbers") from error
     return values

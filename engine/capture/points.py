@@ -80,7 +80,7 @@ def read_points(path: Path) -> CapturePoints:
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise CaptureError(
-            "The file is not a point cloud that is read.", hint="Give a .ply, or COLMAP's points3D.bin.", path=path
+            "The file is not a supported point cloud.", hint="Give a .ply, or COLMAP's points3D.bin.", path=path
         )
     try:
         with open_regular(path) as file:
@@ -122,7 +122,7 @@ def _read_text(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray]:
             position = [float(word) for word in words[1:4]]
             color = [min(max(int(word), 0), 255) for word in words[4:7]]
         except ValueError as error:
-            raise damaged(path, f"point number {row} has something else than numbers") from error
+            raise damaged(path, f"point number {row} has values that are not numbers") from error
         if len(color) != 3:
             raise damaged(path, f"point number {row} has no position and colour")
         values.extend(position)
@@ -163,4 +163,4 @@ def _read_npz(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None
 def said_of(points: CapturePoints, path: Path) -> Iterable[str]:
     """What is worth saying about a cloud that was read."""
     if points.n_dropped:
-        yield f"{points.n_dropped:,} points of {path.name} are not numbers or lie nowhere; they are left out."
+        yield f"{points.n_dropped:,} points of {path.name} are not finite numbers and are left out."

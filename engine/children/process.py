@@ -156,7 +156,7 @@ class ChildProcess(Generic[Job, Event, Result]):
                 elif kind is Message.ERROR:
                     self._end_with(decoded(data, Refusal).error())
             except msgspec.DecodeError as error:
-                self._end_with(ChildFailed(f"{self.kind.what} said what cannot be read ({error})", is_final=True))
+                self._end_with(ChildFailed(f"{self.kind.what} sent an unreadable message ({error})", is_final=True))
                 process.kill()
         code = process.wait()
         if not self.is_over:
@@ -241,6 +241,6 @@ def run_child(
             # a machine that slept, or a group of processes that was halted, has not waited
             child.still_s += min(time.monotonic() - began_s, 1.0)
             if stall_s is not None and child.still_s > stall_s:
-                raise ChildFailed(f"{kind.what} did nothing for {stall_s:.0f} s", is_final=False)
+                raise ChildFailed(f"{kind.what} did not respond for {stall_s:.0f} s", is_final=False)
     finally:
         child.end(0.0 if child.is_over else kind.grace_s)

@@ -115,7 +115,7 @@ class Coverage(Struct, frozen=True):
         said = f"{n_outside:,} of {self.n_points:,} moving points ({percent:.0f} %) lie outside the inherited anchors; "
         said += f"{self.n_residual:,} residual anchors ({self.reason})"
         if self.n_left_out:
-            said += f", {self.n_left_out:,} points left to the anchors beside them"
+            said += f", {self.n_left_out:,} points left to neighbouring anchors"
         return f"{said}; {100 * self.share:.1f} % of what moves is within reach of an anchor"
 
 

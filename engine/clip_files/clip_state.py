@@ -219,7 +219,7 @@ class DamagedClip:
         """What to raise where the clip is needed."""
         return ProjectError(
             f"The clip file is damaged or not a clip file ({self.reason}).",
-            hint="Restore it from a copy, or remove it and train the clip again.",
+            hint="Restore it from a backup, or remove it and train the clip again.",
             path=self.path,
         )
 

@@ -88,7 +88,7 @@ def encode_on_grid_of(array: np.ndarray, other: CodedArray) -> CodedArray:
     raw = _ON_GRID[codec](array, before, spec)
     coded = _coded(array, codec, raw, {key: spec[key] for key in ("bits",) if key in spec}, np.zeros(1))
     if decode_array(coded.payload, coded.spec).tobytes() != array.tobytes():
-        raise CodingError(f"values lie beside the grid of {codec}")
+        raise CodingError(f"values are off the grid of {codec}")
     return CodedArray(coded.payload, coded.spec | {"max_error": spec["max_error"]}, other.bounds)
 
 
@@ -127,7 +127,7 @@ def decode_array(payload: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
         raise CodingError(f"the bytes cannot be unpacked ({error})") from error
     is_whole = unpacker.eof and not unpacker.unused_data and len(raw) == n_bytes
     if not is_whole or zlib.crc32(raw) != spec.get("crc32"):
-        raise CodingError(f"{len(raw)} of {n_bytes} bytes are there, or others than were written")
+        raise CodingError(f"{len(raw)} of {n_bytes} bytes are present, or they were changed")
     try:
         array = unpack(raw, dtype, shape, spec)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, MemoryError) as error:
@@ -257,7 +257,7 @@ def _steps_on_grid(array: np.ndarray, before: bytes, spec: dict[str, Any]) -> by
     sizes = np.frombuffer(before[: 16 * n_channels], "<f8").reshape(n_channels, 2)
     codes = np.round(array.astype(np.float64) / np.where(sizes[:, 0] == 0, 1.0, sizes[:, 0])) - sizes[:, 1]
     if not ((codes >= 0) & (codes <= np.iinfo(code_dtype).max)).all():
-        raise CodingError("values lie outside of the grid")
+        raise CodingError("values lie outside the grid")
     return before[: 16 * n_channels] + _planes(np.ascontiguousarray(codes.T.astype(code_dtype)))
 
 

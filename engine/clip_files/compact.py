@@ -160,7 +160,7 @@ def _check_error(name: str, array: np.ndarray, decoded: np.ndarray, coded: Coded
         is_alike = bool((decoded == array).all())
     if not is_alike:
         raise ProjectError(
-            f"The stored form of {name} is up to {errors.max(initial=0.0):.3g} beside what was trained, "
+            f"The stored form of {name} is up to {errors.max(initial=0.0):.3g} off what was trained, "
             f"{coded.spec['max_error']:.3g} was promised; the clip was not saved.",
-            hint="This is a fault of the program; the checkpoint is kept.",
+            hint="This is a bug in the program; the checkpoint is kept.",
         )

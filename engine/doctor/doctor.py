@@ -95,7 +95,7 @@ def examine(
         *check_readable(look.unreadable),
         *check_black(look),
         *check_frozen(look),
-        *check_movement(look, lambda done: tell_movement(done, "looking for cameras that move")),
+        *check_movement(look, lambda done: tell_movement(done, "looking for moving cameras")),
         *check_exposure(survey),
     ]
     if not look.unreadable and len(capture.rig) > 1:
@@ -131,7 +131,7 @@ def _in_turn(tell: Callable[[float, str], None]) -> ReportProgress:
         if progress.stage not in begun:
             begun.append(progress.stage)
         done = min((len(begun) - 1 + progress.done) / N_TIME_STAGES, 1.0)
-        tell(done, f"looking whether cameras are in step: {progress.stage}")
+        tell(done, f"checking synchronisation: {progress.stage}")
 
     return report
 
@@ -159,7 +159,7 @@ def _compare(
         matches = match_pairs(backgrounds, listed, alive=alive)
     except ChildFailed as error:
         text = f"The calibration could not be checked: {error}."
-        advice = "Try again; if it happens again, look at the memory that is left."
+        advice = "Try again; if it happens again, check free memory."
         return [Finding("calibration", "note", (), (), text, 1.0, advice)], [], n_features
     n_features[rows] = matches.n_features
     errors = pair_errors(small, matches.pairs)

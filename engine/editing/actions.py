@@ -96,7 +96,7 @@ class Hide(EditAction, frozen=True, tag="hide"):
     """They are drawn nowhere, but stay in the clips when edits are applied permanently."""
 
     label = "Hide"
-    meaning = "It is not drawn"
+    meaning = "Does not draw it"
     opposite = "isolate"
 
 
@@ -104,7 +104,7 @@ class Delete(EditAction, frozen=True, tag="delete"):
     """They are gone; from the clips too, once edits are applied permanently."""
 
     label = "Delete"
-    meaning = "It is gone"
+    meaning = "Removes it"
 
 
 def _turn(numbers: tuple[float, ...]) -> Quat:
@@ -112,7 +112,7 @@ def _turn(numbers: tuple[float, ...]) -> Quat:
     *axis, degrees = numbers
     length = math.hypot(*axis)
     if not (math.isfinite(length) and math.isfinite(degrees) and length > 0.0):
-        raise ValueError("there is no axis or angle to turn by; write for instance 0 1 0 90")
+        raise ValueError("the axis or angle is missing; write for example 0 1 0 90")
     half = math.radians(degrees) / 2
     x, y, z = (math.sin(half) * part / length for part in axis)
     return math.cos(half), x, y, z
@@ -126,33 +126,33 @@ class Transform(EditAction, frozen=True, tag="transform"):
     """
 
     label = "Move"
-    tip = "Move, rotate and scale what is selected"
-    meaning = "It is scaled and turned about a pivot, then moved"
+    tip = "Move, rotate and scale the selection"
+    meaning = "Scales and rotates about a pivot, then moves"
     centered = "pivot"
 
     translation: Annotated[
-        Vector, value("By so many scene units", "Moved by", "--move X Y Z", low=-FAR, high=FAR, step=2e-3)
+        Vector, value("Distance in scene units", "Move by", "--move X Y Z", low=-FAR, high=FAR, step=2e-3)
     ] = ORIGIN
     quat: Annotated[
         Quat,
         value(
             "A rotation, as a quaternion",
-            "Turned by",
+            "Rotate by",
             "--quat W X Y Z",
-            Flag("--rotate", "About this axis, by so many degrees", like="X Y Z DEG", read=_turn),
+            Flag("--rotate", "Rotation about this axis, in degrees", like="X Y Z DEG", read=_turn),
         ),
     ] = (1.0, 0.0, 0.0, 0.0)
     scale: Annotated[
-        float, value("So many times as large", "Scaled by", "--scale S", low=0, high=FAR, offered=(0.01, 100))
+        float, value("Factor of the size", "Scale by", "--scale S", low=0, high=FAR, offered=(0.01, 100))
     ] = 1.0
     pivot: Annotated[
-        Vector, value("What it is turned and scaled about", "About", "--pivot X Y Z", low=-FAR, high=FAR, step=2e-3)
+        Vector, value("Pivot of rotation and scale", "About", "--pivot X Y Z", low=-FAR, high=FAR, step=2e-3)
     ] = ORIGIN
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.scale:
-            raise ValueError("a transform with the scale 0 makes everything vanish")
+            raise ValueError("a scale of 0 makes everything vanish")
         check_quat(self.quat)
 
     @property
@@ -204,8 +204,8 @@ class Expose(EditAction, frozen=True, tag="expose"):
     """Their light is multiplied by 2 to the power of `stops`, in linear light."""
 
     label = "Exposure"
-    tip = "Change the exposure of what is selected"
-    meaning = "Multiplies its light"
+    tip = "Change the exposure of the selection"
+    meaning = "Multiplies the light"
     verb = "expose"
     adverb = "by {stops:+.3g} EV"
 
@@ -227,15 +227,15 @@ class Hold(EditAction, frozen=True, tag="hold"):
     """They stand still, as they are at one frame; in clips without that frame, as at their frame next to it."""
 
     label = "Set static"
-    tip = "Set static: what is selected stands still, as at this frame"
-    meaning = "It stands still, as it is at one frame"
+    tip = "Set static: freeze the selection as in this frame"
+    meaning = "Freezes it as in one frame"
     verb = "hold"
     adverb = "as in frame {frame_index}"
 
     frame_index: Annotated[
         int,
         value(
-            "It stands still, as it is in this frame",
+            "Freezes it as in this frame",
             "As in frame",
             "--hold FRAME",
             low=0,
@@ -249,14 +249,14 @@ class Smooth(EditAction, frozen=True, tag="smooth"):
     """They change more slowly: each is a weighted mean of itself over the frames of its clip around the moment."""
 
     label = "Smooth"
-    tip = "Smooth what is selected over time"
-    meaning = "It changes more slowly: a mean over the frames of its clip around each moment"
+    tip = "Smooth the selection over time"
+    meaning = "Smooths changes over time: a mean over neighbouring frames of the clip"
     adverb = "over {sigma_frames:.3g} frames"
 
     sigma_frames: Annotated[
         float,
         value(
-            "It changes more slowly: standard deviation of the mean over time",
+            "Smooths changes over time: standard deviation of the mean",
             "Over",
             "--smooth FRAMES",
             low=0.1,

@@ -129,5 +129,5 @@ def _unpacked(rows: bytes) -> np.ndarray:
     try:
         return unpack_rows(rows)
     except ValueError as error:
-        hint = "Delete the edit in which they were picked."
+        hint = "Delete the edit that picked them."
         raise ProjectError(f"An edit cannot be applied: {error}.", hint=hint) from error

@@ -38,7 +38,7 @@ class Scope(Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if self.stop is not None and self.stop <= self.first:
-            raise ValueError(f"a scope from frame {self.first} to before frame {self.stop} holds no frame")
+            raise ValueError(f"a scope from frame {self.first} up to {self.stop} holds no frame")
 
     def holds_at(self, frame: float) -> bool:
         """Whether a moment belongs to it: that between two frames belongs to the one before."""

@@ -15,7 +15,9 @@ def pack_rows(rows: np.ndarray) -> bytes:
     """Pack numbers; those that occur twice count once. rows: [N] integers, not negative"""
     rising = np.unique(np.asarray(rows, dtype=np.int64))
     if len(rising) and not (rising[0] >= 0 and rising[-1] < MAX_PICKED):
-        raise ValueError(f"numbers of Gaussians run from {rising[0]} to {rising[-1]}; 0 to {MAX_PICKED - 1} can be")
+        raise ValueError(
+            f"numbers of Gaussians run from {rising[0]} to {rising[-1]}; the range is 0 to {MAX_PICKED - 1}"
+        )
     return zlib.compress(np.diff(rising, prepend=0).astype("<u4").tobytes(), 9)
 
 

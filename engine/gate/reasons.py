@@ -7,13 +7,13 @@ REASONS = (
     "changes in several views",
     "lamp or shadow: only the brightness changes",
     "changes in too few of the views that see it",
-    "seen unhidden by fewer than two views",
-    "something moves here, which has anchors of its own",
+    "seen unoccluded by fewer than two views",
+    "moving content with its own anchors is here",
     "marked as static",
     "marked as dynamic",
-    "had a dynamic feature and learned no change",
-    "changes, but nothing beside it does",
-    "something else is seen in its place from all sides",
+    "had a dynamic feature but learned no change",
+    "changes, but its neighbours do not",
+    "something else is seen in its place",
 )
 """In words, by code. Clips that are trained today have the three codes below; the others stand in clips of projects
 whose gate also looked at the pictures."""

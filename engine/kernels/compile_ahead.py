@@ -164,9 +164,8 @@ def _end(name: str, process: subprocess.Popen[bytes], seconds: float) -> bool:
     if process.returncode == 0:
         logger.info("kernels of the %s compiled in %.1f s", name, seconds)
         return True
-    logger.warning(
-        "kernels of the %s could not be compiled ahead (exit %s): %s", name, process.returncode, said[-2000:]
-    )
+    reason = said.decode("utf-8", "replace").strip()[-2000:] or f"exit status {process.returncode}, no message"
+    logger.warning("kernels of the %s could not be compiled ahead: %s", name, reason)
     return False
 
 

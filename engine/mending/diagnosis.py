@@ -44,12 +44,12 @@ class Diagnosis(msgspec.Struct, frozen=True):
     def words(self) -> str:
         """In a sentence."""
         if self.all <= 0.0:
-            return "Nothing jumps on what stands still."
+            return "Static parts do not jump."
         if self.colors > max(self.still, 0.5 * self.all):
             return "Colours of single cameras jump."
         if self.still > 0.5 * self.all:
-            return "The light on what stands still jumps."
-        return "What can move jumps where nothing moves."
+            return "The light on static parts jumps."
+        return "Moving anchors jump where nothing moves."
 
 
 def diagnose(capture: Capture, clips: Mapping[int, TrainedClip], stretch: Stretch, cameras: Sequence[int]) -> Diagnosis:

@@ -81,9 +81,9 @@ class Attempt(msgspec.Struct, frozen=True):
 
 
 METHODS = {
-    "light": "the exposure of the cameras and the light on what stands still are measured again",
+    "light": "camera exposure and the light on static parts are measured again",
     "fade": "dynamic features are faded from one clip into the other",
-    "joint": "the frames around it are trained for a while, towards each other",
+    "joint": "the frames around it are briefly trained towards each other",
 }
 """Ways to mend and what they do, cheapest first."""
 CHOICES = ("auto", *METHODS, "retrain")

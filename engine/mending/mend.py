@@ -60,7 +60,7 @@ class Mended:
             return ""
         worst = min(self.before.psnr, key=lambda index: self.before.psnr[index], default=None)
         which = "the clip" if worst is None else f"clip {worst}"
-        return f"More than half of the excess flicker is left. Train {which} again, with more steps perhaps."
+        return f"More than half of the excess flicker is left. Retrain {which}, perhaps with more steps."
 
 
 class Mending:
@@ -102,8 +102,8 @@ class Mending:
         self._open = [index for index in stretch.clip_indices if not states[index].is_reference]
         if not self._open:
             raise ProjectError(
-                "These frames lie in the reference clip, which stays as it is: others inherit from it.",
-                hint="Train the reference clip again, or mend the boundary to a clip beside it.",
+                "These frames are in the reference clip, which cannot change because others inherit from it.",
+                hint="Retrain the reference clip, or mend the boundary to a neighbouring clip.",
             )
         self._capture, self._stretch, self._clips, self._reference = capture, stretch, list(clips), reference
         self._states, self._make, self._backend, self._report = dict(states), make_training, backend, report
@@ -130,7 +130,7 @@ class Mending:
         before = best = self._measuring.measure(self._shown, with_held_out=True)
         if before.excess is None:
             raise ProjectError(
-                "Nothing stands still around these frames, so there is no flicker to measure.",
+                "Nothing is static around these frames, so flicker cannot be measured.",
                 hint="Choose other frames.",
             )
         found = diagnose(self._capture, self._shown, self._stretch, self._cameras)
@@ -194,8 +194,8 @@ class Mending:
         for i, index in enumerate(indices):
             report = self._part(FADING, "fade", i, len(indices), f"clip {index}")
             tried[index] = faded(self._states[index], self._clips[index], span, looks, self._make, report)
-        whom = "each other" if len(tried) > 1 else "what lies beside it"
-        return f"{len(span)} frames of {_named(tried)} go over into {whom}", tried
+        whom = "each other" if len(tried) > 1 else "its neighbours"
+        return f"{len(span)} frames of {_named(tried)} fade into {whom}", tried
 
     def _joint(self, *, is_other: bool) -> tuple[str, dict[int, CompactClip]]:
         looks = self._looks()
@@ -203,7 +203,7 @@ class Mending:
         clip, report = self._clips[index], self._part(TRAINING, "joint", 0, 1, f"clip {index}")
         span = range(clip.start, clip.stop)
         tried = faded(self._states[index], clip, span, looks, self._make, report, is_learning=True)
-        return f"Clip {index} learned on, towards its pictures and towards what lies beside it", {index: tried}
+        return f"Clip {index} was trained further, towards its pictures and its neighbours", {index: tried}
 
     def _looks(self) -> Looks:
         return Looks(self._capture, self._shown, self._cameras)

@@ -50,7 +50,7 @@ def boundary_stretch(clips: Sequence[Clip], after: int) -> Stretch:
     """
     if not 0 < after < len(clips):
         raise ProjectError(
-            f"There is no boundary before clip {after}.",
+            f"Clip {after} has no boundary before it.",
             hint=f"Boundaries lie before clips 1 to {len(clips) - 1}." if len(clips) > 1 else "There is one clip only.",
         )
     before, clip = clips[after - 1], clips[after]

@@ -419,7 +419,7 @@ def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBacken
         decoder = _read_decoder(state)
     else:
         if reference is None:
-            raise ProjectError(f"Clip {header.clip_index} inherits from a reference clip that is not there.")
+            raise ProjectError(f"Clip {header.clip_index} inherits from a missing reference clip.")
         if reference.header.fingerprint != header.reference_fingerprint:
             raise ProjectError(
                 f"Clip {header.clip_index} was trained on reference {header.reference_fingerprint}, "

@@ -56,7 +56,7 @@ def atomic_folder(path: Path | str) -> Iterator[Path]:
     """
     path = Path(path).absolute()
     if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
-        raise FileExistsError(errno.EEXIST, "there is something under this name already", str(path))
+        raise FileExistsError(errno.EEXIST, "this name is already taken", str(path))
     partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
     try:
         partial.mkdir(parents=True)

@@ -24,7 +24,7 @@ MAX_DEPTH = 100
 MAX_DIGITS = 40
 """Digits of a whole number; states of random number generators have 39."""
 CHECKSUM = "checksum"
-HAND_EDITED = f'If it was edited by hand, take out its entry "{CHECKSUM}"; otherwise restore it from a copy.'
+HAND_EDITED = f'If it was edited by hand, take out its entry "{CHECKSUM}"; otherwise restore it from a backup.'
 """What to do about a checksum that does not fit."""
 _LARGE_EXPONENT = re.compile(rb"[eE]\+?\d{3}")
 _ALL_DIGITS_ZERO = bytes.maketrans(b"123456789", b"0" * 9)

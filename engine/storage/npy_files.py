@@ -44,7 +44,7 @@ def parse_npy(data: bytes) -> np.ndarray:
     except Exception as error:
         raise NpyError("it is not a .npy file, or its header is damaged") from error
     if dtype.kind not in "iuf" or dtype.itemsize > 8:
-        raise NpyError("it holds something else than numbers")
+        raise NpyError("it does not hold numbers")
     n_values = 1
     for side in shape:
         if not isinstance(side, int) or isinstance(side, bool) or side < 0:

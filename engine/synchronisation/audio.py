@@ -63,9 +63,9 @@ def audio_estimate(
     solution = solve_pairs(len(recordings), pairs)
     sigmas = np.sqrt(np.maximum(solution.sigmas_frames, 0.5 * SIGMA_S * fps) ** 2 + (SOUND_PATH_S * fps) ** 2)
     if not spectra:
-        note = "There are no sound tracks."
+        note = "No sound tracks found."
     elif not pairs:
-        note = f"{len(spectra)} cameras have sound, but no two of them the same."
+        note = f"{len(spectra)} cameras have sound, but no two share any."
     else:
         note = f"{len(spectra)} cameras have sound; {len(pairs)} pairs were compared over up to {MAX_SECONDS:g} s."
     return Estimate("audio", solution.offsets_frames, sigmas, solution.groups, tuple(pairs), solution.agreements, note)

@@ -121,10 +121,10 @@ def _visual(source: SourceName, solution: Solution, n_curves: int, own_sigma: fl
     """The answer of pictures as an estimate."""
     n_known = int((solution.groups >= 0).sum())
     if n_known == 0:
-        note = "No two cameras see the same things move."
+        note = "No two cameras see the same motion."
     else:
         good = np.nanmean(solution.agreements)
-        note = f"{len(solution.pairs)} of {n_curves} pairs tell something, {100 * good:.0f} % of it agrees."
+        note = f"{len(solution.pairs)} of {n_curves} pairs are informative; {100 * good:.0f} % of them agree."
     return Estimate(
         source=source,
         offsets_frames=solution.offsets_frames,

@@ -98,7 +98,7 @@ def _check_times(times_s: np.ndarray, path: Path) -> None:
     """Raise CaptureError where times tell no rate that a camera has."""
     if len(times_s) < 2:
         raise CaptureError(
-            "The video has 1 frame, so there is nothing to compare.", hint="Take it out of the folder.", path=path
+            "The video has 1 frame, so there is nothing to compare.", hint="Remove it from the folder.", path=path
         )
     fps, (low, high) = 1.0 / float(np.median(np.diff(times_s))), FPS_RANGE
     if not low <= fps <= high:

@@ -88,13 +88,13 @@ def _estimate(source: SourceName, begins_s: list[float | None], fps: float, sigm
         note = f"{int(known.sum()) or 'No'} camera{'' if known.sum() == 1 else 's'} wrote {what}."
         known[:] = False
     elif source == "timecode" and np.ptp(begins[known]) == 0 and begins[known][0] == 0:
-        note = "All timecodes are 0, which says nothing."
+        note = "All timecodes are 0 and therefore useless."
         known[:] = False
     else:
         later_s = begins - begins[known][0]
         later_s = later_s - DAY_S * np.round(later_s / DAY_S) if source == "timecode" else later_s  # around midnight
         offsets = -later_s * fps
-        note = f"{int(known.sum())} cameras wrote {what}."
+        note = f"{int(known.sum())} cameras recorded {what}."
     offsets[~known] = np.nan
     return Estimate(
         source=source,

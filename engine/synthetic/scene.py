@@ -106,7 +106,7 @@ def make_scene(
         ValueError: A number is below 1, or there are no such surroundings.
     """
     if surroundings not in SURROUNDINGS:
-        raise ValueError(f"no surroundings called {surroundings}; there are {', '.join(SURROUNDINGS)}")
+        raise ValueError(f"no environment called {surroundings}; there are {', '.join(SURROUNDINGS)}")
     if min(*size, n_cameras, n_frames, clip_length) < 1:
         raise ValueError("size, n_cameras, n_frames and clip_length must be at least 1")
     parts = (*SURROUNDINGS[surroundings](), *make_parts(clip_length)[1:])

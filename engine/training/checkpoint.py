@@ -79,7 +79,7 @@ def read_checkpoint(
     for name, value in (*of_clip, ("camera_names", list(camera_names)), ("seed", seed)):
         if getattr(kept.header, name) != value:
             raise ProjectError(
-                f"The checkpoint has {name} {getattr(kept.header, name)}, the training {value}.",
+                f"The checkpoint has {name} {getattr(kept.header, name)}, the training has {value}.",
                 hint="Train the clip again.",
                 path=path,
             )

@@ -210,7 +210,7 @@ class ClipTraining:
         self._order = ShuffledOrder(len(self._items), seed=self.seed + index)
         self._phase_index, self._stage = index, name
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
-            self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
+            self._say("Nothing to learn", f"Nothing moves in this clip: 0 steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
 
     def _learn_positions(self) -> None:
@@ -229,7 +229,7 @@ class ClipTraining:
         if not items:
             raise PreparationError(
                 f"Every picture of clip {self.clip.clip_index} is excluded from training.",
-                hint="Take some of the exclusions back, or leave the clip untrained.",
+                hint="Remove some exclusions, or leave the clip untrained.",
             )
         return items
 

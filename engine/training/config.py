@@ -15,7 +15,7 @@ from engine.errors import ProjectError
 from engine.setting import Value, setting, settings_of
 
 MODEL, CLOUDS, COLORS, CAMERAS, LENGTH = "Model", "Point clouds", "Camera colours", "Cameras", "Length of the training"
-RATES, LOSS, GATE, STEP, SHARING = "Learning rates", "Loss", "Gate", "Training step", "What a source clip takes over"
+RATES, LOSS, GATE, STEP, SHARING = "Learning rates", "Loss", "Gate", "Training step", "What a source clip inherits"
 
 
 class StepRule(NamedTuple):
@@ -94,7 +94,10 @@ class TrainConfig(msgspec.Struct, frozen=True):
     field_max_levels: Annotated[
         int,
         _size(
-            "Levels of the field at most; they are added until a cell is about 1.5 anchor spacings.", 1, 16, "levels"
+            "Largest number of levels of the field; levels are added until a cell is about 1.5 anchor spacings.",
+            1,
+            16,
+            "levels",
         ),
     ] = 7
     field_levels: Annotated[int, _size("Levels of the field; 0 derives them.", 0, 16, "levels")] = 0
@@ -117,7 +120,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             MODEL,
-            "Where the field lies and what its network ends in.",
+            "Box of the field, and the last layer of its network.",
             {
                 "fitted": "a cube around nearly all anchors, and no activation",
                 "published": "from the first to the last anchor along each axis, and a ReLU",
@@ -128,7 +131,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             MODEL,
-            "What anchors, heads and field start with.",
+            "Initial values of anchors, heads and field.",
             {
                 "cloud": "colours of the cloud, Gaussians spread over the anchor's cell, residual anchors like the "
                 "inherited ones beside them",
@@ -141,9 +144,9 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             CLOUDS,
-            "The point clouds that anchors come from.",
+            "Source of the point clouds that anchors start from.",
             {
-                "parts": "what stands still by stereo of the backgrounds, what moves by visual hulls",
+                "parts": "static parts by stereo of the backgrounds, moving parts by visual hulls",
                 "frames": "everything by stereo of every frame of the clip, as published; needs gate=off; the voxel "
                 "grows until a reference clip has no more anchors than both limits below together",
             },
@@ -156,18 +159,18 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "Frames that a camera's background is estimated from.",
             {
                 "capture": "spread over the whole capture",
-                "clip": "those of the clip itself, so that it can be trained before the capture is complete",
+                "clip": "frames of the clip itself, so that it can be trained before the capture is complete",
             },
         ),
     ] = "capture"
     max_static_points: Annotated[
-        int, _points("Anchors of the static part at most; the voxel grows until they fit.", "Static anchors, at most")
+        int, _points("Largest number of static anchors; the voxel grows until they fit.", "Static anchors, at most")
     ] = 22_000
     max_moving_points: Annotated[
         int,
         _points(
-            "Anchors of the moving part over the whole clip at most. In a reference clip the voxel grows until they "
-            "fit; a source clip keeps that voxel and leaves some points to the anchors beside them.",
+            "Largest number of moving anchors over the whole clip. In a reference clip the voxel grows until they "
+            "fit; a source clip keeps that voxel and leaves some points to neighbouring anchors.",
             "Moving anchors, at most",
         ),
     ] = 32_000
@@ -175,7 +178,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         int,
         setting(
             CLOUDS,
-            "Frames from which each camera's background is estimated, at most.",
+            "Largest number of frames from which each camera's background is estimated.",
             low=2,
             high=1000,
             unit="frames",
@@ -186,12 +189,12 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             COLORS,
-            "What a training camera's colours are against the scene's: estimated first, trained with the reference "
+            "How a training camera's colours relate to the scene's: estimated first, trained with the reference "
             "clip, kept by later clips. Except with `off`, how its exposure changes from frame to frame is measured in "
             "every clip and removed.",
             {
                 "auto": "a gain per channel where the cameras differ",
-                "gain": "always a gain per channel",
+                "gain": "a gain per channel, always",
                 "off": "every camera shows the scene's own colours",
             },
         ),
@@ -201,9 +204,9 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             CAMERAS,
-            "Poses and focal lengths of the training cameras while a reference clip trains; later clips keep what was "
-            "learned. Cameras held out stay as they are.",
-            {"off": "as the capture has them", "on": "small corrections are learned"},
+            "Poses and focal lengths of the training cameras while a reference clip trains; later clips keep the "
+            "result. Held-out cameras do not change.",
+            {"off": "as in the capture", "on": "small corrections are learned"},
         ),
     ] = "off"
 
@@ -281,7 +284,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             LOSS,
-            "What the volume term is of.",
+            "Definition of the volume term.",
             {
                 "mean": "the mean over the Gaussians, in cubes of the anchor spacing",
                 "sum": "the sum over the Gaussians, in cubes of scene units, as published",
@@ -292,7 +295,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         float,
         setting(
             LOSS,
-            "Gradients with a larger norm, which only accidents have, are scaled down to it; 0 switches it off.",
+            "Gradients with a larger norm, which only outliers have, are scaled down to it; 0 switches this off.",
             low=0.0,
             high=1e6,
         ),
@@ -302,7 +305,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             GATE,
-            "Which anchors may change over time, and when they are there.",
+            "Which anchors may change over time, and when they exist.",
             {
                 "hull": "static anchors never change; moving ones are decoded only where a frame has its visual hull",
                 "static": "static anchors never change; moving ones are decoded in every frame",
@@ -315,7 +318,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             STEP,
-            "What a step of a source clip draws and compares; what is learned is the same.",
+            "What a step of a source clip draws and compares; the result is the same.",
             {"active": "only tiles that a learning Gaussian touches", "all": "whole pictures"},
         ),
     ] = "active"
@@ -335,7 +338,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "Heads of the reference clip in a source clip.",
             {
                 "frozen": "as they are",
-                "finetune": "they go on learning in every source clip",
+                "finetune": "they keep learning in every source clip",
                 "new": "they start afresh in every source clip",
             },
         ),
@@ -346,9 +349,9 @@ class TrainConfig(msgspec.Struct, frozen=True):
             SHARING,
             "Anchors that a source clip adds.",
             {
-                "dedup": "where the inherited ones leave space uncovered",
+                "dedup": "where inherited anchors leave space uncovered",
                 "none": "none",
-                "full": "all points of the clip's cloud that may move, beside the inherited ones that cover them",
+                "full": "all points of the clip's cloud that may move, in addition to the inherited ones",
             },
         ),
     ] = "dedup"
@@ -359,9 +362,9 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "Anchors of the reference clip in a source clip.",
             {
                 "frozen": "they keep feature and scales",
-                "moving": "static ones do, and moving ones that the clip uses go on learning",
-                "trainable": "all of them are a start to learn from",
-                "off": "none; the clip builds its own, and only the decoder is taken over",
+                "moving": "static ones do; moving ones that the clip uses keep learning",
+                "trainable": "all are starting values that keep learning",
+                "off": "none; the clip builds its own and inherits only the decoder",
             },
         ),
     ] = "frozen"
@@ -372,7 +375,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "The field that gives dynamic features.",
             {
                 "per_clip": "every clip learns its own from nothing",
-                "continue": "one goes on learning from clip to clip, and its last state shows all of them",
+                "continue": "one keeps learning from clip to clip, and its last state shows all of them",
                 "joint": "one clip, and so one field, for the whole capture",
             },
         ),
@@ -384,10 +387,10 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             SHARING,
-            "Where an independent clip begins.",
+            "Initial state of an independent clip.",
             {
-                "scratch": "with nothing learned",
-                "previous": "with all that the clip before has learned, and all of it goes on learning",
+                "scratch": "from scratch",
+                "previous": "from the previous clip's result, all of which keeps learning",
             },
         ),
     ] = "scratch"
@@ -403,16 +406,16 @@ class TrainConfig(msgspec.Struct, frozen=True):
         if self.independent and shared:
             listed = ", ".join(f"{name}={getattr(self, name)}" for name in shared)
             raise ProjectError(
-                f"independent clips take over nothing, so {listed} would change nothing.", hint=f"Leave out {listed}."
+                f"independent clips inherit nothing, so {listed} would have no effect.", hint=f"Leave out {listed}."
             )
         if self.inherit == "off" and self.residual == "none":
             raise ProjectError(
-                "inherit=off with residual=none leaves a source clip without anything that moves.",
+                "inherit=off with residual=none leaves a source clip with nothing that moves.",
                 hint="Leave out one of them.",
             )
         if self.cloud == "frames" and self.gate != "off":
             raise ProjectError(
-                f"cloud=frames does not tell what moves from what stands still, so it cannot go with gate={self.gate}.",
+                f"cloud=frames does not separate moving from static, so it cannot be combined with gate={self.gate}.",
                 hint="Add gate=off, or leave out cloud=frames.",
             )
         if self.start == "previous" and not self.independent:
@@ -465,7 +468,7 @@ def config_of(values: Mapping[str, Any]) -> TrainConfig:
     """
     unknown = sorted(values.keys() - SETTINGS.keys())
     if unknown:
-        raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Take it out.")
+        raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Remove it.")
     return TrainConfig(**values)
 
 

@@ -120,7 +120,7 @@ def test_a_clip_that_cannot_be_put_in_its_place_is_a_checkpoint_until_it_can(ben
     (told,) = it.of(m.WarningRaised)
     assert "trained, but could not be written" in told.title
     assert os.strerror(number) in told.detail
-    assert "kept as a checkpoint" in told.detail
+    assert "saved as a checkpoint" in told.detail
     disk.is_full = False
     assert it.steps(20) is False
     assert isinstance(it.events[-1], m.ClipTrained)
@@ -198,8 +198,8 @@ def test_without_a_window_it_gives_up_after_some_tries_and_the_same_command_fini
     assert isinstance(failed, m.TrainingFailed)
     assert failed.kind == "DiskError"
     assert "No space left on device" in failed.message
-    assert "Step 5 is kept; training again with the same command goes on from there." in failed.message
-    assert "fault of the program" not in failed.message + failed.hint
+    assert "Step 5 is kept; training again with the same command resumes from there." in failed.message
+    assert "bug in the program" not in failed.message + failed.hint
     disk.is_full = False
     it.start()
     assert it.steps(20) is False
@@ -284,7 +284,7 @@ def test_the_command_ends_with_1_deletes_nothing_and_goes_on_with_room(run, capt
     code, _, err = run(*arguments)
     assert code == 1
     assert "No space left on device" in err
-    assert "fault of the program" not in err
+    assert "bug in the program" not in err
     assert (tmp_path / "p" / "checkpoints" / "0000.safetensors").is_file()
     disk.is_full = False
     code, out, err = run(*arguments, "--json")

@@ -194,7 +194,7 @@ def test_a_fault_of_the_program_is_reported_with_its_trace(bench):
     assert isinstance(failed, m.TrainingFailed)
     assert failed.kind == "ZeroDivisionError"
     assert "Traceback" in failed.trace
-    assert "fault of the program" in failed.hint
+    assert "bug in the program" in failed.hint
 
 
 @pytest.mark.parametrize("n_clipped", [0, 2])
@@ -223,7 +223,7 @@ def test_a_loss_that_is_no_number_keeps_the_steps_before_and_says_so(bench):
     assert it.steps(10) is False
     failed = it.events[-1]
     assert failed.message == (
-        "The loss became nan at step 5. Step 4 is kept; training again with the same command goes on from there."
+        "The loss became nan at step 5. Step 4 is kept; training again with the same command resumes from there."
     )
     assert failed.hint == "Lower the rates."
     assert read_clip_state(it.checkpoint).header.step == 4
@@ -242,7 +242,7 @@ def test_what_could_not_be_kept_is_not_said_to_be(bench, monkeypatch, has_older)
         it.commands += [m.Resume()]
     monkeypatch.setattr("tests.app.fakes.write_clip_state", full)
     assert it.steps(10) is False
-    end = "with the same command goes on from step 2." if has_older else "starts from the beginning."
+    end = "with the same command resumes from step 2." if has_older else "starts from the beginning."
     assert it.events[-1].message.endswith(f"Step 4 could not be kept; training again {end}")
     assert it.of(m.WarningRaised)[-1].hint == "Free some space."
 
@@ -359,7 +359,7 @@ def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_w
     assert it.steps(10, each_s=0.0) is False
     figures = read_clip_state(it.project.clip_path(0)).header.figures
     assert figures.stages_s == pytest.approx(
-        {"Starting": 2.0, "Carving": 30.0, "Sizing": 4.0, "Measuring and keeping": 0.0, "Training": 2.0}
+        {"Starting": 2.0, "Carving": 30.0, "Sizing": 4.0, "Measuring and saving": 0.0, "Training": 2.0}
     )
     assert figures.preparation_s == pytest.approx(36.0)
     norms = range(1, read_clip_state(it.project.clip_path(0)).header.n_steps + 1)  # of the fake: its step
@@ -401,4 +401,4 @@ def test_the_times_of_a_training_that_was_stopped_add_up(bench):
     figures = read_clip_state(it.project.clip_path(0)).header.figures
     assert it.now_s == 10_010.0
     assert figures.seconds == pytest.approx(4.0 + 4.0)
-    assert figures.stages_s.keys() >= {"Starting", "Training", "Measuring and keeping"}
+    assert figures.stages_s.keys() >= {"Starting", "Training", "Measuring and saving"}

@@ -84,7 +84,7 @@ def test_a_plan_of_a_trained_project_with_other_settings_is_refused(run, capture
     assert run(*arguments)[0] == 0
     code, _, err = run(*arguments, "--plan", "--set", "passes=3")
     assert code == 2
-    assert "cannot change any more: 1 trained clip" in err
+    assert "can no longer change: 1 trained clip" in err
     assert "--start-over" in err
     code, out, _ = run(*arguments, "--plan", "--set", "passes=3", "--start-over")
     assert code == 0
@@ -92,7 +92,7 @@ def test_a_plan_of_a_trained_project_with_other_settings_is_refused(run, capture
     assert "Clip 0, frames 0 to 5, reference" in out
     assert len(list((tmp_path / "p" / "clips").iterdir())) == 1  # nothing has happened yet
     code, out, _ = run(*arguments, "--plan")
-    assert (code, out) == (0, "Trained already: clip 0\n")
+    assert (code, out) == (0, "Already trained: clip 0\n")
 
 
 def test_training_says_its_plan_and_how_right_it_was(run, capture_folder, tmp_path):
@@ -113,7 +113,7 @@ def test_a_later_clip_in_which_nothing_moves_takes_no_steps(run, capture_folder,
     looks.clear()
     code, out, err = run(*arguments, "--plan")
     assert code == 0, err
-    assert re.search(r"source steps +0  nothing moves in the pictures looked at", out)
+    assert re.search(r"source steps +0  nothing moves in the sampled pictures", out)
     ((_, clip, camera_indices, _, prep_dir),) = looks
     assert (clip.clip_index, camera_indices, prep_dir) == (1, [1, 2, 3], tmp_path / "p" / "prep")
     assert run("gate", tmp_path / "p", "--dynamic-sphere", 0, 0, 0, 1)[0] == 0

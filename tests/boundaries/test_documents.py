@@ -54,7 +54,7 @@ def test_a_block_that_is_out_of_date_is_seen_and_the_text_around_it_stays() -> N
 
 
 def test_blocks_hold_what_they_are_for() -> None:
-    assert "| `Ctrl+T` | Stop training and keep what was learned |" in key_tables()
+    assert "| `Ctrl+T` | Stop training; progress is kept |" in key_tables()
     sections = command_sections()
     assert "### `clipgstream eval PROJECT --json OUT [options]`" in sections
     assert "| `--size WxH` | window size in pixels, for example 1440x900 |" in sections

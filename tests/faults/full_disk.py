@@ -109,7 +109,7 @@ def _run(project: Path, scratch: Path, settings: tuple[str, ...], clips: str, ta
         tally.faults.append(f"{where}: not finished after {LONGEST_RUN_S:.0f} s")
         return "hang"
     code, said = command.process.returncode, command.said()
-    for word in ("Traceback", "fault of the program", "Logging error"):
+    for word in ("Traceback", "bug in the program", "Logging error"):
         if word in said:
             tally.faults.append(f"{where}: {word}: {said[-1500:]}")
     if code == 0:

@@ -2,7 +2,7 @@
 
 Each case damages one thing in a small capture of either layout: bytes or values of a file, what lies under a name, a
 name or a number in the calibration. `inspect` then runs as a user would run it, and the first and last frame of each
-camera are decoded. Counted as faults: an exception that is not an EngineError, a traceback or a fault of the program
+camera are decoded. Counted as faults: an exception that is not an EngineError, a traceback or a bug in the program
 on standard error, a hang, a file opened outside of the capture, and JSON with NaN.
 
     python -m tests.faults.fuzz_capture --cases 1000 --seed 1
@@ -256,7 +256,7 @@ def _look(folder: Path) -> tuple[str, str]:
     from engine.capture.capture import open_capture
 
     code, out, err = _inspect(folder)
-    if code not in (0, 2) or "Traceback" in err or "fault of the program" in err or "Warning" in err:
+    if code not in (0, 2) or "Traceback" in err or "bug in the program" in err or "Warning" in err:
         return "untyped", f"exit {code}: {err[-300:]}"
     if code == 2:
         is_one_message = err.startswith("clipgstream: ") and err.count("clipgstream: ") == 1

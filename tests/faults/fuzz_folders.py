@@ -100,13 +100,13 @@ def put(path: Path, kind: str, foreign: Path) -> None:
 
 
 def command(*arguments: str) -> None:
-    """A command of the command line. Raises RuntimeError where it ends with a fault of the program."""
+    """A command of the command line. Raises RuntimeError where it ends with a bug in the program."""
     from app.cli.cli import main
 
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(arguments)
-    if code not in (0, 1, 2) or "fault of the program" in err.getvalue() or "Traceback" in err.getvalue():
+    if code not in (0, 1, 2) or "bug in the program" in err.getvalue() or "Traceback" in err.getvalue():
         raise RuntimeError(f"{arguments[0]} ended with {code}: {err.getvalue()[-300:]}")
 
 
@@ -159,7 +159,7 @@ def trained(project: Any) -> None:
 
 
 def measured(folder: Path) -> None:
-    """Figures are kept by programs that have the project open for reading only."""
+    """Figures are kept by programs that have the project open read-only."""
     from app.evaluation.kept_figures import KeptFigures
     from tests.faults.fuzz_project import _figure_rows
 

@@ -3,7 +3,7 @@
 Each case damages one file of a small project: its bytes, a value of its JSON, or what lies under its name. Files are
 those of this version, with checksums, and of the version before, without. The file is then read as its owner reads
 it, and the whole project as `inspect`, `gate` and the timeline do. Counted as faults: an exception that is not an
-EngineError, "a fault of the program", a hang, a Python file opened outside of the project, and values that differ from
+EngineError, "a bug in the program", a hang, a Python file opened outside of the project, and values that differ from
 what was written although the file has a checksum. A file without one can only be refused where it makes no sense.
 
     python -m tests.faults.fuzz_project --cases 1000 --seed 1
@@ -227,7 +227,7 @@ def read_project(project: Path) -> None:
     """The whole project as its listings read it.
 
     Raises:
-        RuntimeError: A command ended with what it calls a fault of the program.
+        RuntimeError: A command ended with what it calls a bug in the program.
     """
     from app.cli.cli import main
     from app.project.clip_catalog import ClipCatalog
@@ -238,7 +238,7 @@ def read_project(project: Path) -> None:
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = main([command, str(project)])
-        if code not in (0, 2) or "fault of the program" in err.getvalue() or "Traceback" in err.getvalue():
+        if code not in (0, 2) or "bug in the program" in err.getvalue() or "Traceback" in err.getvalue():
             raise RuntimeError(f"{command} ended with {code}: {err.getvalue()[-300:]}")
     with contextlib.suppress(EngineError):
         ClipCatalog(open_project(project, is_writable=False), 2)

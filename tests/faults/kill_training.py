@@ -175,7 +175,7 @@ class KillTest:
         )
         if code not in codes and not is_early and not is_late:
             self.tally.faults.append(f"{kind}: exit code {code}: {said[-500:]}")
-        for word in ("Traceback", "fault of the program", "Logging error"):
+        for word in ("Traceback", "bug in the program", "Logging error"):
             if word in said:
                 self.tally.faults.append(f"{kind}: {word}: {said[-1500:]}")
 

@@ -342,7 +342,7 @@ class FakeSession:
         assert camera_index is not None
         clip_index = 0 if self.timeline.clip is None else self.timeline.clip.clip_index
         if kind in ("R", "G", "E", "clips") and frame_index == 0:
-            return HeatMap(None, kind, None, 0, 0, camera_index, note="Frame 0 has no frame before it.")
+            return HeatMap(None, kind, None, 0, 0, camera_index, note="Frame 0 has no previous frame.")
         width, height = (int(side) for side in self.rig.image_sizes[camera_index])
         low, high = HEAT_KINDS[kind].value_range
         values = np.tile(np.linspace(low, high, width, dtype=np.float32), (height, 1))
@@ -359,7 +359,7 @@ class FakeSession:
         self.views.look_at(capture.rig)
         self.paths, self.history = PathsStatus(can_edit=True), HistoryStatus()
         self.edits = EditsStatus(can_edit=True)
-        self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
+        self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips trained from now on.")
 
     def dispatch(self, command: commands.Command) -> None:
         """Record the command; carry out what needs no worker."""

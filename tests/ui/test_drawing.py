@@ -108,7 +108,7 @@ def test_menus_work_with_the_keyboard_alone(pilot: Pilot, symbol: int) -> None:
     frame_index = pilot.session.timeline.frame_index
     pilot.key(symbol)
     pilot.rest()
-    assert "menu.Quit; what was learned is kept" in pilot.rects
+    assert "menu.Quit; training progress is kept" in pilot.rects
     pilot.key(key.RIGHT)
     pilot.rest()
     assert "menu.Hide what is selected" in pilot.rects, "Right goes on to the next menu"

@@ -302,4 +302,4 @@ def test_three_points_of_the_ground_and_a_known_length_by_clicks(window: Pilot) 
         window.release()
     found = session.edits.world.meters_per_unit
     assert found is not None
-    assert session.history.undo == "set the scale by a length"
+    assert session.history.undo == "set the scale from a length"

@@ -299,7 +299,7 @@ def test_a_calibration_that_has_failed_is_kept_only_when_chosen(open_pilot: Call
     lines = (
         "10 of 10 cameras were found.",
         "Matches contradict 10 of 10 cameras.",
-        "  a  b  154 matches,  18% explained",
+        "  a  b  154 matches,  18 % explained",
     )
     result = CalibrationResult(folder, False, 10, (), True, "Matches contradict 10 of 10 cameras.", lines)
     show(pilot, CalibrationPage(folder, "done", VIDEOS, result=result))

@@ -128,7 +128,7 @@ def test_a_cloud_stands_in_for_a_clip_that_loads_and_says_what_is_missing(window
     window.draw(3)
     assert scene.shows == CLOUD
     assert hud(window).pending == "loading clip 0"
-    assert hud(window).note == "point cloud of what stands still, not the trained result"
+    assert hud(window).note == "point cloud of static parts, not the trained result"
     reader.may_go_on.set()
     draw_until(window, lambda: scene.shows == RENDERED, "the trained picture")
     assert hud(window).note == ""

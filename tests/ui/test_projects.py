@@ -106,12 +106,12 @@ def test_the_question_is_answered_by_its_buttons(pilot: Pilot) -> None:
 
 def test_what_is_asked_says_what_depends_on_the_clip_and_what_it_costs() -> None:
     text = "\n".join([*retrain_texts(RETRAIN), outdated_text(RETRAIN)])
-    for part in ("~29.70 dB", "stays as it is", "goes on at step 810", "about 1:44", "2 clips", "1, 2", "about 3:10"):
+    for part in ("~29.70 dB", "stays in use", "resumes at step 810", "about 1:44", "2 clips", "1, 2", "about 3:10"):
         assert part in text
     damaged = RetrainQuestion(3, True, "Its header cannot be read.", None, (), None, True, None, None)
     text = "\n".join(retrain_texts(damaged))
     assert "Its header cannot be read." in text
-    assert "puts the damaged file aside" in text
+    assert "moves the damaged file" in text
 
 
 def test_one_of_several_projects_is_chosen(pilot: Pilot) -> None:

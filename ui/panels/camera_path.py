@@ -46,7 +46,7 @@ def draw_paths(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Making paths, the list, the keys of the chosen one, the way back."""
     status = session.paths
     if session.capture is None:
-        text_wrapped_dim("Paths of a camera through the scene are listed here when a capture is open.")
+        text_wrapped_dim("Camera paths appear here once a capture is open.")
         return
     imgui.begin_disabled(not status.can_edit)
     _draw_making(status, dispatch, ui)
@@ -55,7 +55,7 @@ def draw_paths(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         text_warning(status.why_not)
     if status.path is None:
         text_wrapped_dim(
-            "A camera path films the scene: each key is a view at a frame, and the camera goes smoothly between them."
+            "A camera path films the scene: each key is a view at a frame, and the camera moves smoothly between keys."
         )
     else:
         _draw_list(status, dispatch, ui)
@@ -71,7 +71,7 @@ def _draw_making(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     if primary_button(f"{Icon.ADD}  Key from this view", ImVec2(width, 34), ui):
         dispatch(SetCameraKey())
     ui.mark("paths.key")
-    words = "at the playhead; one that is there takes this view (C)"
+    words = "At the playhead; an existing key takes this view (C)"
     imgui.set_item_tooltip(
         f"A key of the path {words}" if status.path is not None else "Begins a path with a key at the playhead (C)"
     )
@@ -81,9 +81,9 @@ def _draw_making(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
             "turntable",
             "Turntable",
             MakeTurntable(),
-            "Once round what this view looks at, while the played frames go by",
+            "Once around the centre of this view over the played frames",
         ),
-        ("fly_through", "Fly-through", MakeFlyThrough(), "From camera to camera, while the played frames go by"),
+        ("fly_through", "Fly-through", MakeFlyThrough(), "From camera to camera over the played frames"),
     )
     for name, label, command, note in made:
         if _flowing_button(label):
@@ -151,17 +151,17 @@ def _draw_path(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: Ui
     imgui.end_disabled()
     imgui.set_item_tooltip("Delete this path; Undo brings it back")
     room = width - imgui.get_style().item_spacing.x
-    if segment("Look along", status.is_along, 0.56 * room):
+    if segment("Follow", status.is_along, 0.56 * room):
         dispatch(LookAlongPath(not status.is_along))
     ui.mark("paths.along")
-    imgui.set_item_tooltip("The view goes along the path with the playhead, until you move it (P)")
+    imgui.set_item_tooltip("The view follows the path until you move it (P)")
     imgui.same_line()
     imgui.begin_disabled(not status.can_edit)
     if segment(f"{Icon.LOOP}  Loop", path.is_closed, 0.44 * room):
         dispatch(CloseCameraPath(not path.is_closed))
     ui.mark("paths.loop")
     imgui.end_disabled()
-    imgui.set_item_tooltip("From the last key the camera goes on to the first, round and round")
+    imgui.set_item_tooltip("The camera continues from the last key to the first")
 
 
 def _draw_keys(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: UiState) -> None:
@@ -189,7 +189,7 @@ def _draw_key_row(status: PathsStatus, path: CameraPath, index: int, dispatch: D
     if imgui.selectable("##key", index == status.chosen_key, flags)[0]:
         choose_key(dispatch, ui, index, is_going=imgui.is_mouse_double_clicked(imgui.MouseButton_.left))
     ui.mark(f"paths.key{index}")
-    imgui.set_item_tooltip("A double click goes there (Alt+Left, Alt+Right)")
+    imgui.set_item_tooltip("Double-click to go there (Alt+Left, Alt+Right)")
     imgui.same_line(0, 0)
     imgui.text_disabled(f"{index + 1}")
     imgui.same_line(36)
@@ -214,7 +214,7 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     ui.mark("paths.frame")
     if is_edited and frame != key.frame:
         dispatch(TimeCameraKey(index, frame, is_whole=False))
-    imgui.set_item_tooltip("Enter takes what is typed (Alt+Shift+Left, Alt+Shift+Right)")
+    imgui.set_item_tooltip("Press Enter to apply (Alt+Shift+Left, Alt+Shift+Right)")
     imgui.align_text_to_frame_padding()
     imgui.text("Lens")
     imgui.same_line(LABEL_WIDTH)
@@ -230,7 +230,7 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     if _flowing_button("Take view", is_first=True):
         dispatch(AimCameraKey(index))
     ui.mark("paths.aim")
-    imgui.set_item_tooltip("The key takes place, direction and lens of this view, at its own frame (Shift+C)")
+    imgui.set_item_tooltip("Sets the key's position, direction and lens from this view (Shift+C)")
     if _flowing_button("Delete"):
         dispatch(DeleteCameraKey(index))
     ui.mark("paths.remove")
@@ -239,7 +239,7 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     if _flowing_button("Go"):
         choose_key(dispatch, ui, index, is_going=True)
     ui.mark("paths.go")
-    imgui.set_item_tooltip("Look from there, at its frame")
+    imgui.set_item_tooltip("Look from this key, at its frame")
 
 
 def _follow_gesture(ui: UiState) -> None:

@@ -54,7 +54,7 @@ class CapturePanel:
         """Summary, then one row per camera."""
         capture = session.capture
         if capture is None:
-            text_wrapped_dim("The cameras of a capture are listed here.")
+            text_wrapped_dim("Cameras appear here once a capture is open.")
             return
         if capture.path != self._capture_path:
             self.release()

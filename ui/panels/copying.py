@@ -46,7 +46,7 @@ def draw_copy_entries(ui: UiState, name: str, make: Callable[[], CommandText], *
     if imgui.menu_item(f"{Icon.COPY}  {COMMAND}", "", False, is_enabled)[0]:
         copy_command(make)
     ui.mark(f"{name}.copy command")
-    imgui.set_item_tooltip("A line for a terminal that does the same to this project")
+    imgui.set_item_tooltip("A command line that does the same to this project")
     if imgui.menu_item(f"{Icon.COPY}  {PYTHON}", "", False, is_enabled)[0]:
         copy_python(make)
     ui.mark(f"{name}.copy python")

@@ -70,7 +70,7 @@ def progress_text(status: ExportStatus) -> str:
 def ending_text(status: ExportStatus) -> str:
     """What came of an export that has ended."""
     if status.state == "cancelled":
-        return "Cancelled; nothing was left behind."
+        return "Cancelled; no files were left."
     if status.state == "failed" or status.result is None:
         return " ".join(filter(None, (status.message, status.hint)))
     result = status.result
@@ -111,7 +111,7 @@ def draw_exports(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if imgui.button("Clear the list##exports"):
             dispatch(ClearExports())
         ui.mark("exports.clear")
-        imgui.set_item_tooltip("Takes out what has ended; files stay")
+        imgui.set_item_tooltip("Removes ended exports from the list; files stay")
     if not statuses:
         text_wrapped_dim(EMPTY)
         return
@@ -177,7 +177,7 @@ def _draw_buttons(status: ExportStatus, waiting: list[int], ui: UiState) -> Comm
         imgui.same_line()
         if _button("Remove", "remove", export_id, ui):
             command = RemoveExport(export_id)
-        imgui.set_item_tooltip("Takes it out of the list; files stay")
+        imgui.set_item_tooltip("Removes it from the list; its files stay")
     if status.state == "waiting":
         place = waiting.index(export_id)
         for icon, name, step, is_possible in (

@@ -17,7 +17,7 @@ from ui.panels.widgets import text_warning
 
 logger = logging.getLogger(__name__)
 
-GOES_ON = "The rest of the window goes on. This is a fault of the program: copy this and report it."
+GOES_ON = "The rest of the window still works. This is a bug in the program: copy this text and report it."
 
 
 class Guard:
@@ -53,7 +53,7 @@ class Guard:
             while len(draw._clip_rect_stack) > n_clips:
                 draw.pop_clip_rect()
             imgui.get_style().alpha = alpha  # Dear ImGui leaves 0 after begin_disabled(False), and nothing is seen
-            self._tell(part, error, f"A fault in {part}")
+            self._tell(part, error, f"Error in {part}")
             return False
         self._failing.discard(part)
         return True
@@ -85,7 +85,7 @@ class Guard:
 
 def draw_failed(part: str) -> None:
     """In place of a part that could not be drawn: that it is so."""
-    text_warning(f"{part[0].upper()}{part[1:]} cannot be drawn at present. The log says why.")
+    text_warning(f"{part[0].upper()}{part[1:]} cannot be drawn. See the log for the reason.")
 
 
 def _recover(stack: imgui.internal.ErrorRecoveryState) -> None:

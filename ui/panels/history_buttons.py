@@ -17,11 +17,11 @@ def draw_history(history: HistoryStatus, dispatch: Dispatch, ui: UiState, panel:
         dispatch(Undo())
     ui.mark(f"{panel}.undo")
     imgui.end_disabled()
-    imgui.set_item_tooltip(f"Takes back: {history.undo or 'nothing'} (Ctrl+Z)")
+    imgui.set_item_tooltip(f"Undo: {history.undo or 'nothing'} (Ctrl+Z)")
     imgui.same_line()
     imgui.begin_disabled(not history.redo)
     if imgui.button(f"{Icon.LOOP}  Redo"):
         dispatch(Redo())
     ui.mark(f"{panel}.redo")
     imgui.end_disabled()
-    imgui.set_item_tooltip(f"Does again: {history.redo or 'nothing'} (Ctrl+Shift+Z or Ctrl+Y)")
+    imgui.set_item_tooltip(f"Redo: {history.redo or 'nothing'} (Ctrl+Shift+Z or Ctrl+Y)")

@@ -95,19 +95,17 @@ class LogPanel:
         if imgui.button(f"{Icon.COPY}##copy"):
             imgui.set_clipboard_text("\n".join(line_text(line) for line in shown))
         ui.mark("log.copy")
-        imgui.set_item_tooltip("Copy the lines that are shown")
+        imgui.set_item_tooltip("Copy the shown lines")
         imgui.same_line()
         _, self.is_following = imgui.checkbox("Follow", self.is_following)
         ui.mark("log.follow")
-        imgui.set_item_tooltip("Stay at the newest line; scrolling up holds it")
+        imgui.set_item_tooltip("Stay at the newest line; scroll up to pause")
         imgui.same_line()
         imgui.text_disabled("1 line" if len(shown) == 1 else f"{len(shown):,} lines")
 
     def _draw_lines(self, shown: Sequence[LogLine]) -> None:
         if not shown:
-            imgui.text_disabled(
-                "Nothing was said that fits." if self.filter != LogFilter() else "Nothing was said yet."
-            )
+            imgui.text_disabled("No lines match." if self.filter != LogFilter() else "The log is empty.")
             return
         clipper = imgui.ListClipper()
         clipper.begin(len(shown))

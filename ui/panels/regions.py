@@ -19,7 +19,7 @@ from ui.style.palette import Palette
 from ui.style.theme import Icon
 from ui.viewport.region_tool import REGION_WORDS
 
-MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everything in here may move or change."}
+MEANINGS = {"static": "Nothing inside moves or changes.", "dynamic": "Everything inside may move or change."}
 ROW_HEIGHT = 44.0
 
 
@@ -37,7 +37,7 @@ def draw_regions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Choosing, the list, the way back, and in which clips all of it takes effect."""
     status = session.regions
     if session.capture is None:
-        text_wrapped_dim("What you mark as static or as moving is listed here when a capture is open.")
+        text_wrapped_dim("Marked regions appear here once a capture is open.")
         return
     if ui.regions.is_active:
         _draw_choice(ui)
@@ -57,7 +57,7 @@ def draw_regions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if status.effect:
         text_wrapped_dim(status.effect)
         if "again" in status.effect:
-            text_wrapped_dim("To train a clip again, right-click it in the timeline.")
+            text_wrapped_dim("To retrain a clip, right-click it in the timeline.")
 
 
 def _draw_choice(ui: UiState) -> None:
@@ -89,9 +89,9 @@ def _draw_choice(ui: UiState) -> None:
     ui.mark("regions.radius")
     if is_moved:
         tool.set_radius(radius)
-    imgui.set_item_tooltip("The wheel over the picture does the same, and so do - and +.")
+    imgui.set_item_tooltip("The mouse wheel over the picture, - and + change it, too.")
     imgui.begin_disabled(tool.sphere is None)
-    if primary_button(f"{Icon.CHECK}  Mark it", ImVec2(half, 32), ui):
+    if primary_button(f"{Icon.CHECK}  Mark", ImVec2(half, 32), ui):
         tool.is_accepted = True
         ui.redraw_within(0.0)
     ui.mark("regions.accept")
@@ -102,13 +102,13 @@ def _draw_choice(ui: UiState) -> None:
         tool.leave()
     ui.mark("regions.cancel")
     imgui.set_item_tooltip("Escape")
-    text_wrapped_dim("Point at the scene; a click fixes the place. Ctrl + arrows, Page Up and Page Down move it.")
+    text_wrapped_dim("Click in the picture to place it. Ctrl + arrows, Page Up and Page Down move it.")
 
 
 def _draw_list(status: RegionsStatus, dispatch: Dispatch, ui: UiState) -> None:
     """One row per region, the newest last: it overrules the others."""
     if not status.regions:
-        text_wrapped_dim("Nothing is marked: what is static and what moves is decided from the pictures alone.")
+        text_wrapped_dim("No marks: what is static and what moves is found from the pictures alone.")
         return
     imgui.text(f"{len(status.regions)} marked")
     if len(status.regions) > 1:
@@ -172,7 +172,7 @@ def draw_chosen_sphere(ui: UiState, draw: imgui.ImDrawList, area: Rect, counts: 
     text = f"      Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(counts)}"
     chip(draw, area.x0, area.y0, text)
     draw_region_mark(draw, ImVec2(area.x0 + 16, area.y0 + 12), tool.treat, theme.ON_PICTURE)
-    place = "Click elsewhere moves it" if tool.is_placed else "Click fixes it"
+    place = "Click elsewhere to move it" if tool.is_placed else "Click to place it"
     other = REGION_WORDS["dynamic" if tool.treat == "static" else "static"]
     keys = f"{place}   Wheel size   M {other} instead   Enter marks it   Esc leaves"
     if imgui.calc_text_size(keys).x + 30 < area.width:  # the panel says it too

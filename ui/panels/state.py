@@ -33,7 +33,7 @@ RESIDUALS, LOG, DOCTOR = "Residuals", "Log", "Capture doctor"
 PATHS, EXPORTS = "Camera path", "Exports"
 PANELS = (CAPTURE, TRAINING, REGIONS, SELECTION, EDITS, RESIDUALS, PATHS, HISTORY, TIMELINE, LOG, DOCTOR, EXPORTS)
 """Titles of the panels around the picture."""
-LAYOUT_WORDS = {"Standard": "as in the beginning", "Long capture": "with a tall timeline, for long captures"}
+LAYOUT_WORDS = {"Standard": "the default", "Long capture": "with a tall timeline, for long captures"}
 LAYOUTS = tuple(LAYOUT_WORDS)
 """Layouts of the panels that the program brings; the first is the one to begin with."""
 Dispatch = Callable[[Command], None]

@@ -109,7 +109,7 @@ def picture_of_window(capture_path: Path, project_dir: Path, path: Path, line: P
         except Exception as error:  # a missing library or driver shows as one of many kinds
             logger.info("no OpenGL without a display", exc_info=True)
             line.say(f"No picture of the window: OpenGL without a display is not available ({error}).")
-            line.say("`make setup` installs the system libraries that it needs, or prints the line that does.")
+            line.say("`make setup` installs the system libraries that it needs, or prints the command that does.")
             return None
         try:
             return _draw_window(studio, session, capture_path, path, line)

@@ -220,14 +220,14 @@ class Frame:
 
     def _drain(self) -> bool:
         """Let the session take in what was finished; a fault there becomes a notice and never ends the loop."""
-        with self.guard.telling("the session", "Something that was finished could not be taken in"):
+        with self.guard.telling("the session", "A finished result could not be used"):
             return self.session.poll()
         return True
 
     def _move_on(self, dt_s: float) -> bool:
         """Follow what was chosen, move time on, and ask for pictures; a fault there is told as well."""
         session = self.session
-        with self.guard.telling("the loop", "Something between two frames went wrong"):
+        with self.guard.telling("the loop", "An error occurred between two frames"):
             if self._theme.follow(self.ui.preferences.theme):
                 self.forget_shown()
             self._follow_preferences()

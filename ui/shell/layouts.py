@@ -15,7 +15,7 @@ from ui.style.theme import Icon
 
 logger = logging.getLogger(__name__)
 
-TITLE = "Keep the layout###layout name"
+TITLE = "Save the layout###layout name"
 MAX_NAME = 60
 
 
@@ -77,13 +77,15 @@ class Layouts:
         name = self._name.strip()
         why_not = "" if name in kept or len(kept) < MAX_LAYOUTS else "There are too many layouts; remove one first."
         if name in LAYOUTS:
-            why_not = "A layout of the program has this name."
+            why_not = "This name belongs to a built-in layout."
         if why_not:
             imgui.text_colored(imgui.ImVec4(*theme.ORANGE), f"{Icon.WARNING}  {why_not}")
         else:
-            text_wrapped_dim("It replaces the layout of this name." if name in kept else "It is kept for all projects.")
+            text_wrapped_dim(
+                "It replaces the layout of this name." if name in kept else "It is saved for all projects."
+            )
         imgui.begin_disabled(not name or bool(why_not))
-        is_agreed |= imgui.button("Keep", ImVec2(120, 0))
+        is_agreed |= imgui.button("Save", ImVec2(120, 0))
         ui.mark("layout.save")
         imgui.end_disabled()
         imgui.same_line()

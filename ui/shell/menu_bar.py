@@ -129,7 +129,7 @@ def _draw_scale_menu(ui: UiState) -> None:
             choose_scale(ui, choice)
     drawn = imgui.get_io().display_framebuffer_scale.x
     if drawn < scale.wanted - 1e-3:
-        imgui.text_disabled(f"Drawn at {scale_text(drawn)}: the window has no room for more")
+        imgui.text_disabled(f"Drawn at {scale_text(drawn)}: the window is too small for more")
     imgui.end_menu()
 
 
@@ -172,7 +172,7 @@ def _draw_recent_menu(session: SessionView, dispatch: Dispatch, ui: UiState) -> 
         gone = [entry.folder for entry in session.recent.entries if entry.folder in session.recent.missing]
         if gone:
             imgui.separator()
-            if _item(ui, "Remove those that were not found"):
+            if _item(ui, "Remove missing"):
                 for folder in gone:
                     dispatch(ForgetRecent(folder))
         imgui.end_menu()

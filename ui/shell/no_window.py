@@ -14,13 +14,13 @@ EXIT_NO_WINDOW = 1
 _OF_DISPLAY = {"NoSuchDisplayException"}
 _OF_OPENGL = {"ContextException", "NoSuchConfigException", "GLException", "MissingFunctionException"}
 HINT = (
-    "`clipgstream doctor` tells what this machine has. Training, eval and render work without a window: "
+    "`clipgstream doctor` reports what this machine has. Training, eval and render work without a window: "
     "see `clipgstream --help`."
 )
 
 
 def reason(error: BaseException) -> str:
-    """Why there is no window, as a sentence; empty for an error that is a fault of the program.
+    """Why there is no window, as a sentence; empty for an error that is a bug in the program.
 
     Args:
         error: What making the window has raised.
@@ -29,7 +29,7 @@ def reason(error: BaseException) -> str:
     modules = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}
     if names & _OF_DISPLAY:
         display = os.environ.get("DISPLAY", "")
-        return f"The display {display} does not answer." if display else "There is no display to open a window on."
+        return f"The display {display} does not answer." if display else "No display found."
     if names & _OF_OPENGL or modules & {"moderngl", "_moderngl"}:
         return f"The graphics driver offers no OpenGL 3.3, which the window needs ({error})."
     if isinstance(error, ImportError):

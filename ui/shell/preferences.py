@@ -153,25 +153,25 @@ def draw_general(ui: UiState) -> None:
     text_wrapped_dim(projects_words(preferences.projects_dir))
     imgui.spacing()
     label("Compute with")
-    choices = {AUTO: "the best that works here"} | {name: entry.words for name, entry in BACKENDS.items()}
-    if imgui.begin_combo("##backend", preferences.backend):
+    choices = {AUTO: "the best available"} | {name: entry.words for name, entry in BACKENDS.items()}
+    if imgui.begin_combo("##backend", choices.get(preferences.backend, preferences.backend)):
         for name, words in choices.items():
-            if imgui.selectable(f"{name}: {words}", preferences.backend == name)[0]:
+            if imgui.selectable(f"{words}##{name}", preferences.backend == name)[0]:
                 preferences.backend = name
             ui.mark(f"preferences.backend.{name}")
         imgui.end_combo()
     ui.mark("preferences.backend")
     imgui.set_cursor_pos_x(LABEL_WIDTH)
-    text_wrapped_dim("From the next start on.")
+    text_wrapped_dim("Takes effect at the next start.")
 
 
 def projects_words(chosen: str) -> str:
     """Where projects go that are made from now on."""
     named = os.environ.get(VARIABLE, "").strip()
-    above = f" {VARIABLE} names it." if named else ""
+    above = f" Set by {VARIABLE}." if named else ""
     folder = str(projects_dir(chosen))
     where = "here" if folder == (chosen or str(projects_dir())) else f"to {folder}"
-    return f"New projects go {where}.{above} Projects that exist stay where they are."
+    return f"New projects go {where}.{above} Existing projects stay where they are."
 
 
 def draw_navigation(ui: UiState) -> None:
@@ -202,7 +202,7 @@ def draw_memory(ui: UiState) -> None:
     """How much memory decoded frames may take."""
     preferences = ui.preferences
     label("Decoded frames")
-    is_usual = imgui.checkbox("As much as is usual", preferences.cache_mb is None)[1]
+    is_usual = imgui.checkbox("Default", preferences.cache_mb is None)[1]
     ui.mark("preferences.cache_usual")
     if is_usual:
         preferences.cache_mb = None
@@ -214,4 +214,4 @@ def draw_memory(ui: UiState) -> None:
         ui.mark("preferences.cache")
         preferences.cache_mb = min(max(typed if is_changed else shown, CACHE_MB[0]), CACHE_MB[1])
     imgui.set_cursor_pos_x(LABEL_WIDTH)
-    text_wrapped_dim("Frames that were decoded once are shown again at once. More memory holds more of them.")
+    text_wrapped_dim("Decoded frames are shown again at once; more memory holds more of them.")

@@ -117,7 +117,7 @@ class KeysPage:
         others = [other for other in ui.keys.owners(self._pressed, ACTIONS)] if self._pressed else []
         others = [other for other in others if other.id != action.id]
         if not others:
-            text_wrapped_dim("Press the new key, with Ctrl, Shift or Alt if you like. Escape leaves it as it is.")
+            text_wrapped_dim("Press the new key, with Ctrl, Shift or Alt if you like. Escape cancels.")
             if pressed == "Escape":
                 return True
             if pressed:
@@ -130,9 +130,9 @@ class KeysPage:
             return self._cancelled(ui)
         imgui.push_text_wrap_pos(0.0)
         names = ", ".join(f'"{_text(other.id)}"' for other in others)
-        imgui.text_colored(ImVec4(*theme.ORANGE), f"{Icon.WARNING}  {self._pressed} does this at present: {names}.")
+        imgui.text_colored(ImVec4(*theme.ORANGE), f"{Icon.WARNING}  {self._pressed} is already used by: {names}.")
         imgui.pop_text_wrap_pos()
-        is_taken = primary_button(f"Take {self._pressed}", ImVec2(170, 0), ui) or pressed == "Enter"
+        is_taken = primary_button(f"Use {self._pressed}", ImVec2(170, 0), ui) or pressed == "Enter"
         ui.mark("keys.take")
         imgui.same_line()
         if is_taken:

@@ -128,9 +128,9 @@ class Remembering:
         self._has_told = True
         session.notices.add(
             "warn",
-            "Preferences cannot be kept",
+            "Preferences cannot be saved",
             f"{failed.failure} - {failed.path}",
-            "The program goes on with them until you quit. Projects are not concerned.",
+            "They apply until you quit. Projects are not affected.",
         )
 
 

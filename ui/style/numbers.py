@@ -8,11 +8,12 @@ def format_count(number: int) -> str:
     return f"{number:,}"
 
 
-def number_format(value: float) -> str:
-    """How an input field writes a number: in three digits, or eight places after the point; never with an exponent."""
+def number_format(value: float, finest: float = 1e-8) -> str:
+    """How an input field writes a number: in three digits, but none below `finest`; never with an exponent."""
     if value == 0 or not math.isfinite(value):
         return "%.3g"
-    return f"%.{min(max(0, 2 - math.floor(math.log10(abs(value)))), 8)}f"
+    n_places = 2 - math.floor(math.log10(abs(value)))
+    return f"%.{max(0, min(n_places, math.ceil(-math.log10(finest))))}f"
 
 
 def parsed_count(text: str) -> int | None:

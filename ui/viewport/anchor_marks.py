@@ -24,7 +24,7 @@ _WORDS = {
     "moving": "moving: on the surface of what moved in the reference clip",
     "promoted": "promoted: stands still and changes, as under a lamp",
     "residual": "residual: moves in this clip, where the reference has nothing",
-    "adapted": "moving, and learned on in this clip",
+    "adapted": "moving, and trained further in this clip",
     "replacing": "promoted in this clip, in place of a static one",
 }
 
@@ -59,7 +59,7 @@ class AnchorMarks:
         lines += [reason_text(code)] if reason_text(code) else []
         for treat, reason in (("static", USER_STATIC), ("dynamic", USER_DYNAMIC)):
             if code != reason and marked(self.positions[row : row + 1], regions, treat)[0]:
-                lines.append(f"in a region marked as {REGION_WORDS[treat]}, which counts from the next training on")
+                lines.append(f"in a region marked as {REGION_WORDS[treat]}, in effect from the next training on")
         return "\n".join(lines)
 
     def at(self, world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, *, near: float) -> int | None:

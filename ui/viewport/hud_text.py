@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from app.playback.picture_source import UNKNOWN, PictureSource
 from app.status import WantedFrame
+from engine.text import rate_text
 from ui.style.numbers import format_count
 from ui.viewport.picture_rate import ShownRate
 
@@ -22,7 +23,7 @@ RENDERED, CLOUD, FIRST_CLOUD, HINT, CAPTURED, MARKS = (
     "Cameras only",
 )
 _STANDS_IN = {
-    CLOUD: "point cloud of what stands still",
+    CLOUD: "point cloud of static parts",
     FIRST_CLOUD: "rough point cloud of frame 0",
     HINT: "captured pictures placed in space",
     CAPTURED: "captured picture",
@@ -109,7 +110,7 @@ def hud_text(
         pending=pending,
         failure=failure,
         note=_note(shown, wanted, state, state_words),
-        rate=loading_text(*loading) if loading is not None else "" if rate is None else rate_text(rate),
+        rate=loading_text(*loading) if loading is not None else "" if rate is None else playing_text(rate),
     )
 
 
@@ -118,9 +119,9 @@ def loading_text(n_ready: int, n_frames: int) -> str:
     return f"loading {n_ready} of {n_frames} frames"
 
 
-def rate_text(rate: ShownRate) -> str:
+def playing_text(rate: ShownRate) -> str:
     """How fast pictures really follow each other, and how many of the frames are among them."""
-    words = f"{'–' if rate.per_s is None else f'{rate.per_s:.1f}'} of {rate.wanted_per_s:g} fps"
+    words = f"{'–' if rate.per_s is None else f'{rate.per_s:.1f}'} of {rate_text(rate.wanted_per_s)} fps"
     if rate.is_every_frame:
         return f"{words}, every frame"
     if rate.every_nth > 1:

@@ -23,7 +23,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--out",
         type=path_argument,
         metavar="CAPTURE",
-        help="folder that becomes the capture (default: that of the videos). Only capture.json is written",
+        help="folder that becomes the capture (default: the folder of the videos); only capture.json is written",
     )
     command.add_argument(
         "--lens",
@@ -31,7 +31,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         default="simple",
         help="; ".join(f"{name}: {text}" for name, text in LENSES.items()) + " (default: simple)",
     )
-    command.add_argument("--shared-lens", action="store_true", help="all cameras are of one make at one zoom")
+    command.add_argument("--shared-lens", action="store_true", help="all cameras are the same model at the same zoom")
     command.add_argument(
         "--distance",
         nargs=3,
@@ -49,9 +49,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write capture.json even if matches contradict many cameras, and leave doubtful ones in use",
     )
-    command.add_argument("--replace", action="store_true", help="replace a capture.json that is there")
+    command.add_argument("--replace", action="store_true", help="replace an existing capture.json")
     add_follow_links(command)
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
@@ -75,10 +75,10 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     line.finish()
     print(printable("\n".join(outcome.lines)))
     if not outcome.is_written:
-        print("Nothing was written. --keep-doubtful writes capture.json all the same.")
+        print("Nothing was written. --keep-doubtful writes capture.json anyway.")
         return EXIT_FAILED
     links = " --follow-links" if outcome.needs_links else ""
-    print(printable(f"The capture is {outcome.capture}. Look at it with: clipgstream inspect{links} {outcome.capture}"))
+    print(printable(f"The capture is {outcome.capture}. Inspect it with: clipgstream inspect{links} {outcome.capture}"))
     return EXIT_OK
 
 

@@ -14,7 +14,7 @@ from engine.capture.writers.frame_files import FRAMES
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream convert`."""
-    command.add_argument("capture", type=path_argument, help="capture folder of any layout")
+    command.add_argument("capture", type=path_argument, help="capture folder in any layout")
     command.add_argument("--to", required=True, choices=TARGETS, help="layout to write")
     command.add_argument("--out", required=True, type=path_argument, metavar="DIR", help="new folder")
     command.add_argument(
@@ -24,7 +24,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="leave frames where they are, link to them, copy them, or decode them into PNG files (default: none)",
     )
     command.add_argument("--binary", action="store_true", help="with --to colmap: binary files instead of text")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
     add_follow_links(command)
 
 

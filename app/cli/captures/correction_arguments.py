@@ -24,14 +24,14 @@ def add_correction_arguments(command: argparse.ArgumentParser) -> None:
     """The flags; each may be given several times where it names a camera."""
     group = command.add_argument_group("corrections", "Written to capture.json; nothing else of the capture changes.")
     group.add_argument("--exclude", metavar="CAM", action="append", default=[], help="do not use this camera")
-    group.add_argument("--include", metavar="CAM", action="append", default=[], help="use it again")
+    group.add_argument("--include", metavar="CAM", action="append", default=[], help="use this camera again")
     group.add_argument(
         "--shift",
         metavar="CAM=FRAMES",
         action="append",
         default=[],
         type=_shift,
-        help="its own frame is the capture's frame plus FRAMES; replaces what was said before",
+        help="its own frame is the capture's frame plus FRAMES; replaces its earlier offset",
     )
     group.add_argument(
         "--hold-out", metavar="CAM", action="append", default=[], help='keep it out of training; "none" for none'
@@ -42,15 +42,16 @@ def add_correction_arguments(command: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         type=_mask,
-        help="masks of what moves: a pattern as masks/cam00/*.png, or a video",
+        help="masks of what moves: a pattern such as masks/cam00/*.png, or a video",
     )
     group.add_argument(
         "--fit",
         choices=tuple(fit.replace("_", "-") for fit in FITS),
-        help="what became of frames of another shape than their calibration: scaled, or cropped at the right and lower "
+        help="how frames whose shape differs from their calibration were made: scaled, or cropped at the right and "
+        "lower "
         "border (end), at the left and upper one (start), or at both by the same (middle)",
     )
-    group.add_argument("--apply", action="store_true", help="do what the doctor is sure of, notes left out")
+    group.add_argument("--apply", action="store_true", help="apply the fixes the doctor is sure of, except notes")
     group.add_argument("--out", metavar="FOLDER", type=path_argument, help="write capture.json there instead")
 
 
@@ -123,7 +124,7 @@ def correction_flags(corrections: Corrections) -> str:
 
 
 def _shift(text: str) -> tuple[str, float]:
-    name, number = _assigned(text, "CAM=FRAMES, as cam03=-2")
+    name, number = _assigned(text, "CAM=FRAMES, such as cam03=-2")
     try:
         return name, float(number)
     except ValueError:
@@ -131,7 +132,7 @@ def _shift(text: str) -> tuple[str, float]:
 
 
 def _mask(text: str) -> tuple[str, str]:
-    return _assigned(text, "CAM=FILES, as cam03=masks/cam03/*.png")
+    return _assigned(text, "CAM=FILES, such as cam03=masks/cam03/*.png")
 
 
 def _assigned(text: str, form: str) -> tuple[str, str]:

@@ -21,13 +21,13 @@ HEIGHTS = "_.-'"
 def exposure_lines(survey: ExposureSurvey) -> list[str]:
     """One line per camera that changes, one for the others, and what training does about it."""
     frames = survey.frames
-    lines = [f"Note: camera {name} could not be looked at: {reason}" for name, reason in survey.unreadable.items()]
+    lines = [f"Note: camera {name} could not be checked: {reason}" for name, reason in survey.unreadable.items()]
     if len(frames) < 2 or not survey.curves:
         return lines
     changing = {name: curve for name, curve in survey.curves.items() if curve.has_changed}
     n_calm = len(survey.curves) - len(changing)
     limit = f"{100 * CHANGE_LIMIT:g} %"
-    looked = f"looked at {len(frames)} of the frames from {frames[0]} to {frames[-1]}{_left_out(survey)}"
+    looked = f"checked {len(frames)} of the frames from {frames[0]} to {frames[-1]}{_left_out(survey)}"
     if not changing:
         return [*lines, f"Exposure: no camera changes by more than {limit} ({looked})."]
     lines.append(f"Exposure, lowest to highest against frame {frames[0]}, and its curve over time ({looked}):")
@@ -92,5 +92,5 @@ def _left_out(survey: ExposureSurvey) -> str:
     n_looked_at = len(survey.curves)
     if not survey.n_left_out:
         return ""
-    why = f"more take longer than {MAX_SECONDS:g} s" if survey.is_late else "there are so many"
+    why = f"more would take longer than {MAX_SECONDS:g} s" if survey.is_late else "there are too many"
     return f", of {n_looked_at} of {survey.n_cameras} cameras: {why}"

@@ -31,7 +31,7 @@ def diagnosis_lines(diagnosis: Diagnosis, names: Sequence[str], *, path: str) ->
     lines = finding_lines(diagnosis.findings, path=path)
     bad = sum(finding.severity != "note" for finding in diagnosis.findings)
     head = f"Capture doctor: {bad or 'no'} problem{'' if bad == 1 else 's'} found"
-    looked = f"{diagnosis.n_pictures} pictures looked at in {diagnosis.seconds:.0f} s"
+    looked = f"{diagnosis.n_pictures} pictures checked in {diagnosis.seconds:.0f} s"
     known = [(px, name) for px, name in zip(diagnosis.camera_px, names, strict=True) if not math.isnan(px)]
     fits = ""
     if known:

@@ -27,7 +27,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream inspect`."""
     command.add_argument("path", type=path_argument, help="capture or project folder")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
-    command.add_argument("--quick", action="store_true", help="look at no pixels: done in a moment")
+    command.add_argument("--quick", action="store_true", help="do not look at pixels; takes only a moment")
     add_follow_links(command)
     add_correction_arguments(command)
 
@@ -79,7 +79,7 @@ def _quick(options: argparse.Namespace, capture: Capture) -> dict[str, Any]:
 
     findings = quick_findings(capture)
     if not options.json:
-        print("\n".join(finding_lines(findings, path=str(options.path)) or ["Nothing odd in the numbers."]))
+        print("\n".join(finding_lines(findings, path=str(options.path)) or ["No problems found so far."]))
     return {"doctor": {"findings": [finding_document(finding) for finding in findings]}}
 
 
@@ -91,9 +91,7 @@ def _doctor(options: argparse.Namespace, capture: Capture) -> dict[str, Any]:
     from engine.doctor.memory import memory_bytes
 
     line = ProgressLine()
-    print(
-        f"The doctor takes up to about {memory_bytes(capture) / 2**30:.1f} GB of memory.", file=sys.stderr, flush=True
-    )
+    print(f"The doctor uses up to about {memory_bytes(capture) / 2**30:.1f} GB of memory.", file=sys.stderr, flush=True)
     diagnosis = examine(capture, report=lambda progress: line.update(progress.stage, progress.done, progress.message))
     line.finish()
     if not options.json:
@@ -103,7 +101,7 @@ def _doctor(options: argparse.Namespace, capture: Capture) -> dict[str, Any]:
         corrections = sure_corrections(diagnosis.findings)
         if corrections is None:
             if not options.json:
-                print("Nothing that is certain enough is to be corrected.")
+                print("No problem is certain enough to be corrected.")
         else:
             _say_written(options, write_asked(capture, corrections, options.out))
     exposure = exposure_document(diagnosis.exposure)
@@ -113,5 +111,5 @@ def _doctor(options: argparse.Namespace, capture: Capture) -> dict[str, Any]:
 def _say_written(options: argparse.Namespace, path: object) -> int:
     if not options.json:
         print(printable(f"Written: {path}"))
-        print("Projects made from this capture before do not fit it any more; train a new one.")
+        print("Existing projects of this capture no longer match it; train a new one.")
     return EXIT_OK

@@ -34,7 +34,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="with --apply: write capture.json there, not into the capture",
     )
     command.add_argument(
-        "--max-offset", type=float, default=1.0, metavar="SECONDS", help="how far to look in pictures (1 second)"
+        "--max-offset",
+        type=float,
+        default=1.0,
+        metavar="SECONDS",
+        help="largest offset that pictures are searched for (default: 1 second)",
     )
     command.add_argument("--json", action="store_true", help="print everything as JSON")
     add_follow_links(command)
@@ -90,9 +94,9 @@ def synchronisation_lines(found: Synchronisation) -> list[str]:
     lines += [f"{estimate.source}: {estimate.note}" for estimate in found.estimates]
     lines += [f"Disagreement: {printable(disagreement.text)}" for disagreement in found.disagreements]
     if not found.is_known:
-        lines.append("The offset of some cameras is unknown: they share nothing that was found with the others.")
+        lines.append("The offset of some cameras is unknown: nothing links them to the others.")
     elif found.is_in_step:
-        lines.append("All cameras are in step.")
+        lines.append("All cameras are synchronised.")
     return lines
 
 
@@ -148,15 +152,15 @@ def _apply(capture: Capture | None, found: Synchronisation, out: Path | None) ->
 
     if capture is None:
         raise CaptureError(
-            "These videos have no calibration, so there is no capture yet whose offsets could be written.",
+            "These videos have no calibration, so there is no capture yet to write offsets to.",
             hint="Calibrate first: clipgstream calibrate FOLDER --out CAPTURE; then synchronise CAPTURE --apply.",
         )
     unsure = [camera.name for camera in found.cameras if camera.source is None or camera.confidence < MIN_CONFIDENCE]
     if unsure:
         raise CaptureError(
             f"The offsets of {', '.join(unsure[:5])} are too uncertain to be written.",
-            hint="Look at the table without --apply. A clap that all cameras hear or see helps, or offset_frames by "
-            "hand in capture.json.",
+            hint="See the table without --apply. Record a clap that all cameras hear or see, or set offset_frames in "
+            "capture.json.",
             path=capture.path,
         )
     return write_corrections(capture.layout, capture.path, corrections_for(capture, found), target=out)

@@ -17,9 +17,9 @@ APPLY_SCHEMA = 1
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream apply`."""
     command.add_argument("project", type=path_argument, help="project folder")
-    command.add_argument("--dry-run", action="store_true", help="only say what would go")
+    command.add_argument("--dry-run", action="store_true", help="only show what would be removed")
     command.add_argument("--json", action="store_true", help="print what was done as JSON on standard output")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
@@ -30,7 +30,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
 
     def report(n_done: int, n_all: int) -> None:
-        line.update("Looking at clips", n_done / max(n_all, 1), f"{n_done}/{n_all}")
+        line.update("Reading clips", n_done / max(n_all, 1), f"{n_done}/{n_all}")
 
     project = open_project(options.project, is_writable=not options.dry_run)
     try:
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         if options.dry_run:
             found = find_deletions(project, clips, report)
             indices = [clip_index for clip_index, clip in found.clips.items() if clip.n_anchors]
-            said, n_anchors, kept = f"{found.n_anchors:,} anchors can go.", found.n_anchors, None
+            said, n_anchors, kept = f"{found.n_anchors:,} anchors can be removed.", found.n_anchors, None
         else:
             done = apply_permanently(project, clips, report)
             said, n_anchors, indices = done.text(), done.n_anchors, list(done.clip_indices)

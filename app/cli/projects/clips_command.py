@@ -27,11 +27,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--split", type=int, metavar="FRAME", action="append", default=[], help="let a clip begin at this frame"
     )
-    command.add_argument(
-        "--merge", type=int, metavar="N", help="make clip N and the one after it one clip, once --split is done"
-    )
-    command.add_argument("--reference", type=int, metavar="N", help="let the other clips inherit from clip N")
-    command.add_argument("--dry-run", action="store_true", help="only say what would become of the clips")
+    command.add_argument("--merge", type=int, metavar="N", help="merge clip N with the next one, after --split")
+    command.add_argument("--reference", type=int, metavar="N", help="make clip N the reference clip")
+    command.add_argument("--dry-run", action="store_true", help="only show what would happen to the clips")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
@@ -65,7 +63,7 @@ def _change(project: Project, n_frames: int, options: argparse.Namespace) -> Non
     if options.dry_run:
         project.history = replace(project.history, present=document)  # so that what is said is of it
     else:
-        project.change(document, "cut clips otherwise")
+        project.change(document, "change the clips")
 
 
 def describe_clips(project: Project, capture: Capture) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def _add_targets(group: argparse._ArgumentGroup) -> None:
         help="a box by its centre, half its lengths, and the quaternion that turns it",
     )
     one.add_argument("--sphere", nargs=4, type=float, metavar=("X", "Y", "Z", "R"), help="a sphere: centre and radius")
-    one.add_argument("--target", metavar="JSON", help="as --json prints it; - reads standard input")
+    one.add_argument("--target", metavar="JSON", help="in the form that --json prints; - reads standard input")
     group.add_argument(
         "--where",
         metavar="TEXT",
@@ -57,7 +57,7 @@ def _add_targets(group: argparse._ArgumentGroup) -> None:
         "motion",
     )
     group.add_argument("--at", type=int, metavar="FRAME", help="frame in which --where looks (default: 0)")
-    group.add_argument("--inverted", action="store_true", help="everything but that")
+    group.add_argument("--inverted", action="store_true", help="everything except the target")
 
 
 def _add_actions(group: argparse._ArgumentGroup) -> None:
@@ -159,8 +159,8 @@ def chosen_action(options: argparse.Namespace, target: Target) -> tuple[Action, 
     found = _given_actions(options)
     if len(found) != 1:
         flags = [flag for _, given in found for flag in given]
-        said = f"{' and '.join(flags)} are given together" if found else "Nothing says what the edit does"
-        raise ProjectError(f"{said}.", hint="An edit does one thing: give one of them.")
+        said = f"{' and '.join(flags)} are given together" if found else "No edit is given"
+        raise ProjectError(f"{said}.", hint="An edit does one thing; give one of them.")
     ((kind, given),) = found
     return _made(" with ".join(given), lambda: _action(kind, given, target)), f"--{kind.opposite}" in given
 

@@ -40,29 +40,27 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_edit_arguments(command)
     stack = command.add_argument_group("the stack and the history")
     one = stack.add_mutually_exclusive_group()
-    one.add_argument("--on", type=int, metavar="ID", help="let an edit count")
-    one.add_argument("--off", type=int, metavar="ID", help="let it not count")
-    one.add_argument("--remove", type=int, metavar="ID", help="take it out of the stack")
-    one.add_argument("--rename", nargs=2, metavar=("ID", "NAME"), help="give it another name")
+    one.add_argument("--on", type=int, metavar="ID", help="switch an edit on")
+    one.add_argument("--off", type=int, metavar="ID", help="switch it off")
+    one.add_argument("--remove", type=int, metavar="ID", help="remove it from the stack")
+    one.add_argument("--rename", nargs=2, metavar=("ID", "NAME"), help="rename it")
     one.add_argument(
         "--move-to", nargs=2, type=int, metavar=("ID", "POSITION"), help="its place in the stack, 0 is the bottom"
     )
-    one.add_argument(
-        "--replace", type=int, metavar="ID", help="change it: what is given takes the place of what it had"
-    )
-    one.add_argument("--undo", type=int, nargs="?", const=1, metavar="N", help="take back the last step, or N steps")
-    one.add_argument("--redo", type=int, nargs="?", const=1, metavar="N", help="do again what was taken back")
+    one.add_argument("--replace", type=int, metavar="ID", help="change it: given options replace what it had")
+    one.add_argument("--undo", type=int, nargs="?", const=1, metavar="N", help="undo the last step, or N steps")
+    one.add_argument("--redo", type=int, nargs="?", const=1, metavar="N", help="redo the last undone step, or N steps")
     one.add_argument(
         "--put",
         metavar="JSON",
-        help=f"entries of the document, which take the place of what is there: {', '.join(ENTRIES)}; - reads them "
+        help=f"entries of the document, which replace the present ones: {', '.join(ENTRIES)}; - reads them "
         "from standard input",
     )
     one.add_argument(
         "--apply-permanently",
         action="store_true",
         default=None,
-        help="take what is deleted out of the clips for good; what they were becomes versions",
+        help="remove deleted anchors from the clips for good; earlier clips become versions",
     )
     stack.add_argument("--history", action="store_true", help="list the steps as well")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
@@ -97,9 +95,7 @@ def _check_options(options: argparse.Namespace, chosen: str) -> None:
         if is_given and not takes_edit:
             raise ProjectError(f"--{chosen.replace('_', '-')} is given with {what}.", hint="Leave one of them out.")
         if is_given and not chosen and not has_action(options):
-            raise ProjectError(
-                "Nothing says what the edit does.", hint="Give for instance --delete, or --replace ID to change one."
-            )
+            raise ProjectError("No edit is given.", hint="Give for instance --delete, or --replace ID to change one.")
 
 
 def _add(options: argparse.Namespace, project: ScriptedProject) -> None:
@@ -143,7 +139,7 @@ def _take_steps(options: argparse.Namespace, project: ScriptedProject) -> None:
     n = options.undo if is_undo else options.redo
     n_known = len(project.history.past if is_undo else project.history.future)
     if not 1 <= n <= n_known:
-        what = "taken back" if is_undo else "done again"
+        what = "undone" if is_undo else "redone"
         raise ProjectError(f"{n} steps cannot be {what}: there are {n_known}.")
     for _ in range(n):
         (project.undo if is_undo else project.redo)()
@@ -179,7 +175,7 @@ def _text(argument: str) -> str:
         return argument
     text = sys.stdin.read(MAX_STDIN_CHARACTERS + 1)
     if len(text) > MAX_STDIN_CHARACTERS:
-        raise ProjectError("There is too much on standard input.")
+        raise ProjectError("Standard input is too long.")
     return text
 
 
@@ -219,5 +215,5 @@ def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str
         history = project.history
         lines.append(f"Steps: {len(history.past)}")
         lines += [f"  {one_line(step.name)}" for step in history.past]
-        lines += [f"  {one_line(step.name)} (taken back)" for step in reversed(history.future)]
+        lines += [f"  {one_line(step.name)} (undone)" for step in reversed(history.future)]
     return lines

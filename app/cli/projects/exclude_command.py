@@ -26,10 +26,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream exclude`."""
     command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument("--cameras", metavar="NAMES", help="cameras, separated by commas; without --frames altogether")
-    command.add_argument("--frames", metavar="A:B", help="frames A to before B, of --cameras or of all of them")
-    command.add_argument("--include", action="store_true", help="let them take part again")
-    command.add_argument("--forget-masks", action="store_true", help="remove the masks that were painted in the window")
-    command.add_argument("--forget", action="store_true", help="let everything take part again, before the rest")
+    command.add_argument(
+        "--frames", metavar="A:B", help="frames A up to B, B not included, of --cameras or of all cameras"
+    )
+    command.add_argument("--include", action="store_true", help="include them again")
+    command.add_argument("--forget-masks", action="store_true", help="remove the masks painted in the window")
+    command.add_argument("--forget", action="store_true", help="include everything again, before the rest")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
 
 

@@ -28,7 +28,7 @@ _SHAPES = {"box": (("X0", "Y0", "Z0", "X1", "Y1", "Z1"), "two corners"), "sphere
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream gate`."""
     command.add_argument("project", type=path_argument, help="project folder")
-    for treat, meaning in (("static", "nothing moves here"), ("dynamic", "everything may change here")):
+    for treat, meaning in (("static", "nothing inside moves"), ("dynamic", "everything inside may change")):
         for shape, (names, what) in _SHAPES.items():
             command.add_argument(
                 f"--{treat}-{shape}",

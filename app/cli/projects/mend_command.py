@@ -35,12 +35,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--method",
         choices=("auto", *METHODS),
         default="auto",
-        help="auto: one after the other, until half of the flicker is gone (default); "
+        help="auto: each in turn, until half of the flicker is gone (default); "
         + "; ".join(f"{name}: {words}" for name, words in METHODS.items()),
     )
-    command.add_argument("--revert", action="store_true", help="take back what was mended last")
-    command.add_argument("--json", action="store_true", help="print what came of it as JSON")
-    command.add_argument("--quiet", action="store_true", help="no progress")
+    command.add_argument("--revert", action="store_true", help="revert the last mend")
+    command.add_argument("--json", action="store_true", help="print the result as JSON")
+    command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     try:
         if options.revert:
             if options.boundary or options.frames:
-                raise ProjectError("--revert takes back what was mended last; it has no frames of its own.")
+                raise ProjectError("--revert undoes the last mend and takes no frames.")
             return _revert(project, options)
         request = _request(project, options)
         line = ProgressLine(is_quiet=options.quiet)
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 def _request(project: Project, options: argparse.Namespace) -> MendRequest:
     if bool(options.boundary) == bool(options.frames):
-        raise ProjectError("Name what is to be mended: --boundary A|B or --frames A:B.")
+        raise ProjectError("Name what to mend: --boundary A|B or --frames A:B.")
     settings = project.settings
     capture = open_capture_of(settings, project.folder)
     if options.frames:
@@ -119,7 +119,7 @@ def lines_of(project: Project, outcome: MendOutcome) -> list[str]:
     for clip in record.clips:
         versions = [one for one in list_versions(project, clip.clip_index) if one.header is not None]
         number = next((one.number for one in versions if one.header and one.header.fingerprint == clip.before), None)
-        lines.append(f"What clip {clip.clip_index} was is its version {number}; --revert brings it back.")
+        lines.append(f"The previous clip {clip.clip_index} is its version {number}; --revert restores it.")
     return lines + ([record.advice] if record.advice else [])
 
 

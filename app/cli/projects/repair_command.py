@@ -22,7 +22,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--keep-good-steps",
         action="store_true",
-        help="go on with all that can be read; what is damaged is kept aside in the project folder",
+        help="continue with all that can be read; damaged files are kept in the project folder",
     )
     command.add_argument("--json", action="store_true", help="print everything as JSON")
 
@@ -67,18 +67,18 @@ def repair_lines(result: dict[str, Any]) -> list[str]:
     """The same as text."""
     if result["missing"]:
         found = [f"{result['path']}: {note}" for note in result["missing"]]
-        return [*found, "All that is there can be read, and the project goes on from it. A copy of it may hold more."]
+        return [*found, "Everything present can be read, and the project continues from it. A backup may hold more."]
     if not result["is_damaged"]:
         return [f"{result['path']}: the document and its journal are whole."]
     lines = [f"{result['path']}: {result['problem']}"]
     if result["step"] is None:
         return [
             *lines,
-            "Nothing of the document can be read. Restore project.json from a copy; clips are not affected.",
+            "The document cannot be read. Restore project.json from a backup; clips are not affected.",
         ]
     source = "the backup of the project file" if result["is_from_backup"] else "the project file"
     last = f" ({result['step_name']})" if result["step_name"] else ""
     lines.append(f"Everything up to step {result['step']}{last} can be read, from {source} and the journal.")
     if result["kept_aside"] is None:
-        return [*lines, "With --keep-good-steps the project goes on from there."]
-    return [*lines, f"The project goes on from there. What was damaged is kept in {result['kept_aside']}."]
+        return [*lines, "With --keep-good-steps the project continues from there."]
+    return [*lines, f"The project continues from there. Damaged files are kept in {result['kept_aside']}."]

@@ -27,14 +27,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument("--clip", type=int, metavar="N", help="only this clip")
     command.add_argument(
-        "--restore", type=int, metavar="V", help="bring this version of --clip back; what it is now becomes a version"
+        "--restore", type=int, metavar="V", help="restore this version of --clip; the present clip becomes a version"
     )
     command.add_argument(
         "--free",
         choices=tuple(WHAT),
         help="delete for good: " + "; ".join(f"{name}: {words}" for name, words in WHAT.items()),
     )
-    command.add_argument("--dry-run", action="store_true", help="with --free: only say what would go")
+    command.add_argument("--dry-run", action="store_true", help="with --free: only show what would be deleted")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
 
 
@@ -137,7 +137,7 @@ def version_lines(found: dict[str, Any]) -> list[str]:
     lines = []
     if "n_bytes_freed" in found:
         asked, freed = found["n_bytes_asked_for"], found["n_bytes_freed"]
-        lines.append(f"Freed {_megabytes(freed)}." if freed or not asked else f"That would free {_megabytes(asked)}.")
+        lines.append(f"Freed {_megabytes(freed)}." if freed or not asked else f"This would free {_megabytes(asked)}.")
     disk = found["disk"]
     parts = ", ".join(f"{name} {_megabytes(n)}" for name, n in disk.items() if n and name != "total")
     lines.append(f"{found['path']}: {_megabytes(disk['total'])}{f' ({parts})' if parts else ''}")
@@ -151,7 +151,7 @@ def version_lines(found: dict[str, Any]) -> list[str]:
             psnr = version["held_out_psnr"]
             psnr = "" if psnr is None else f", {psnr_words(psnr, is_whole=version['held_out_whole'])}"
             steps = "" if version["step"] is None else f", {version['step']} steps"
-            why = f"; cannot come back: {version['why_not']}" if version["why_not"] else ""
+            why = f"; cannot be restored: {version['why_not']}" if version["why_not"] else ""
             size = _megabytes(version["n_bytes"])
             lines.append(f"  version {version['number']}: trained {version['trained']}{steps}{psnr}, {size}{why}")
     return lines

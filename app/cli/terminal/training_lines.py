@@ -51,7 +51,7 @@ def show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
     psnr = outcome.held_out_psnr
     figure = "" if psnr is None else f", {psnr_words(psnr, is_whole=outcome.held_out_whole)}"
     if outcome.state == "skipped":
-        line.say(f"Clip {outcome.clip_index} is trained already: {outcome.step:,} steps{figure}")
+        line.say(f"Clip {outcome.clip_index} is already trained: {outcome.step:,} steps{figure}")
     elif outcome.state == "trained":
         took = duration_text(outcome.seconds)
         line.say(f"Clip {outcome.clip_index} is trained: {outcome.step:,} steps in {took}{figure}")

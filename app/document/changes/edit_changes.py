@@ -92,7 +92,7 @@ def move_edit(document: ProjectDocument, edit_id: int, position: int) -> Project
     """
     edit, n_edits = edit_with(document, edit_id), len(document.edits)
     if not 0 <= position < n_edits:
-        raise ProjectError(f"There is no position {position} in a stack of {n_edits} edits.")
+        raise ProjectError(f"Position {position} is outside the stack of {n_edits} edits.")
     others = [other for other in document.edits if other is not edit]
     return _with(document, (*others[:position], edit, *others[position:]))
 
@@ -139,7 +139,7 @@ def _next_id(document: ProjectDocument) -> int:
 def _check_room(document: ProjectDocument) -> None:
     if len(document.edits) >= MAX_EDITS:
         raise ProjectError(
-            f"The project has {len(document.edits)} edits, no more are kept.",
+            f"The project has {len(document.edits)} edits, which is the limit.",
             hint="Apply them permanently, or delete some.",
         )
 
@@ -150,6 +150,6 @@ def _checked(edit: Edit) -> Edit:
     try:
         read = to_type(to_builtins(edit), Edit)
     except (EntryError, ValueError) as error:
-        raise ProjectError(f"The edit makes no sense ({error}).") from error
+        raise ProjectError(f"The edit is not valid ({error}).") from error
     check_picks(read)
     return edit

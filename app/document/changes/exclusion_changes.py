@@ -31,7 +31,7 @@ def with_cameras_excluded(
     n_left = len(set(camera_names) - set(document.settings.holdout) - set(excluded))
     if is_excluded and n_left < MIN_TRAINING_CAMERAS:
         raise ProjectError(
-            f"That leaves {n_left} cameras for training; {MIN_TRAINING_CAMERAS} are needed.",
+            f"This leaves {n_left} cameras for training; {MIN_TRAINING_CAMERAS} are needed.",
             hint="Hold out fewer cameras, or exclude fewer.",
         )
     return _with(document, lambda one: Exclusions(excluded, one.frames, one.masks))
@@ -101,7 +101,7 @@ def with_stroke(
     known = next((i for i, one in enumerate(masks) if (one.camera, one.first, one.stop) == (camera, first, stop)), None)
     if known is None:
         if stroke.is_erasing:
-            raise ProjectError("Nothing is painted there that could be erased.", hint="Check the frames it is for.")
+            raise ProjectError("There is nothing to erase.", hint="Check the frames it is for.")
         masks.append(PaintedMask(camera, first, stop, (stroke,)))
     else:
         masks[known] = PaintedMask(camera, first, stop, (*masks[known].strokes, stroke))

@@ -25,7 +25,7 @@ def put_marker(document: ProjectDocument, frame_index: int, text: str = "") -> P
         raise ProjectError(f"There is no frame {frame_index} to mark.")
     others = tuple(marker for marker in document.markers if marker.frame_index != frame_index)
     if len(others) >= MAX_MARKERS:
-        raise ProjectError(f"There are {len(others)} markers, no more are kept.", hint="Remove some first.")
+        raise ProjectError(f"There are {len(others)} markers, which is the limit.", hint="Remove some first.")
     marker = Marker(frame_index, checked_text(text))
     return replace(document, markers=tuple(sorted((*others, marker), key=lambda one: one.frame_index)))
 

@@ -12,7 +12,7 @@ from engine.editing.edit import Scope
 from engine.editing.reach import Frames, Reach
 from engine.errors import ProjectError
 
-VOLUME_HINT = "A box or a sphere acts in all clips."
+VOLUME_HINT = "A box or sphere acts in all clips."
 MAX_RUNS = 3
 
 
@@ -23,7 +23,7 @@ def check_acts(reach: Reach, scope: Scope) -> None:
         ProjectError: What it acts on exists in no frame in which it is to hold.
     """
     if reach.is_nowhere:
-        hint = "Choose other frames for the edit, or select in a frame where it is to hold."
+        hint = "Choose other frames for the edit, or select in a frame where it should act."
         raise ProjectError(_nowhere_text(reach, scope), hint=hint)
 
 
@@ -32,14 +32,14 @@ def reach_note(reach: Reach, scope: Scope) -> str:
     if reach.is_nowhere:
         return _nowhere_text(reach, scope)
     if reach.empty:
-        return f"Nothing that is selected exists in {frames_text(reach.empty)}: there it acts on everything."
+        return f"The selection does not exist in {frames_text(reach.empty)}; there the edit acts on everything."
     if not reach.is_whole:
         return f"Acts in {frames_text(reach.acts)} only: other clips have other Gaussians. {VOLUME_HINT}"
     if reach.n_ending:
         where = f"{reach.n_ending:,} of {reach.n_picked:,} Gaussians are in {frames_text(reach.ending)} only"
         return f"{where}: other clips have other Gaussians. {VOLUME_HINT}"
     if reach.has_newcomers:
-        return f"Other clips show what moves partly by Gaussians of their own, which are not selected. {VOLUME_HINT}"
+        return f"Other clips show what moves partly with their own Gaussians, which are not selected. {VOLUME_HINT}"
     return ""
 
 
@@ -68,5 +68,5 @@ def frames_text(runs: Frames) -> str:
 
 
 def _nowhere_text(reach: Reach, scope: Scope) -> str:
-    what = "what is selected exists in" if reach.n_picked else "the capture has"
+    what = "the selection exists in" if reach.n_picked else "the capture has"
     return f"The edit can never act ({scope_text(scope)}): {what} {frames_text(reach.exists)} only."

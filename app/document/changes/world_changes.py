@@ -66,7 +66,7 @@ def up_of_ground(points: Sequence[Sequence[float]], toward: Sequence[float]) -> 
         raise ProjectError("The three points lie on a line.", hint="Choose points that are farther apart.")
     height = float(normal @ (np.asarray(toward, dtype=np.float64) - a))
     if height == 0.0 or not np.isfinite(height):
-        raise ProjectError("The cameras stand on the ground that the points say.", hint="Choose other points.")
+        raise ProjectError("The cameras stand on the ground that the points give.", hint="Choose other points.")
     x, y, z = (normal * (np.sign(height) / length)).tolist()
     return x, y, z
 

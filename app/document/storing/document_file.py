@@ -26,7 +26,7 @@ PROJECT_FILE, BACKUP_FILE = "project.json", "project.backup.json"
 GATE_FILE, CAMERA_PATHS_FILE = "gate.json", "camera_paths.json"
 """Of schema 1: regions and camera paths, which are part of the document now."""
 MAX_DOCUMENT_BYTES = 256 << 20
-RESTORE = "Restore it from a copy."
+RESTORE = "Restore it from a backup."
 """Where it is not known yet what else is left of the project."""
 _REMOVE = "Correct or remove the file."
 
@@ -82,7 +82,7 @@ def read_stored(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
     if type(schema) is not int or schema not in (1, SCHEMA):
         raise ProjectError(
             f"The project has schema {schema!r:.60}, this version reads {SCHEMA}.",
-            hint="Use the version that wrote it, or restore the file from a copy.",
+            hint="Use the version that wrote it, or restore the file from a backup.",
             path=path,
         )
     step = content.pop("step", 0) if schema == SCHEMA else 0
@@ -98,7 +98,7 @@ def read_stored(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
     try:
         return StoredDocument(document_of(content), step, checksum or "", schema)
     except ProjectError as error:
-        raise DamagedDocument(error.message, hint="Correct it or restore the file from a copy.", path=path) from error
+        raise DamagedDocument(error.message, hint="Correct it or restore the file from a backup.", path=path) from error
     except EntryError as error:
         raise DamagedDocument(
             f"The project file has a missing or wrong entry ({error}).", hint=RESTORE, path=path
@@ -159,7 +159,7 @@ def _from_schema_1(folder: Path, settings: dict[str, Any]) -> dict[str, Any]:
     """Plain data of schema 2: the file held the settings only."""
     regions = read_kept(folder / GATE_FILE, "The file of the gate's regions", hint=_REMOVE) or {"regions": []}
     if regions.keys() != {"regions"} or not isinstance(regions["regions"], list):
-        message = 'The file holds something else than a list "regions".'
+        message = 'The file does not hold a list "regions".'
         raise ProjectError(message, hint=_REMOVE, path=folder / GATE_FILE)
     path = folder / CAMERA_PATHS_FILE
     paths = read_kept(path, "The file of the camera paths", hint=_REMOVE, max_bytes=MAX_JSON_BYTES)

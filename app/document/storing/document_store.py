@@ -87,7 +87,7 @@ class DocumentStore:
 
     @property
     def _repair_hint(self) -> str:
-        return f'"clipgstream repair {self.folder}" says what can be kept.'
+        return f'"clipgstream repair {self.folder}" shows what can be kept.'
 
     def _found(self, document: ProjectDocument) -> ProjectDocument:
         return with_capture(document, lambda capture: found_place(capture, self._place))
@@ -165,7 +165,7 @@ class DocumentStore:
         try:
             self._begin(known)
         except EngineError as error:
-            logger.warning("the project file could not be written anew: %s", error)
+            logger.warning("the project file could not be rewritten: %s", error)
             self._known = known
 
     def _to_store(self, event: Event) -> Event:
@@ -230,7 +230,7 @@ class DocumentStore:
                 write_history(folder, known.history, step=step, document=text.checksum)
                 write_document_text(folder, text)
             except (EngineError, OSError) as error:
-                logger.warning("the project file could not be written anew: %s", error)
+                logger.warning("the project file could not be rewritten: %s", error)
                 return
             self._forget_journals(self._stored_step)
             self._stored_step = step

@@ -84,7 +84,7 @@ def read_history(folder: Path) -> StoredHistory | None:
         ProjectError: It is damaged.
     """
     path = folder / HISTORY_FILE
-    content = read_kept(path, "The file of the steps that can be taken back", hint="", max_bytes=MAX_BYTES)
+    content = read_kept(path, "The undo history file", hint="", max_bytes=MAX_BYTES)
     if content is None:
         return None
     try:
@@ -92,7 +92,7 @@ def read_history(folder: Path) -> StoredHistory | None:
         if found.history != FORMAT:
             raise EntryError(f"history is {found.history}, not {FORMAT}")
     except EntryError as error:
-        message = f"The file of the steps that can be taken back has a missing or wrong entry ({error})."
+        message = f"The undo history file has a missing or wrong entry ({error})."
         raise ProjectError(message, path=path) from error
     return found
 
@@ -112,6 +112,6 @@ def _steps(present: ProjectDocument, stored: Sequence[_StoredStep]) -> tuple[Ste
         try:
             document = document_with(document, step.patch)
         except PatchError as error:
-            raise ProjectError(f"A step that can be taken back does not fit the document ({error}).") from error
+            raise ProjectError(f"An undo step does not fit the document ({error}).") from error
         found.append(Step(step.name, document, step.merge))
     return tuple(reversed(found))

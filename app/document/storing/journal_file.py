@@ -274,4 +274,4 @@ def _line(row: Row) -> tuple[bytes, str]:
         text = json.dumps({**row, CHECKSUM: link}, allow_nan=False, ensure_ascii=False)
         return text.encode("utf-8") + b"\n", link
     except ValueError as error:  # NaN, or half a Unicode character
-        raise ProjectError(f"That cannot be kept ({error}).") from error
+        raise ProjectError(f"This cannot be saved ({error}).") from error

@@ -67,11 +67,11 @@ def kept_text(content: dict[str, Any], *, max_bytes: int = MAX_BYTES, is_for_peo
         text, checksum = checked_text(content, is_for_people=is_for_people)
         data = text.encode("utf-8")
     except ValueError as error:  # NaN, or half a Unicode character
-        raise ProjectError(f"That cannot be kept ({error}).") from error
+        raise ProjectError(f"This cannot be saved ({error}).") from error
     if len(data) > max_bytes:
         raise ProjectError(
             f"The project would take {len(data) / 1e6:.0f} MB, at most {max_bytes / 1e6:.0f} are kept.",
-            hint="Delete some of what is not needed.",
+            hint="Delete what is not needed.",
         )
     return KeptText(data, checksum)
 

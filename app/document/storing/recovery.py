@@ -132,14 +132,14 @@ def recover(folder: Path) -> Path:
     best = _best(folder, _sources(folder))
     if best is None:
         raise ProjectError(
-            "Neither the project file nor its backup can be read, so nothing can be kept of the document.",
-            hint="Restore project.json from a copy. Clips are not affected.",
+            "Neither the project file nor its backup can be read, so the document is lost.",
+            hint="Restore project.json from a backup. Clips are not affected.",
             path=folder,
         )
     try:
         aside = _keep_aside(folder)
     except OSError as error:
-        raise disk_error(error, what="The copy of what is damaged", path=folder) from error
+        raise disk_error(error, what="The copy of the damaged files", path=folder) from error
     store = DocumentStore(folder)
     history = best[1].history.each(lambda document: with_capture(document, lambda place: found_place(place, folder)))
     step = max([best[1].step, *journal_steps(folder)]) + 1  # so that no file that is there goes on from it

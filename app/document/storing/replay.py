@@ -108,11 +108,11 @@ class _Replay:
         try:
             kept = read_history(self.folder)
         except ProjectError as error:
-            self.notes.append(f"{error.message} What was done before step {self.step} cannot be taken back.")
+            self.notes.append(f"{error.message} Steps before step {self.step} cannot be undone.")
             return None
         is_missing = self.stored.step > 0 and (kept is None or kept.step < self.stored.step)
         if is_missing:
-            self.notes.append(f"The file of the steps before step {self.step} is missing; they cannot be taken back.")
+            self.notes.append(f"The file of the steps before step {self.step} is missing; they cannot be undone.")
         return None if is_missing else kept
 
     def _take_history(self) -> None:
@@ -124,10 +124,10 @@ class _Replay:
         is_same = kept.document == self.stored.checksum if self.step == self.stored.step else True
         try:
             if not is_same:
-                raise ProjectError("The steps that can be taken back belong to another document.")
+                raise ProjectError("The undo history belongs to another document.")
             self.history = history_of(self.history.present, kept)
         except ProjectError as error:
-            self.notes.append(f"{error.message} What was done before step {self.step} cannot be taken back.")
+            self.notes.append(f"{error.message} Steps before step {self.step} cannot be undone.")
 
     # ---------------------------------------------------------------- journal
 
@@ -139,7 +139,7 @@ class _Replay:
             raise JournalDamage("The journal of the project is not a folder.", path=journal)
         if self.stored.schema == 1:
             if steps:
-                raise self._damage("It is of a version that has no journal, but there is one")
+                raise self._damage("It was written by a version without a journal, but there is one")
             return
         before = [step for step in steps if step <= self.step]
         if not before:
@@ -154,7 +154,7 @@ class _Replay:
                 self._check_begin(file)
             elif file.start != self.step or file.after != last.links[-1]:
                 raise JournalDamage(
-                    f"The journal of the project has a gap: after step {self.step}, the next file goes on from step "
+                    f"The journal of the project has a gap: after step {self.step}, the next file continues from step "
                     f"{file.start}.",
                     path=file.path,
                 )
@@ -181,7 +181,7 @@ class _Replay:
     def _check_begin(self, file: JournalFile) -> None:
         if file.start == self.stored.step and file.document != self.stored.checksum:
             if self.stored.checksum or file.rows:
-                raise self._damage(f"It is not the document that the journal goes on from at step {self.step}")
+                raise self._damage(f"It is not the document that the journal continues from at step {self.step}")
             self._is_edited = True  # by hand, and nothing has happened since it was written
         if file.start < self.stored.step and not self.stored.checksum:
             raise self._damage("It was edited by hand while the journal held steps that it does not have")
@@ -209,13 +209,13 @@ class _Replay:
 def _missing(n: int | None) -> str:
     match n:
         case None:
-            return "what was done last is missing; it is not known how many steps that is"
+            return "the last steps are missing; how many is unknown"
         case 0:
-            return "what was done last was not written completely"
+            return "the last step was not written completely"
         case 1:
-            return "1 later step was kept and is missing"
+            return "1 later step is missing"
         case _:
-            return f"{n} later steps were kept and are missing"
+            return f"{n} later steps are missing"
 
 
 # ---------------------------------------------------------------- events

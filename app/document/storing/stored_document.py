@@ -82,7 +82,7 @@ def _checked(kind: type[Any]) -> Callable[[Any], Any]:
         try:
             return to_builtins(to_type(to_builtins(value), kind))
         except EntryError as error:
-            raise ProjectError(f"That cannot be kept ({error}).") from error
+            raise ProjectError(f"This cannot be saved ({error}).") from error
 
     return plain
 

@@ -38,7 +38,7 @@ def draw_with(module: str) -> None:
 def drawn_laps(project_folder: Path) -> Drawn:
     """Render frames of a project as the window does. Never raises for want of a display or a driver."""
     if not _module:
-        return _none("no window belongs to this program")
+        return _none("this program has no window")
     command = [sys.executable, "-m", _module, str(project_folder)]
     try:
         with undisturbed():
@@ -73,8 +73,8 @@ def read_said(text: str) -> Drawn:
         laps = [Lap(float(decode), float(draw), int(n)) for decode, draw, n in said["laps"]]
         return Drawn(laps, str(said["renderer"]), str(said["reason"]))
     except (IndexError, KeyError, TypeError, ValueError):
-        logger.warning("drawing said %r", text[-500:])
-        return _none("the program that draws said nothing that can be read")
+        logger.warning("drawing sent %r", text[-500:])
+        return _none("the program that draws sent nothing readable")
 
 
 def _none(reason: str) -> Drawn:

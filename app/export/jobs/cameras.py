@@ -12,7 +12,7 @@ class CamerasJob(Job, frozen=True):
 
     kind: ClassVar[str] = "cameras"
     title: ClassVar[str] = "Cameras"
-    about: ClassVar[str] = "Where the cameras of the capture stand and what their lenses do."
+    about: ClassVar[str] = "Poses and lenses of the capture's cameras."
     work: ClassVar[str] = "app.export.cameras_job"
     is_prefixed: ClassVar[bool] = True
 

@@ -23,7 +23,7 @@ def _vector_text(vector: Vector) -> str:
     return " ".join(map(value_text, vector))
 
 
-_SCENE_UPS = {"": "As the project says"} | {_vector_text(axis): name for name, axis in AXES.items()}
+_SCENE_UPS = {"": "As in the project"} | {_vector_text(axis): name for name, axis in AXES.items()}
 
 
 class GaussiansJob(Job, frozen=True):
@@ -44,20 +44,20 @@ class GaussiansJob(Job, frozen=True):
     part: Annotated[
         WrittenPart,
         option(
-            "What of the scene is written",
+            "Which part of the scene is written",
             "Part",
             answers={
-                "all": ("All of the scene", ""),
-                "static": ("What stands still", "what stands still, once for as long as it stays the same"),
-                "moving": ("What moves", "what moves, in a file per frame"),
-                "split": ("Both, apart", "what stands still once, and what moves in a file per frame"),
+                "all": ("Whole scene", ""),
+                "static": ("Static", "what stands still, once for as long as it does not change"),
+                "moving": ("Moving", "what moves, in a file per frame"),
+                "split": ("Both, separately", "what stands still once, and what moves in a file per frame"),
             },
         ),
     ] = "all"
     up: Annotated[
         str | None,
         option(
-            "Turns the scene so that what is up in it points along this axis of the files",
+            "Turns the scene so that up points along this axis of the files",
             "Up axis",
             none="as in the capture",
             choices=dict.fromkeys(AXES, ""),
@@ -84,11 +84,11 @@ class GaussiansJob(Job, frozen=True):
     axes: Annotated[
         Literal["ply", "rub"],
         option(
-            "How the axes of the files lie",
+            "Axes of the files",
             "Axes",
             answers={
                 "ply": ("As in .ply files", "as in .ply files"),
-                "rub": ("As Niantic's programs take them", "y and z reversed, as Niantic's programs take .spz"),
+                "rub": ("For Niantic's programs", "y and z reversed, as Niantic's programs expect .spz"),
             },
             shown_with={"format": ("spz",)},
         ),
@@ -98,7 +98,7 @@ class GaussiansJob(Job, frozen=True):
         option(
             "Which way is up in the capture, for the up axis of the files",
             "Up in the capture",
-            none="as the project says, else what its cameras agree on",
+            none="set in the project, else derived from the cameras",
             titles=_SCENE_UPS,
             writing=Writing("X Y Z", "three numbers", _read_vector, _vector_text),
         ),
@@ -110,11 +110,11 @@ class GaussiansJob(Job, frozen=True):
             "What is kept of each Gaussian in a .ply file",
             "Fields",
             answers={
-                "usual": ("Usual, 56 bytes each", ""),
+                "usual": ("Standard, 56 bytes each", ""),
                 "full": (
                     "Full, 248 bytes each",
                     "normals and f_rest too, all 0, as the reference code of 3D Gaussian Splatting writes, for "
-                    "programs that read nothing else",
+                    "programs that need them",
                 ),
             },
             shown_with={"format": ("ply",)},

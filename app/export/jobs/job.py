@@ -40,12 +40,12 @@ def option(
     return setting("", meaning, label=label, **declared)
 
 
-FRAMES = option("Frames of the capture", none="all that are trained")
+FRAMES = option("Frames of the capture", none="all trained frames")
 EDITS = option(
     "Whether the edits of the project are applied",
     "Edits",
-    titles={"true": "Go along", "false": "Left out"},
-    flags=(Flag("--without-edits", "The scene as it was trained", constant=False),),
+    titles={"true": "Applied", "false": "Left out"},
+    flags=(Flag("--without-edits", "Left out: the scene as it was trained", constant=False),),
 )
 
 

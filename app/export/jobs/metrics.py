@@ -13,7 +13,7 @@ class MetricsJob(Job, frozen=True):
 
     kind: ClassVar[str] = "metrics"
     title: ClassVar[str] = "Metrics"
-    about: ClassVar[str] = "Every figure that was measured, with the settings it was reached with."
+    about: ClassVar[str] = "Every measured figure, with the training settings."
     work: ClassVar[str] = "app.export.metrics_job"
     is_prefixed: ClassVar[bool] = True
 

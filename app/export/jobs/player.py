@@ -15,7 +15,7 @@ class PlayerJob(Job, frozen=True):
 
     kind: ClassVar[str] = "player"
     title: ClassVar[str] = "Player"
-    about: ClassVar[str] = "A page that plays the scene in a browser, to be turned by hand; it works without a network."
+    about: ClassVar[str] = "A page that plays the scene in a browser, with free view control; it works offline."
     work: ClassVar[str] = "app.export.player_job"
     needs_trained: ClassVar[bool] = True
 
@@ -23,7 +23,7 @@ class PlayerJob(Job, frozen=True):
     has_folder: Annotated[
         bool | None,
         option(
-            "Where the scene lies",
+            "Where the scene is stored",
             "Scene",
             none="in the page up to 150 MB, in a folder above that",
             titles={"": "Depending on size", "false": "In the page", "true": "In a folder beside it"},

@@ -51,11 +51,11 @@ class Turntable(Declared, frozen=True):
     n_turns: Annotated[
         float,
         option(
-            "Turns of the turntable; negative ones go the other way round",
+            "Turns of the turntable; negative ones reverse it",
             "Turns",
             low=-100.0,
             high=100.0,
-            titles={"1": "One", "2": "Two", "3": "Three", "0.5": "Half a turn", "-1": "One, the other way round"},
+            titles={"1": "One", "2": "Two", "3": "Three", "0.5": "Half a turn", "-1": "One, reversed"},
             flags=(Flag("--turns"),),
         ),
     ] = 1.0
@@ -74,7 +74,7 @@ class Turntable(Declared, frozen=True):
     radius: Annotated[
         float | None,
         option(
-            "Distance of the turntable to the middle, in scene units",
+            "Distance of the turntable from the centre, in scene units",
             "Distance",
             low=1e-9,
             high=1e9,
@@ -89,9 +89,7 @@ class VideoJob(Job, frozen=True):
 
     kind: ClassVar[str] = "video"
     title: ClassVar[str] = "Video"
-    about: ClassVar[str] = (
-        "A video or pictures from a camera of the capture, along a camera path, or all around the scene."
-    )
+    about: ClassVar[str] = "A video or pictures from a camera of the capture, along a camera path, or around the scene."
     work: ClassVar[str] = "app.export.video.video_export"
     command: ClassVar[str] = "render"
     has_step: ClassVar[bool] = False
@@ -141,10 +139,10 @@ class VideoJob(Job, frozen=True):
                 "color": ("Colour", ""),
                 "depth": ("Depth", "distance along the viewing axis"),
                 "opacity": ("Opacity", "how much of what lies behind is covered"),
-                "change": ("Change", "what differs from the moment before, seen from the same place"),
+                "change": ("Change", "what changed since the previous moment, seen from the same place"),
                 "compare": (
                     "Truth, render, error",
-                    "what the camera took, the render, and the error between them, side by side",
+                    "the captured picture, the render, and the error between them, side by side",
                 ),
             },
             flags=(Flag("--show"),),
@@ -157,7 +155,7 @@ class VideoJob(Job, frozen=True):
             "Size",
             low=1,
             high=MAX_SIDE_PX,
-            none="those of the capture",
+            none="as captured",
             titles={"": "{} x {}"} | {f"{w}x{h}": f"{w} x {h}" for w, h in ((1280, 720), (1920, 1080), (3840, 2160))},
             writing=SIZE,
         ),
@@ -165,37 +163,37 @@ class VideoJob(Job, frozen=True):
     fps: Annotated[
         float | None,
         option(
-            "Pictures per second; what takes a second in the scene takes a second in the video",
+            "Pictures per second; does not change how fast the scene plays",
             "Rate",
             low=0.1,
             high=1000.0,
-            none="those of the capture",
-            titles={"": "{:g} per second"} | {rate: rate for rate in ("24", "25", "30", "50", "60")},
+            none="as captured",
+            titles={"": "{:.5g} per second"} | {rate: rate for rate in ("24", "25", "30", "50", "60")},
         ),
     ] = None
     speed: Annotated[
         float,
         option(
-            "How fast the scene runs; 0.25 is four times slower than it was",
+            "Playback speed of the scene; 0.25 is four times slower",
             "Speed",
             low=0.001,
             high=1000.0,
-            titles={"1": "As it happened", "0.5": "Half", "0.25": "A quarter", "0.125": "An eighth", "2": "Double"},
+            titles={"1": "Normal", "0.5": "Half", "0.25": "A quarter", "0.125": "An eighth", "2": "Double"},
         ),
     ] = 1.0
     hold: Annotated[
         float | None,
         option(
-            "The scene stands still at this frame, while the camera moves",
+            "Freezes the scene at this frame while the camera moves",
             "Time",
-            titles={"": "Runs", STILL: "Stands still at frame {}"},
+            titles={"": "Runs", STILL: "Frozen at frame {}"},
             like="FRAME",
         ),
     ] = None
     supersampling: Annotated[
         int,
         option(
-            "Draws pictures so many times as large along both sides, and reduces them",
+            "Draws pictures this many times larger along both sides, then scales them down",
             "Smoothing",
             low=1,
             high=8,
@@ -210,14 +208,14 @@ class VideoJob(Job, frozen=True):
     is_transparent: Annotated[
         bool,
         option(
-            "No background: keeps the opacity of the scene, which OpenEXR does in any case",
+            "No background: keeps the opacity of the scene; OpenEXR always does",
             flags=(Flag("--transparent", constant=True),),
         ),
     ] = False
     sound: Annotated[
         str | None,
         option(
-            "The sound that this camera recorded goes along",
+            "Adds the sound recorded by this camera",
             "Sound",
             titles={"": "None", "*": "Camera {}"},
             names="cameras",
@@ -227,9 +225,9 @@ class VideoJob(Job, frozen=True):
     features: Annotated[
         Literal["both", "static", "dynamic"],
         option(
-            "Shows what the static or the dynamic features of the anchors carry",
+            "Shows only what the static or dynamic features of the anchors carry",
             "Features",
-            answers={"both": ("Both", ""), "static": ("Static alone", ""), "dynamic": ("Dynamic alone", "")},
+            answers={"both": ("Both", ""), "static": ("Static only", ""), "dynamic": ("Dynamic only", "")},
         ),
     ] = "both"
     has_edits: Annotated[bool, EDITS] = True
@@ -302,7 +300,7 @@ class VideoJob(Job, frozen=True):
         if self.frames is not None and (self.frames.step != 1 or not self.frames):
             raise ProjectError("A video has frames without gaps, at least one.", hint="Give a range without step.")
         if self.turntable is not None and not self.turntable.n_turns:
-            raise ProjectError("A turntable of 0 turns stands still.", hint="Give a number of turns, such as 1.")
+            raise ProjectError("A turntable of 0 turns does not move.", hint="Give a number of turns, such as 1.")
         if self.is_transparent and not kind.can_be_transparent:
             others = ", ".join(name for name, other in FORMATS.items() if other.can_be_transparent)
             raise ProjectError(f"{kind.label} has no transparency.", hint=f"Formats that have it are {others}.")
@@ -310,22 +308,22 @@ class VideoJob(Job, frozen=True):
             raise ProjectError("Only pictures in colour can be transparent.", hint="Leave one of the two out.")
         if self.format == "exr" and self.background != (0, 0, 0):
             raise ProjectError(
-                "OpenEXR files keep the opacity of the scene, so that nothing is behind it.",
+                "OpenEXR files keep the opacity of the scene and have no background.",
                 hint="Leave the background out.",
             )
         if self.sound is not None and kind.sound_codec is None:
             raise ProjectError(f"{kind.label} cannot hold sound.", hint="Write an mp4 or a webm file.")
         if self.shows == "compare" and (self.camera is None or self.hold is not None):
             raise ProjectError(
-                "Side by side with the truth there is only what a camera of the capture took, frame by frame.",
+                "Side by side with the truth needs a camera of the capture, frame by frame.",
                 hint="Look through a camera, and leave the hold out.",
             )
         if self.shows == "compare" and self.size is not None:
             raise ProjectError(
-                "Side by side, pictures have the size in which the camera took them.", hint="Leave the size out."
+                "Side by side, pictures have the size of the captured pictures.", hint="Leave the size out."
             )
         if self.shows == "compare" and self.format == "exr":
-            raise ProjectError("Three pictures side by side hold no numbers for OpenEXR.", hint="Write PNG files.")
+            raise ProjectError("OpenEXR cannot hold three pictures side by side.", hint="Write PNG files.")
 
 
 def _without(question: Question, *values: float) -> Question:

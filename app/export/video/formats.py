@@ -79,9 +79,8 @@ def check_codecs(name: str, *, needs_sound: bool = False) -> None:
     if missing:
         others = [other for other in FORMATS if not missing_codecs(other, needs_sound=needs_sound)]
         raise MissingCodecError(
-            f"{FORMATS[name].label} cannot be written here: FFmpeg, as PyAV brings it along, was built without "
-            f"{' and '.join(missing)}.",
-            hint=f"What can be written is {', '.join(others)}.",
+            f"{FORMATS[name].label} cannot be written here: PyAV's FFmpeg was built without {' and '.join(missing)}.",
+            hint=f"Available: {', '.join(others)}.",
         )
 
 

@@ -95,7 +95,7 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     moments = moments_of(runs, step, job.hold)
     if job.shows == "compare" and not all(moment.is_whole for moment in moments):
         raise ProjectError(
-            "Side by side with the truth there are only frames of the capture, not moments between them.",
+            "Side by side with the truth is possible at captured frames only, not between them.",
             hint="Leave speed and rate out.",
         )
     size = capture.picture_size if job.size is None else job.size
@@ -132,7 +132,7 @@ def _runs(job: VideoJob, scene: SceneFrames, path: CameraPath | None) -> list[ra
     first, stop = job.frames.start, job.frames.stop
     if not 0 <= first < stop <= n_frames:
         raise ProjectError(
-            f"Frames {first}:{stop} were asked for, of which the capture does not have all.",
+            f"Frames {first}:{stop} were asked for, not all of which are in the capture.",
             hint=f"It has frames 0 to {n_frames - 1}.",
         )
     return [job.frames]
@@ -148,7 +148,7 @@ def _frames_of(path: CameraPath, n_frames: int | None) -> range:
         start, stop = max(start, 0), min(stop, n_frames)
     if start >= stop:
         raise ProjectError(
-            f"The camera path {shown(path.name)} goes from {first:g} to {last:g}, where the capture has no frames.",
+            f"The camera path {shown(path.name)} goes from {first:g} to {last:g}, outside the frames of the capture.",
             hint="Move its keys, or choose frames.",
         )
     return range(start, stop)
@@ -187,7 +187,7 @@ def _sound(job: VideoJob, capture: Capture, runs: list[range]) -> tuple[tuple[Pa
         return None, ()
     source = sound_source(capture, _camera(capture, job.sound), runs[0].start)
     if job.speed != 1.0:
-        return None, (f"The sound is left out, because the scene runs at {job.speed:g} times its speed.",)
+        return None, (f"The sound is left out, because the scene plays at {job.speed:g} times its speed.",)
     if job.hold is not None:
         return None, ("The sound is left out, because time stands still.",)
     if len(runs) > 1:

@@ -12,6 +12,7 @@ from app.export.video.formats import FORMATS
 from app.export.video.plan import VideoPlan, plan_video
 from app.export.video.render import render_video
 from engine.progress import Progress
+from engine.text import rate_text
 
 
 def estimate(opened: TrainedProject, job: VideoJob) -> ExportEstimate:
@@ -20,7 +21,8 @@ def estimate(opened: TrainedProject, job: VideoJob) -> ExportEstimate:
     kind, (width, height) = FORMATS[job.format], plan.picture_size
     n_pictures = len(plan.moments)
     n_bytes = round(kind.bytes_per_pixel * width * height * n_pictures)
-    said = f"{n_pictures:,} pictures of {width} x {height}, {plan.fps:g} per second: {n_pictures / plan.fps:.1f} s."
+    length = f"{rate_text(plan.fps)} per second: {n_pictures / plan.fps:.1f} s."
+    said = f"{n_pictures:,} pictures of {width} x {height}, {length}"
     return ExportEstimate(n_pictures if kind.is_sequence else 1, n_bytes, (said, *plan.notes))
 
 

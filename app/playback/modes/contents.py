@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from engine.raster.gaussians import Gaussians
 
 OF_REFERENCE, LEARNED_ON, BORN_HERE = 0, 1, 2
-"""Births: from the reference clip as it was; from it, but learned on in this clip; new in this clip."""
+"""Births: from the reference clip as it was; from it, but trained further in this clip; new in this clip."""
 _SAME_PLACE_SHARE = 1e-2
 """Anchors nearer to each other than this share of their spacing are the same anchor, stored twice."""
 

@@ -50,7 +50,7 @@ _NORMAL_LEGEND = (
     ((0.5, 0.5, 1.0), "blue: faces the camera (-z)"),
 )
 _BIRTH_LEGEND = tuple(
-    zip(BIRTH_HUES, ("from the reference clip", "from it, learned on here", "born in this clip"), strict=True)
+    zip(BIRTH_HUES, ("from the reference clip", "from it, trained further", "born in this clip"), strict=True)
 )
 
 MODES = MappingProxyType(
@@ -61,7 +61,7 @@ MODES = MappingProxyType(
             ViewMode(
                 "depth",
                 "Depth",
-                "Distance along the viewing axis: depth of what blends, divided by its opacity",
+                "Distance along the viewing axis: blended depth divided by opacity",
                 "scene units",
                 "viridis",
                 is_picture=True,
@@ -77,18 +77,18 @@ MODES = MappingProxyType(
             ViewMode(
                 "ellipsoids",
                 "Ellipsoids",
-                "Every Gaussian as a solid body at a fixed share of its spread",
+                "Every Gaussian as a solid ellipsoid",
                 is_picture=True,
             ),
             ViewMode(
                 "overdraw",
                 "Overdraw",
-                "How many Gaussians blend in a pixel: what drawing costs",
+                "How many Gaussians blend in a pixel, which is what drawing costs",
                 "Gaussians",
                 "inferno",
                 is_picture=True,
             ),
-            ViewMode("anchors", "Anchors", "Anchors alone, as small balls in the colour of what they are"),
+            ViewMode("anchors", "Anchors", "Only anchors, as small balls coloured by kind"),
             ViewMode(
                 "birth",
                 "Birth clip",
@@ -125,8 +125,8 @@ CONTENTS = MappingProxyType(
             Content(ALL, "Everything", "All Gaussians with all features"),
             Content("static", "Static only", "Only Gaussians without a dynamic feature"),
             Content("dynamic", "Dynamic only", "Only Gaussians with a dynamic feature"),
-            Content("f_s", "f_s only", "Dynamic features set to zero: what does not depend on time"),
-            Content("f_d", "f_d only", "Static features set to zero: what the field alone adds to the cloud's colours"),
+            Content("f_s", "f_s only", "Dynamic features set to zero: only what does not depend on time"),
+            Content("f_d", "f_d only", "Static features set to zero: only what the field adds to the cloud's colours"),
         )
     }
 )

@@ -16,8 +16,8 @@ from engine.training.preparation.stages import stage_files
 WHAT = {
     "oldest": "the oldest version of every clip",
     "versions": "all earlier versions",
-    "checkpoints": "what was learned in trainings that were stopped",
-    "unused": "clips of other cuts of the capture, and damaged files that were put aside",
+    "checkpoints": "progress of stopped trainings",
+    "unused": "clips of other cuts, and damaged files that were put aside",
 }
 """What can be freed, in words."""
 

@@ -48,7 +48,7 @@ def put_in_place(project: Project, record: MendRecord, drafts: Mapping[int, Path
     for clip in record.clips:
         if _fingerprint(project, clip.clip_index) != clip.before:
             raise ProjectError(
-                f"Clip {clip.clip_index} was trained or brought back while it was mended; it was left as it is.",
+                f"Clip {clip.clip_index} was trained or restored while it was mended, and was not changed.",
                 hint="Mend it again.",
             )
         header = read_clip_header(drafts[clip.clip_index])
@@ -88,7 +88,7 @@ def take_back(project: Project, record: MendRecord) -> None:
     project.check_writable()
     reason = why_not_back(project, record)
     if reason:
-        raise ProjectError(reason, hint="The versions in the clip's menu say what can come back.")
+        raise ProjectError(reason, hint="The clip's menu lists the versions that can be restored.")
     record = as_cut_now(project, record)
     unfinished = records_dir(project) / UNFINISHED
     write_record(unfinished, record)  # killed in between, it is taken back to the end when the project is opened
@@ -116,7 +116,7 @@ def why_not_back(project: Project, record: MendRecord) -> str:
     """Why what was mended cannot be taken back; empty where it can."""
     for clip in as_cut_now(project, record).clips:
         if _fingerprint(project, clip.clip_index) != clip.after:
-            return f"Clip {clip.clip_index} was trained or brought back since it was mended."
+            return f"Clip {clip.clip_index} was trained or restored since it was mended."
         if version_before(project, clip) is None:
             return f"The version of clip {clip.clip_index} from before it was mended is gone."
     return ""

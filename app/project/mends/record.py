@@ -120,7 +120,7 @@ def write_record(path: Path, record: MendRecord) -> None:
     try:
         path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
     except OSError as error:
-        raise disk_error(error, what="The record of what was mended", path=path) from error
+        raise disk_error(error, what="The mending record", path=path) from error
     write_kept(path, kept_text({"schema": SCHEMA, **to_builtins(record, str_keys=True)}))
 
 
@@ -130,13 +130,13 @@ def read_record(path: Path) -> MendRecord | None:
     Raises:
         ProjectError: It is damaged, or of another schema.
     """
-    content = read_kept(path, "The record of what was mended", hint=_HINT)
+    content = read_kept(path, "The mending record", hint=_HINT)
     if content is None:
         return None
     if content.pop("schema", None) != SCHEMA:
-        raise ProjectError("The record of what was mended is of another schema.", hint=_HINT, path=path)
+        raise ProjectError("The mending record is of another schema.", hint=_HINT, path=path)
     try:
         return to_type(content, MendRecord)
     except EntryError as error:
-        message = f"The record of what was mended has a missing or wrong entry ({error})."
+        message = f"The mending record has a missing or wrong entry ({error})."
         raise ProjectError(message, hint=_HINT, path=path) from error

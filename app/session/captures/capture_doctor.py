@@ -150,6 +150,6 @@ class CaptureDoctor:
             self._reopen(OpenCapture(folder, is_new_project=True, follow_links=follow_links))
 
         def failed(error: Exception) -> None:
-            self._notices.add_failure("The correction cannot be written", error)
+            self._notices.add_failure("The correction could not be written", error)
 
         self._jobs.start("Correcting the capture", work, done, failed)

@@ -68,7 +68,7 @@ class SynchronisationPage:
         lines = [
             f"{row.name}: unknown"
             if row.offset_frames is None
-            else f"{row.name}: {row.offset_frames:+.2f} frames, give or take {row.sigma_frames:.2f}, by {row.source}"
+            else f"{row.name}: {row.offset_frames:+.2f} frames ± {row.sigma_frames:.2f}, by {row.source}"
             for row in self.rows
         ]
         return "\n".join([*lines, *self.notes, *self.disagreements])

@@ -145,9 +145,9 @@ class ClipWork:
             if question.n_bytes:
                 self._ask(question)
             else:
-                self._notices.add("info", "There is nothing to free", f"Asked for: {question.words}.")
+                self._notices.add("info", "Nothing to free", f"Requested: {question.words}.")
 
-        self._jobs.start("Looking for what can go", work, done, self._failed("That could not be looked up"))
+        self._jobs.start("Looking for files to delete", work, done, self._failed("The disk use could not be read"))
 
     def _free(self, what: str, clip_index: int | None) -> None:
         opened, service = self._opened, self._live.service
@@ -157,7 +157,7 @@ class ClipWork:
         project.check_writable()
         if what == "checkpoints" and running is not None and clip_index in (None, running):
             raise ProjectError(
-                f"Clip {running} trains at the moment, and keeps what it has learned there.",
+                f"Clip {running} is training and keeps its progress there.",
                 hint="Wait until it is finished.",
             )
 
@@ -171,7 +171,7 @@ class ClipWork:
                     service.catalog.update(index)
             self._notices.add("info", f"{size_text(n_bytes / 1e6)} are free now")
 
-        self._jobs.start("Making room", work, done, self._failed("The files could not be removed"))
+        self._jobs.start("Freeing disk space", work, done, self._failed("The files could not be removed"))
 
     # ---------------------------------------------------------------- damage
 
@@ -213,7 +213,10 @@ class ClipWork:
             return DamagedQuestion(clip_index, reason, version, text, why, outdated, seconds)
 
         self._jobs.start(
-            f"Looking for what clip {clip_index} was before", work, self._ask, self._failed("That could not be read")
+            f"Looking for earlier versions of clip {clip_index}",
+            work,
+            self._ask,
+            self._failed("The versions could not be read"),
         )
 
     # ---------------------------------------------------------------- dependencies
@@ -328,7 +331,7 @@ def recoverable(project: Project, clip_index: int) -> tuple[int | None, str, str
     if version is None or version.header is None:
         found = list_versions(project, clip_index)
         if not found:
-            return None, "", "The clip was trained only once, so that there is nothing before it."
+            return None, "", "The clip was trained only once and has no earlier version."
         header = found[0].header
         return None, "", found[0].damage if header is None else why_not(project, clip_index, header)
     figures = version.header.figures

@@ -55,7 +55,7 @@ class Permanence:
             return find_deletions(project, clips, report, edits=edits)
 
         if not command.is_confirmed:
-            self._jobs.start("Looking for what is deleted everywhere", find, self._found, self._failed)
+            self._jobs.start("Looking for deleted anchors", find, self._found, self._failed)
             return
 
         def work(context: JobContext) -> StagedClips:
@@ -65,7 +65,7 @@ class Permanence:
         def staged(result: StagedClips) -> None:
             self._exchange(result, opened, service)
 
-        self._jobs.start("Writing clips without what is deleted", work, staged, self._failed)
+        self._jobs.start("Rewriting clips", work, staged, self._failed)
 
     def check_idle(self) -> None:
         """See that nothing is applied at the moment.
@@ -74,9 +74,7 @@ class Permanence:
             ProjectError: Something is.
         """
         if self._is_busy:
-            raise ProjectError(
-                "Deletions are being applied to the clips as they are now.", hint="Wait until that is done."
-            )
+            raise ProjectError("Deletions are being applied to the clips.", hint="Wait until they are applied.")
 
     def _found(self, deletions: Deletions) -> None:
         self._is_busy = False
@@ -87,7 +85,7 @@ class Permanence:
             self._notices.add(
                 "info",
                 "Nothing can be applied permanently",
-                "No anchor is deleted as a whole in all frames of its clip. The edits stay, and hold as before.",
+                "No anchor is fully deleted in all frames of its clip. The edits stay in the stack.",
             )
 
     def _exchange(self, staged: StagedClips, opened: OpenedProject, service: TrainingService) -> None:
@@ -95,13 +93,13 @@ class Permanence:
         try:
             _check_idle(service)
             if self._document.project is not project or content is None or content.edits != staged.before:
-                raise ProjectError("The edits have changed meanwhile.", hint="Apply them again.")
+                raise ProjectError("The edits have changed in the meantime.", hint="Apply them again.")
             self._n_done += 1
             step = (NAME, self._n_done)
             if staged.during != staged.before:
                 self._document.change(replace(content, edits=staged.during), NAME, merge=step)
                 if not self._document.settle():  # it has to be on disk before the clips are others
-                    raise ProjectError("What was edited could not be kept yet.", hint="Apply them again in a moment.")
+                    raise ProjectError("Recent edits are not saved yet.", hint="Apply them again in a moment.")
         except EngineError as error:
             give_up_exchange(project.folder)
             self._failed(error)
@@ -119,7 +117,7 @@ class Permanence:
                     self._document.change(after, NAME, merge=step)
             for clip_index in staged.clip_indices:
                 service.catalog.update(clip_index)
-            self._notices.add("info", "Deletions are applied permanently", staged.text())
+            self._notices.add("info", "Deletions were applied permanently", staged.text())
 
         self._jobs.start("Exchanging clips", work, done, self._failed)
 
@@ -134,6 +132,6 @@ class Permanence:
 def _check_idle(service: TrainingService) -> None:
     if service.running_clip is not None:
         raise ProjectError(
-            f"Clip {service.running_clip} trains at the moment, and would not fit the clips that are written.",
-            hint="Let the training end, or stop it: what was learned is kept.",
+            f"Clip {service.running_clip} is training and would not match the rewritten clips.",
+            hint="Let training end, or stop it; progress is kept.",
         )

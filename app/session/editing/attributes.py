@@ -48,7 +48,7 @@ ATTRIBUTES = MappingProxyType(
                 "Birth",
                 choices=(
                     (OF_REFERENCE, "from the reference clip"),
-                    (LEARNED_ON, "from it, learned on here"),
+                    (LEARNED_ON, "from the reference, trained further"),
                     (BORN_HERE, "born in this clip"),
                 ),
             ),

@@ -155,13 +155,13 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
             merge = ("label", kind, name, gesture) if gesture else None
             return Change(note_changes.set_label(document, kind, name, text), f"label a {kind}", merge)
         case c.SetUp(direction=direction):
-            return Change(world_changes.set_up(document, direction), "set what is up")
+            return Change(world_changes.set_up(document, direction), "set up")
         case c.SetUpByGround(points=points, toward=toward):
             up = world_changes.up_of_ground(points, toward)
-            return Change(world_changes.set_up(document, up), "set what is up by the ground")
+            return Change(world_changes.set_up(document, up), "set up from the ground")
         case c.SetScaleByLength(a=a, b=b, length_m=length_m):
             meters_per_unit = world_changes.scale_of_length(a, b, length_m)
-            return Change(world_changes.set_scale(document, meters_per_unit), "set the scale by a length")
+            return Change(world_changes.set_scale(document, meters_per_unit), "set the scale from a length")
         case c.SetScale(meters_per_unit=meters_per_unit):
             return Change(world_changes.set_scale(document, meters_per_unit), "set the scale")
 

@@ -148,12 +148,12 @@ class KeptDocument:
             ProjectError: Not now; says why.
         """
         if self._project is None:
-            raise ProjectError("No capture is open.", hint="Open a capture first; its project keeps what is edited.")
+            raise ProjectError("No capture is open.", hint="Open a capture first; its project keeps the edits.")
         self._project.check_writable()
         if self._problem:
             raise ProjectError(self._problem)
         if self._awaited is not None:
-            raise ProjectError("The project file is being read again.", hint="Try again in a moment.")
+            raise ProjectError("The project file is being reloaded.", hint="Try again in a moment.")
         return self._project
 
     def why_not(self) -> str:

@@ -150,11 +150,11 @@ class Selecting:
             return
         gaussians = self._shown.selectable()
         if gaussians is None or gaussians.rows is None:
-            raise ProjectError("There are no Gaussians to select here.", hint="Go to a frame that is trained.")
+            raise ProjectError("No Gaussians to select here.", hint="Go to a frame that is trained.")
         anchors = None
         if isinstance(command, SelectByAttribute):
             if command.attribute not in ATTRIBUTES:
-                raise ProjectError(f"There is no attribute {command.attribute!r} to select by.")
+                raise ProjectError(f"{command.attribute!r} is not an attribute.")
             anchors = self._residuals_of(command.attribute)
         elif isinstance(command, SelectAnchor):
             anchors = self._shown.anchor_values("")

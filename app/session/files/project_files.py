@@ -84,16 +84,16 @@ class ProjectFiles:
         def work(context: JobContext) -> SaveAsQuestion:
             return SaveAsQuestion(project.folder, _free_name(project.folder), copy_bytes(project.folder))
 
-        self._start("Looking at the project", work, self._ask)
+        self._start("Reading the project", work, self._ask)
 
     def _save(self, project: Project, folder: Path) -> None:
         if self._saving is not None and self._saving.is_running:
-            raise ProjectError("The project is being saved already.", hint="Wait until that has ended, or cancel it.")
+            raise ProjectError("The project is being saved already.", hint="Wait until it is saved, or cancel.")
         self._settle()
 
         def saved(result: None) -> None:
             self._ask(None)
-            self._notices.add("info", "The project was saved", f"It goes on in {folder}.", "")
+            self._notices.add("info", "The project was saved", f"It is now in {folder}.", "")
             self._open_project(OpenProject(folder))
 
         def failed(error: Exception) -> None:
@@ -117,7 +117,7 @@ def _checked(project: Project | None, *, is_training: bool) -> Project:
     if project is None:
         raise ProjectError("No project is open.", hint="Open one first.")
     if is_training:
-        raise ProjectError("A clip is being trained.", hint="Wait until it has ended, or stop the training first.")
+        raise ProjectError("A clip is being trained.", hint="Wait until it has ended, or stop training first.")
     return project
 
 

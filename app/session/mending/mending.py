@@ -76,7 +76,7 @@ class Mending:
             ProjectError: Something is.
         """
         if self.is_busy:
-            raise ProjectError("Clips are being mended as they are now.", hint="Wait for it, or stop it first.")
+            raise ProjectError("Clips are being mended.", hint="Wait for it, or stop it first.")
 
     def apply(self, command: MendCommand, timeline: Timeline) -> None:
         """Carry out a command.
@@ -103,7 +103,7 @@ class Mending:
     def _ask(self, request: MendRequest) -> None:
         opened = self._checked()
         if self.is_busy:
-            raise ProjectError("Something is being mended already.", hint="Wait for it, or stop it.")
+            raise ProjectError("Mending is already running.", hint="Wait for it, or stop it.")
         self._close_page()
         stretch = request.stretch(opened.clips)
         page = MendPage(request, stretch.words, stretch.pairs[0], stretch.clip_indices, why_not=self._why_not(request))
@@ -114,18 +114,18 @@ class Mending:
         stretch = request.stretch(opened.clips)
         project = opened.project
         if not project.is_writable:
-            return "The project is open for reading only, because another program trains into it."
+            return "The project is open read-only, because another program is training it."
         states = ["untrained" if service is None else service.catalog[i].state for i in stretch.clip_indices]
         not_ready = [index for index, state in zip(stretch.clip_indices, states, strict=True) if state != "trained"]
         if not_ready:
             return f"Clip {not_ready[0]} is not trained, or out of date. Train it first."
         if all(index == project.settings.reference_clip for index in stretch.clip_indices):
-            return "These frames lie in the reference clip, which stays as it is: others inherit from it."
+            return "These frames are in the reference clip, which cannot change because others inherit from it."
         config = project.settings.config()
         if config.independent or config.field != "per_clip":
-            return "The clips of this project share nothing, or one field; they cannot be mended one by one."
+            return "The clips of this project share nothing, or one field, so they cannot be mended."
         if self._live.is_busy:
-            return "A clip trains at the moment. Mend when it has ended."
+            return "A clip is being trained. Mend when it has ended."
         return ""
 
     def _estimate(self, clip_indices: tuple[int, ...]) -> float | None:

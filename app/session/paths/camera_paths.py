@@ -79,7 +79,7 @@ class CameraPaths:
 
     def _look_along(self, status: PathsStatus, views: Views, is_on: bool) -> None:
         if is_on and (status.path is None or not status.path.keys):
-            raise ProjectError("There is no camera path with keys to look along.", hint="Add a key first.")
+            raise ProjectError("No camera path with keys to follow.", hint="Add a key first.")
         self._along = (views.current_index, views.current.view) if is_on else None
         self._led = None
 

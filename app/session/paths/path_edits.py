@@ -85,7 +85,7 @@ def edited(status: PathsStatus, command: c.PathEdit, view: OrbitView, timeline: 
         case c.PlaceCameraKey(index=index, center=center, gesture=gesture):
             _, key = _checked_key(status, index)
             if not (np.abs(center) <= MAX_DISTANCE / 2).all():  # NaN is not
-                raise ProjectError("A camera key cannot stand there.")
+                raise ProjectError("A camera key cannot be placed there.")
             return _with_changed_key(status, index, key.at_center(np.array(center)), "move camera key", gesture)
         case c.AimCameraKey(index=index):
             _, key = _checked_key(status, index)
@@ -93,7 +93,7 @@ def edited(status: PathsStatus, command: c.PathEdit, view: OrbitView, timeline: 
         case c.SetCameraKeyFov(index=index, fov_y_rad=fov_y_rad, gesture=gesture):
             _, key = _checked_key(status, index)
             if not MIN_FOV_RAD <= fov_y_rad <= MAX_FOV_RAD:
-                raise ProjectError(f"A field of view of {math.degrees(fov_y_rad):g} degrees cannot be.")
+                raise ProjectError(f"A field of view of {math.degrees(fov_y_rad):g} degrees is not possible.")
             return _with_changed_key(status, index, replace(key, fov_y_rad=fov_y_rad), "lens of camera key", gesture)
 
 

@@ -58,7 +58,7 @@ class RecentProjects:
             self.missing = missing
 
         def failed(error: Exception) -> None:
-            logger.warning("recent projects could not be looked for: %s", error)
+            logger.warning("recent projects could not be read: %s", error)
 
         self._looks.start("Looking for recent projects", lambda context: missing_folders(entries), found, failed)
 

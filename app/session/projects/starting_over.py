@@ -49,7 +49,7 @@ class StartingOver:
         def work(context: JobContext) -> StartOverQuestion:
             return StartOverQuestion(project.folder, training_of(project).words, tuple(PRESETS), now)
 
-        self._jobs.start("Looking at the project", work, self._ask, self._failed)
+        self._jobs.start("Reading the project", work, self._ask, self._failed)
 
     def start(self, opened: OpenedProject, name: str, question: Question | None) -> None:
         """Discard what is trained, and take a preset.

@@ -117,7 +117,7 @@ class WindowMemory:
             write_checked_json(self.path, document)
         except (OSError, EngineError) as error:
             level = logging.DEBUG if self.failure else logging.WARNING  # once is enough
-            logger.log(level, "the look of the window could not be kept (%s) - %s", error, self.path)
+            logger.log(level, "the window layout could not be saved (%s) - %s", error, self.path)
             self.failure = getattr(error, "strerror", None) or str(error)
         self._saved = document
 
@@ -131,7 +131,7 @@ def read_window_memory(path: Path | None = None) -> WindowMemory:
     except FileNotFoundError:
         return memory
     except (OSError, ValueError, EngineError) as error:
-        logger.warning("the look of the window is forgotten, its file is damaged (%s) - %s", error, path)
+        logger.warning("the window layout is lost, its file is damaged (%s) - %s", error, path)
         return memory
     size = found.get("size")
     if isinstance(size, list) and len(size) == 2 and all(_number(side, 1, MAX_SIDE_PX) is not None for side in size):

@@ -1,4 +1,4 @@
-"""Versions: what the clips of the open project were before they were trained again, listed, brought back and removed.
+"""Versions: what the clips of the open project were before they were trained again, listed, restored and removed.
 
 Folders and headers are read on a thread when somebody looks; files are moved by short jobs.
 """
@@ -122,14 +122,14 @@ class Versions:
         project.check_writable()
         if running is not None and (running == clip_index or clip_index == project.settings.reference_clip):
             raise ProjectError(
-                f"Clip {running} trains at the moment, and would not fit what is brought back.",
-                hint="Let the training end, or stop it: what was learned is kept.",
+                f"Clip {running} is training and would not match the restored version.",
+                hint="Let training end, or stop it; progress is kept.",
             )
 
         def work(context: JobContext) -> None:
             clip_versions.restore_version(project, clip_index, number)
 
-        self._start(clip_index, f"Bringing back clip {clip_index}", work, f"Clip {clip_index} is back as it was")
+        self._start(clip_index, f"Restoring clip {clip_index}", work, f"Clip {clip_index} is restored")
 
     def remove(self, clip_index: int, number: int) -> None:
         """Delete a version on a thread."""
@@ -161,7 +161,7 @@ class Versions:
 
         def failed(error: Exception) -> None:
             self._busy.discard(clip_index)
-            title = f"The version of clip {clip_index} could not be " + ("brought back" if told else "removed")
+            title = f"The version of clip {clip_index} could not be " + ("restored" if told else "removed")
             if isinstance(error, EngineError):
                 self._notices.add_error(title, error)
             else:
@@ -181,7 +181,7 @@ def _same_clip(one: VersionsRequest, other: VersionsRequest) -> bool:
 def _stale_text(n: int) -> str:
     if not n:
         return ""
-    return f"{n} {'clip was' if n == 1 else 'clips were'} trained on another version of it and out of date now."
+    return f"{n} {'clip was' if n == 1 else 'clips were'} trained on another version of it and are now out of date."
 
 
 # ---------------------------------------------------------------- on the thread

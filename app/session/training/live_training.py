@@ -105,7 +105,7 @@ class LiveTraining:
         def done(_: None) -> None:
             self._n_ending -= 1
 
-        self._jobs.start("Keeping what was learned", work, done, failed)
+        self._jobs.start("Saving progress", work, done, failed)
 
     @property
     def is_ending(self) -> bool:
@@ -125,8 +125,8 @@ class LiveTraining:
         """
         if self.service is not None and (self.service.worker is not None or self.service.queue):
             raise ProjectError(
-                "Clips are being trained, or wait for it, as they are now.",
-                hint="Stop the training first: what was learned is kept.",
+                "Clips are training or queued.",
+                hint="Stop training first; progress is kept.",
             )
 
     def is_finished(self, clip_index: int) -> bool:
@@ -156,8 +156,8 @@ class LiveTraining:
             self._notices.add(
                 "info",
                 "No clip can be trained next",
-                "What is left is damaged, or needs a clip that is.",
-                "Restore the damaged file from a copy, or train the clip again: right-click it in the timeline.",
+                "The remaining clips are damaged, or need a damaged clip.",
+                "Restore the damaged file from a backup, or train the clip again: right-click it in the timeline.",
             )
         else:
             self._notices.add("info", "Every clip is trained")
@@ -196,12 +196,12 @@ class LiveTraining:
             listed = ", ".join(str(index) for index in dropped[:MAX_LISTED])
             more = f" and {len(dropped) - MAX_LISTED} more" if len(dropped) > MAX_LISTED else ""
             them = "Clip" if len(dropped) == 1 else "Clips"
-            verb = "waits no more: it needs" if len(dropped) == 1 else "wait no more: they need"
+            verb = "left the queue: it needs" if len(dropped) == 1 else "left the queue: they need"
             self._notices.add("warn", f"{them} {listed}{more} {verb} a clip that is not trained")
 
     def tell_nothing_open(self) -> None:
         """Tell the user that no capture is open."""
-        self._notices.add("warn", "There is nothing to train yet", "No capture is open.", "Open a capture folder.")
+        self._notices.add("warn", "Nothing to train yet", "No capture is open.", "Open a capture folder.")
 
     def pause(self) -> None:
         """Hold the running training where it is."""

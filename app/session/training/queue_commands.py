@@ -73,9 +73,9 @@ class QueueCommands:
             more = f" and {len(left_out) - MAX_LISTED} more" if len(left_out) > MAX_LISTED else ""
             self._notices.add(
                 "warn",
-                f"{len(left_out)} {'clip is' if len(left_out) == 1 else 'clips are'} left out of the training",
-                f"Damaged, or in need of a clip that is: {listed}{more}.",
-                "Restore the damaged file from a copy, or train that clip again: right-click it in the timeline.",
+                f"{len(left_out)} {'clip is' if len(left_out) == 1 else 'clips are'} left out of training",
+                f"Damaged, or in need of a damaged clip: {listed}{more}.",
+                "Restore the damaged file from a backup, or train that clip again: right-click it in the timeline.",
             )
         elif service.worker is None and not service.queue:
             self._notices.add("info", "All of these clips are trained")

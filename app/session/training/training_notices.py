@@ -14,7 +14,7 @@ def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
             figure = "" if psnr is None else f"{psnr_words(psnr, is_whole=False).capitalize()}."
             notices.add("info", "A clip is trained" if clip_index is None else f"Clip {clip_index} is trained", figure)
         case TrainingStopped(path=path, step=step):
-            detail = f"What was learned in {step} steps is kept." if path else "Nothing was learned yet."
+            detail = f"Progress of {step} steps is kept." if path else "No progress yet."
             notices.add("info", "Training stopped", detail)
         case WarningRaised(title=title, detail=detail, hint=hint):
             notices.add("warn", title, detail, hint)
@@ -26,7 +26,7 @@ def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
                 "error",
                 "The training process ended unexpectedly",
                 f"{_exit_words(exit_code)} {last}",
-                "Train the clip again; it goes on from what was kept.",
+                "Train the clip again; it resumes from its saved progress.",
             )
         case _:
             pass

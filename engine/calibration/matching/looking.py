@@ -21,7 +21,7 @@ USUAL_S = 5.0
 LOOKING = arrays_kind(
     "engine.calibration.matching.looking:LOOKING",
     "engine.calibration.matching.features_child:main",
-    "the process that looks",
+    "the process that finds key points",
 )
 _may_begin = Semaphore(MAX_PROCESSES)
 
@@ -56,7 +56,7 @@ def key_points(pictures: CameraPictures, name: str, advance: Callable[[float], N
         try:
             found = work_on_arrays(LOOKING, arrays, alive=tell)
         except ChildFailed as error:
-            hint = "Try again; if it happens again, look at the memory that is left."
+            hint = "Try again; if it happens again, check free memory."
             raise PreparationError(f"Key points of {name} could not be found: {error}.", hint=hint) from error
     advance(1.0 - told)
     return KeyPoints(found["pixels"], found["moments"], found["descriptors"])

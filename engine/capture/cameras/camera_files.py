@@ -121,7 +121,7 @@ def missing_frames(names: Sequence[str], found: CameraFrames, path: Path) -> lis
     problems = list(found.problems.values())
     missing = [shown(name) for name in names if name not in found.files and name not in found.problems]
     if missing:
-        text = f"There are no frames for {len(missing)} of {len(names)} cameras: {shortened(missing)}."
+        text = f"No frames found for {len(missing)} of {len(names)} cameras: {shortened(missing)}."
         if found.left_over:
             text += f" These belong to no camera: {shortened([shown(name) for name in found.left_over])}."
         hint = "Name each video or folder of images as its camera, or take the camera out of the calibration."

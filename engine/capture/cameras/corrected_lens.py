@@ -38,7 +38,7 @@ def lens_of_correction(
     with np.errstate(all="ignore"):
         params, error_px = _fitted(K, size, centre, coefficients)
     if not error_px <= MAX_ERROR_PX:
-        text = f"Its lens cannot be said in OpenCV's model: that is off by {error_px:.3g} px."
+        text = f"Its lens does not fit OpenCV's model: the error is {error_px:.3g} px."
         raise CaptureError(text, hint="Undistort the videos, or calibrate again.", path=path)
     return Lens("opencv", tuple(params.tolist()))
 

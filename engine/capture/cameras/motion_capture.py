@@ -69,7 +69,7 @@ def read_motion_capture(
 
     found, warnings = described_cameras(cameras, search, describe, findings)
     if others:
-        warnings.append(f"{path.name} is read; {others[0].name} would do too.")
+        warnings.append(f"{path.name} is read; {others[0].name} would work, too.")
     return assemble(folder, format_name, found, problems=findings.problems, warnings=warnings, said_in=path)
 
 
@@ -102,8 +102,8 @@ def probe_calibration(folder: Path, suffix: str) -> Probe:
         return Probe(False, lacks=f"no {suffix}")
     if (folder / "images").is_dir() or any(_has_video(folder / place) for place in FRAME_FOLDERS):
         return MATCH
-    hint = "Put the videos beside it or into videos/, and open the folder above."
-    return Probe(False, seen=found[0].relative_to(folder).as_posix(), lacks="no video that goes with it", hint=hint)
+    hint = "Put the videos next to it or into videos/, and open the folder above."
+    return Probe(False, seen=found[0].relative_to(folder).as_posix(), lacks="no matching video", hint=hint)
 
 
 def _has_video(folder: Path) -> bool:

@@ -176,7 +176,7 @@ def _matrix(lines: _Lines, row: int) -> np.ndarray:
     try:
         values = [_number(item) for item in data]
     except ValueError:
-        raise YamlError(f"the matrix in line {row} holds something else than numbers") from None
+        raise YamlError(f"the matrix in line {row} does not hold only numbers") from None
     return np.array(values, dtype=np.float64).reshape(int(rows), int(cols))
 
 
@@ -220,7 +220,7 @@ def _scalar(text: str, row: int) -> str:
         return text[1:end]
     plain = text.split(" #", 1)[0].strip()
     if plain[:1] in _INDICATORS.difference("-"):
-        raise YamlError(f"line {row} has {shown(plain)}, which is not read")
+        raise YamlError(f"line {row} has {shown(plain)}, which is not supported")
     return plain
 
 

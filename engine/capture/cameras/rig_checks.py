@@ -62,9 +62,7 @@ def rig_warnings(rig: CameraRig, extent: float) -> list[str]:
         return warnings
     away = [name for name, cosine in zip(rig.names, _cosines(rig), strict=True) if cosine <= 0]
     if away:
-        warnings.append(
-            f"Cameras that look away from what the others look at: {_listed(away)}. Check their calibration."
-        )
+        warnings.append(f"Cameras that face away from the scene: {_listed(away)}. Check their calibration.")
     return warnings
 
 

@@ -93,7 +93,7 @@ def read_rig(model_folder: Path) -> ModelRig:
         )
     others = _other_models(model_folder)
     if others:
-        rig.warnings.append(f"There are other models beside {model_folder.name}, which are not read: {others}.")
+        rig.warnings.append(f"Other models next to {model_folder.name} are ignored: {others}.")
     return rig
 
 

@@ -100,7 +100,7 @@ def read_model(folder: Path) -> ColmapModel:
 
 def damaged(path: Path, why: str) -> CaptureError:
     """The error for a file of a model that is not what it should be. why: part of a sentence."""
-    return CaptureError(f"The file is damaged or not of COLMAP: {why}.", hint=AGAIN, path=path)
+    return CaptureError(f"The file is damaged or not a COLMAP file: {why}.", hint=AGAIN, path=path)
 
 
 def unreadable(path: Path, error: OSError) -> CaptureError:
@@ -227,7 +227,7 @@ def _decoded(data: bytes, path: Path) -> str:
 
 def _checked_camera(cameras: dict[int, ColmapCamera], camera_id: int, camera: ColmapCamera, path: Path) -> None:
     if camera_id in cameras:
-        raise damaged(path, f"camera {camera_id} is there twice")
+        raise damaged(path, f"camera {camera_id} occurs twice")
     if not (0 < camera.width <= 1 << 30 and 0 < camera.height <= 1 << 30):
         raise damaged(path, f"camera {camera_id} has {camera.width} x {camera.height} pixels")
     cameras[camera_id] = camera

@@ -35,7 +35,7 @@ def check_duplicates(cameras: Mapping[str, CameraFiles]) -> list[CaptureError]:
 def _problem(names: list[str], firsts: list[Path]) -> CaptureError:
     path = firsts[1]
     if os.path.samefile(firsts[0], path):
-        how, hint = f"use the same file, {path.name}", "Give each camera its own file, or take one out."
+        how, hint = f"use the same file: {path.name}", "Give each camera its own file, or take one out."
     else:
         how = f"show the same pictures: {firsts[0].name} and {path.name} hold the same bytes"
         hint = "Copy the right file of each camera, or take one out."

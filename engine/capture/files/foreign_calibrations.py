@@ -8,7 +8,7 @@ from pathlib import Path
 
 from engine.capture.files.folder_contents import MAX_LOOKED_AT
 
-_READ = "put it into the folder or into calibration/, and the videos beside it or into videos/"
+_READ = "put it into the folder or into calibration/, and the videos next to it or into videos/"
 _KINDS = (
     (".qca.txt", "Qualisys", _READ),
     (".xcp", "Vicon", _READ),
@@ -18,8 +18,8 @@ _KINDS = (
     (".pickle", "OpenCap", "pickles are not read: convert it with Pose2Sim"),
     (".psx", "Metashape", "export its cameras from Metashape for COLMAP"),
     (".rcproj", "RealityCapture", "export its cameras from RealityCapture for COLMAP"),
-    ("intri.yml", "EasyMocap", "put it and extri.yml into the folder, and images/ beside them"),
-    ("poses_bounds.npy", "LLFF", "put it into the folder, and the videos beside it"),
+    ("intri.yml", "EasyMocap", "put it and extri.yml into the folder, and images/ next to them"),
+    ("poses_bounds.npy", "LLFF", "put it into the folder, next to the videos"),
     ("transforms.json", "nerfstudio", "open the folder that it lies in"),
 )
 """How the name ends, whose calibration it looks like, what to do. The first that fits counts."""

@@ -73,7 +73,7 @@ def image_files(folder: Path, files: str | Sequence[str], *, follow_links: bool,
         text = f"The folder of {shown(files)} cannot be read ({error.strerror})."
         raise CaptureError(text, hint="Check that it is there and that you may read it.", path=inside) from error
     if not names:
-        raise CaptureError(f"No image fits {shown(files)}.", hint=hint, path=inside)
+        raise CaptureError(f"No image matches {shown(files)}.", hint=hint, path=inside)
     return images_in(folder, directory, names, follow_links=follow_links, named_in=named_in)
 
 

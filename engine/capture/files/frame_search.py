@@ -72,8 +72,8 @@ class FrameSearch:
         where = " or ".join(f"{directory}/" if directory else "the folder" for directory in self._directories)
         there = shortened([place for _, place, _ in self._places])
         raise CaptureError(
-            f"There is no video and no folder of images called {shown(names[0])} in {where}.",
-            hint=f"Name frames as the calibration names cameras; there are {there}." if there else "Add its frames.",
+            f"No video or folder of images is called {shown(names[0])} in {where}.",
+            hint=f"Name frames as the calibration names cameras; found are {there}." if there else "Add its frames.",
             path=self._named_in,
         )
 
@@ -100,10 +100,10 @@ class FrameSearch:
         if found := by_serial(list(cameras), videos):
             note = ""
         elif found := {short[name]: video for name, video in by_pattern(list(short), videos).items()}:
-            note = "Videos are matched by what their names share"
+            note = "Videos are matched by similar names"
         else:
             found = dict(by_order(list(cameras), videos))
-            note = "No video is called as its camera: they are taken in the order of their names, as Pose2Sim does"
+            note = "No video is named after its camera; they are taken in name order, as Pose2Sim does"
         pairs = shortened([f"{name} is {video}" for name, video in found.items()])
         options = {"follow_links": self._follow_links, "named_in": self._named_in}
         paths = {name: place_in(self._folder, video, **options) for name, video in found.items()}
@@ -126,7 +126,7 @@ class FrameSearch:
         by_name = {path.stem: path for path in found}
         lacking = [path.stem for path in frames if path.stem not in by_name]
         if lacking:
-            return None, f"there is no mask of {len(lacking)} of {len(frames)} frames, such as {shown(lacking[0])}"
+            return None, f"no mask for {len(lacking)} of {len(frames)} frames, such as {shown(lacking[0])}"
         return [by_name[path.stem] for path in frames], ""
 
     def _at(self, place: str, *, is_video: bool) -> Files:

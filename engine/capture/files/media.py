@@ -185,7 +185,7 @@ def read_video_header(path: Path) -> VideoHeader:
                 )
             stream = container.streams.video[0]
             if stream.codec_context is None:
-                raise CaptureError("The video is of a kind that is not known.", hint=again, path=path)
+                raise CaptureError("The video has an unknown format.", hint=again, path=path)
             size = (stream.codec_context.width, stream.codec_context.height)
             rate = float(stream.average_rate or 0)
             turn = _read_turn(path, container.format.name)
@@ -197,7 +197,7 @@ def read_video_header(path: Path) -> VideoHeader:
             n_whole = sum(entry.pos + entry.size <= n_bytes for entry in entries)
     except FileNotFoundError as error:
         raise CaptureError(
-            "The video is missing.", hint="Put the file back or take its camera out.", path=path
+            "The video is missing.", hint="Put the file back or remove its camera.", path=path
         ) from error
     except VIDEO_FAULTS as error:
         reason = getattr(error, "strerror", None) or "damaged"
@@ -265,7 +265,7 @@ def read_frame_times(path: Path) -> np.ndarray:
     times_s = np.sort(np.array(found, dtype=np.float64)) * seconds
     if len(times_s) == 0 or (np.diff(times_s) <= 0).any():
         raise CaptureError(
-            "The frames of the video have no times of their own.",
+            "The frames of the video have no timestamps.",
             hint="Copy it into an mp4 file, or give the times of its frames.",
             path=path,
         )

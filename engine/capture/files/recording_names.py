@@ -68,7 +68,7 @@ def by_pattern(names: Sequence[str], videos: Sequence[str]) -> dict[str, str]:
     ]
     if len(fits) > 1:
         of_first = shortened([shown(os.path.basename(by_stem[a + wanted[0] + b][0])) for a, b in fits])
-        text = f"Videos of {len(fits)} recordings fit the cameras: that of {shown(names[0])} may be {of_first}."
+        text = f"Videos of {len(fits)} recordings match the cameras: that of {shown(names[0])} may be {of_first}."
         raise CaptureError(text, hint="Put the videos of one recording and the calibration into a folder of their own.")
     return (
         {} if not fits else {name: by_stem[fits[0][0] + plain + fits[0][1]][0] for name, plain in _pairs(names, wanted)}

@@ -35,7 +35,7 @@ def probe(folder: Path) -> Probe:
             hint = "Put the files cameras.bin and images.bin that COLMAP wrote into sparse/0."
             return Probe(False, f"{place}/", lacks, hint)
     if any((folder / name).is_file() for name in ("database.db", "cameras.bin", "cameras.txt")):
-        hint = "Run COLMAP's mapper and put what it writes into sparse/0."
+        hint = "Run COLMAP's mapper and put its output into sparse/0."
         return Probe(False, "a COLMAP project", "no images.bin or images.txt with poses", hint)
     return Probe(False, lacks="no sparse/0")
 
@@ -56,7 +56,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     rig.problems.extend(missing_frames(names, found, rig.said_in))
     if found.left_over and found.files:
         listed = shortened([shown(name) for name in found.left_over])
-        rig.warnings.append(f"There are frames without a pose in the model, which are not used: {listed}.")
+        rig.warnings.append(f"Frames without a pose in the model are ignored: {listed}.")
     return layout_of(folder, FORMAT, rig, found.files, model_folder, follow_links=follow_links)
 
 

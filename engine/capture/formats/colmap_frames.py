@@ -67,7 +67,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
             "after the other."
         )
     if (folder / "plys").is_dir():
-        rig.warnings.append("plys/ holds clouds that another program made for its clips; only plys/0.ply is of use.")
+        rig.warnings.append("plys/ holds another program's point clouds; only plys/0.ply is used.")
     return layout_of(folder, FORMAT, rig, files, model_folder, follow_links=follow_links, other_points=POINTS)
 
 
@@ -133,5 +133,5 @@ def _files(folder: Path, frames: list[str], rig: ModelRig, *, follow_links: bool
         rig.problems.append(CaptureError(text, hint=hint, path=folder / frames_without[0]))
     if left_over:
         listed_names = shortened([shown(name) for name in sorted(left_over)])
-        rig.warnings.append(f"There are images without a pose in the model, which are not used: {listed_names}.")
+        rig.warnings.append(f"Images without a pose in the model are ignored: {listed_names}.")
     return {name: paths for name, paths in files.items() if name not in missing}

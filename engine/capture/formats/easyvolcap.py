@@ -42,7 +42,7 @@ def probe(folder: Path) -> Probe:
     if not found:
         return Probe(False, lacks=f"no {INTRI} and {EXTRI}")
     other, holds = (EXTRI, "poses") if found == [INTRI] else (INTRI, "intrinsics")
-    return Probe(False, seen=found[0], lacks=f"no {other}", hint=f"Put {other} beside it, which holds the {holds}.")
+    return Probe(False, seen=found[0], lacks=f"no {other}", hint=f"Put {other} next to it; it holds the {holds}.")
 
 
 def read(folder: Path, *, follow_links: bool = False) -> Layout:

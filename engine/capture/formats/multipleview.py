@@ -65,7 +65,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         try:
             if directory is None:
                 hint = "image7.jpg of the model belongs to the folder cam07. Add it or take the image out of the model."
-                raise CaptureError("There is no folder of its frames.", hint=hint, path=rig.said_in)
+                raise CaptureError("Its folder of frames is missing.", hint=hint, path=rig.said_in)
             files[camera.name] = frames_in_folder(folder, directory, follow_links=follow_links, named_in=rig.said_in)
         except CaptureError as error:
             rig.problems.append(error.said_of(f"Camera {shown(camera.name)}"))
@@ -73,9 +73,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     rig.problems.extend(check_equal_counts(counts, {name: folder / folder_of[name] for name in counts}))
     left_over = [name for name in folders if name not in folder_of.values()]
     if left_over:
-        rig.warnings.append(
-            f"There are folders without a pose in the model, which are not used: {shortened(left_over)}."
-        )
+        rig.warnings.append(f"Folders without a pose in the model are ignored: {shortened(left_over)}.")
     for row, camera in enumerate(rig.cameras):  # the user knows the folders, not what they were copied to
         if camera.name in files:
             name = folder_of[camera.name]

@@ -57,8 +57,8 @@ def probe(folder: Path) -> Probe:
             return MATCH
     except OSError:
         pass
-    hint = "Put the videos cam00.mp4 and so on beside it, in the order of its rows, or folders with their frames."
-    return Probe(False, FILE, "no videos and no folders of frames beside it", hint)
+    hint = "Put the videos cam00.mp4 and so on next to it, in the order of its rows, or folders with their frames."
+    return Probe(False, FILE, "no videos or folders of frames next to it", hint)
 
 
 def read(folder: Path, *, follow_links: bool = False) -> Layout:

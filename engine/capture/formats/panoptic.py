@@ -180,7 +180,7 @@ def _check_motionless(name: str, Ks: np.ndarray, poses: np.ndarray, path: Path) 
         return []
     return [
         CaptureError(
-            f'Camera "{name}" moves from frame {int(np.argmin(is_same))} on.',
+            f'Camera "{name}" moves after frame {int(np.argmin(is_same))}.',
             hint="Only cameras that stand still are supported; take this one out.",
             path=path,
         )
@@ -226,8 +226,8 @@ def _read_frames(
     if turned:
         warnings.append(
             f"Images of {len(turned)} cameras have an EXIF entry that turns them for display, such as "
-            f"{turned[0].relative_to(folder)}. They are used as they are stored; if the calibration was made on turned "
-            "ones, save them turned without that entry."
+            f"{turned[0].relative_to(folder)}. They are used as stored; if they were calibrated rotated, save them "
+            "rotated, without that entry."
         )
     return entries, warnings
 

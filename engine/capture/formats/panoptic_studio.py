@@ -49,7 +49,7 @@ def probe(folder: Path) -> Probe:
         hint = "Download the HD videos into hdVideos/ (getData.sh of the Panoptic Toolbox)."
         return Probe(False, seen=paths[0].name, lacks="no hdVideos/ or hdImgs/", hint=hint)
     if has_videos:
-        return Probe(False, seen="hdVideos/", lacks="no calibration_<sequence>.json", hint="Put it beside the folder.")
+        return Probe(False, seen="hdVideos/", lacks="no calibration_<sequence>.json", hint="Put it next to the folder.")
     return Probe(False, lacks="no calibration_<sequence>.json")
 
 
@@ -85,7 +85,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
                 cameras.append(camera)
     if not cameras and not findings.problems:
         text = f"None of the {len(absent)} HD cameras has a video in hdVideos/."
-        findings.add(CaptureError(text, hint="They are called hd_00_00.mp4 and so on.", path=path))
+        findings.add(CaptureError(text, hint="Their names are hd_00_00.mp4 and so on.", path=path))
     cameras.sort(key=lambda camera: natural_key(camera.name))
     said = [f"HD cameras without a video are left out: {shortened(absent)}."] if absent else []
     return assemble(folder, FORMAT, cameras, problems=findings.problems, warnings=said, said_in=path)

@@ -133,18 +133,20 @@ def _warnings(
     if document.get("n_frames") is None:
         n_frames = next(iter(headers.values())).n_frames
         warnings.append(
-            f"{CAMERAS_FILE} does not say n_frames; the {n_frames} frames of the videos are taken. Add it, so that "
+            f"{CAMERAS_FILE} does not state n_frames; the {n_frames} frames of the videos are taken. Add it, so that "
             "videos cut short alike are noticed."
         )
     lying = [name for name, header in headers.items() if not is_turned_as_calibrated(header, sizes[name])]
     if lying:
         warnings.append(
-            f"These videos ask to be turned for display: {shortened(lying)}. Only as they are stored they have the "
-            "size of their calibration, so they are not turned."
+            f"These videos ask to be rotated for display: {shortened(lying)}. Only the stored orientation matches "
+            "their calibration, so they are not rotated."
         )
     unstated = [name for name, header in headers.items() if header.rate <= 0]
     if unstated:
-        warnings.append(f"Videos that state no frame rate: {shortened(unstated)}. The {fps:g} per second of fps holds.")
+        warnings.append(
+            f"Videos that state no frame rate: {shortened(unstated)}. The {fps:g} per second given by fps is used."
+        )
     others = {name: header.rate for name, header in headers.items() if abs(header.rate - fps) > RATE_TOLERANCE * fps}
     others = {name: rate for name, rate in others.items() if rate > 0}
     if others:

@@ -38,7 +38,7 @@ def probe(folder: Path) -> Probe:
         return Probe(False, lacks=f"no {FILE}")
     if _pictures(folder):
         return MATCH
-    hint = "Put the pictures <scene>_undist_<frame>_<camera>.png beside it."
+    hint = "Put the pictures <scene>_undist_<frame>_<camera>.png next to it."
     return Probe(False, seen=FILE, lacks="no pictures named by frame and camera", hint=hint)
 
 
@@ -57,7 +57,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     present = sorted(by_camera)
     unknown = [f"{camera:02d}" for camera in present if camera >= len(rows)]
     if unknown:
-        text = f"The file has {len(rows)} cameras, pictures are there of {shortened(unknown)} too."
+        text = f"The file has {len(rows)} cameras, but there are also pictures of {shortened(unknown)}."
         findings.add(CaptureError(text, hint=HINT, path=path))
     absent = [f"{camera:02d}" for camera in range(len(rows)) if camera not in by_camera]
     times = sorted({frame for frames in by_camera.values() for frame in frames})
@@ -117,7 +117,7 @@ def _rows(path: Path) -> list[list[float]]:
         try:
             rows.append([float(word) for word in words])
         except ValueError as error:
-            raise CaptureError(f"Line {line} holds something else than numbers.", hint=HINT, path=path) from error
+            raise CaptureError(f"Line {line} does not hold only numbers.", hint=HINT, path=path) from error
     return rows
 
 

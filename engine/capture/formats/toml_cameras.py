@@ -83,7 +83,8 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     path, tables, warnings = _calibration(folder)
     for other in calibrations(folder, QUALISYS):
         warnings.append(
-            f"{other.name} is not read, but {path.name}. If Pose2Sim made that of it, its distortions are 64 times too "
+            f"{other.name} is ignored in favour of {path.name}. If Pose2Sim converted it, its distortions are 64 "
+            "times too "
             f"small: take {path.name} away to read the original."
         )
     findings = Findings()
@@ -136,7 +137,7 @@ def _calibration(folder: Path) -> tuple[Path, dict[str, dict[str, Any]], list[st
     if not usable:
         raise fault or CaptureError("No camera in it has matrix, rotation and translation.", path=folder)
     (path, tables), others = usable[0], [other.name for other, _ in usable[1:]]
-    said = [f"{path.name} is read; {shortened(others)} would do too."] if others else []
+    said = [f"{path.name} is read; {shortened(others)} would work, too."] if others else []
     if fault is not None:
         said.append(f"{fault.path.name if fault.path else 'Another file'} is left out: {fault.message}")
     return path, tables, said

@@ -51,7 +51,7 @@ def probe(folder: Path) -> Probe:
         return MATCH
     for name in SPLITS[1:]:
         if (folder / name).is_file():
-            return Probe(False, seen=name, lacks=f"no {SPLITS[0]}", hint=f"Put {SPLITS[0]} beside it.")
+            return Probe(False, seen=name, lacks=f"no {SPLITS[0]}", hint=f"Put {SPLITS[0]} next to it.")
     return Probe(False, lacks=f"no {WHOLE}")
 
 
@@ -165,7 +165,7 @@ def _check_times(groups: Sequence[FrameGroup], place: _Place) -> bool:
         place.findings.add(CaptureError(text, hint="Give a time to all of them or to none.", path=place.path))
         return True
     for fault in time_faults(groups)[1]:
-        hint = "Only cameras that stand still are read, each with a picture at every time."
+        hint = "Cameras must stand still and have a picture at every time."
         text = f"{fault[0].upper()}{fault[1:]}."
         place.findings.add(CaptureError(text, hint=hint, path=place.path))
     return True
@@ -250,7 +250,7 @@ def _points(documents: dict[str, dict[str, Any]], place: _Place, warnings: list[
         return None
     path = place.findings.tried(lambda: place.file(name))
     if path is not None and not path.is_file():
-        warnings.append(f"The point cloud {shown(name)} is not there.")
+        warnings.append(f"The point cloud {shown(name)} is missing.")
         return None
     return path
 

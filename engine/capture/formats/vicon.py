@@ -105,7 +105,7 @@ def _correction(state: XmlElement, principal: np.ndarray, path: Path) -> tuple[n
     newer = state.attributes.get("VICON_RADIAL2", "").split()
     if newer:
         if newer[0] != MODEL:
-            text = f"Its lens is of the model {newer[0][:40]}, which is not known."
+            text = f"Its lens has the unknown model {newer[0][:40]}."
             raise CaptureError(text, hint=f"Calibrate with {MODEL}.", path=path)
         plain = XmlElement("", {"VICON_RADIAL2": " ".join(newer[1:])})
         values = numbers_in(plain, "VICON_RADIAL2", 5, path)

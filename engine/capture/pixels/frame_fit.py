@@ -11,10 +11,10 @@ FrameFit = Literal["scaled", "cropped_end", "cropped_start", "cropped_middle"]
 """Made smaller, or cut off: at the right and lower border, at the left and upper one, or at both by the same."""
 FITS: tuple[FrameFit, ...] = get_args(FrameFit)
 FIT_WORDS: dict[FrameFit, str] = {
-    "scaled": "as they were scaled",
-    "cropped_end": "as they were cropped at the right and lower border",
-    "cropped_start": "as they were cropped at the left and upper border",
-    "cropped_middle": "as they were cropped at both sides by the same",
+    "scaled": "which were scaled",
+    "cropped_end": "which were cropped at the right and lower border",
+    "cropped_start": "which were cropped at the left and upper border",
+    "cropped_middle": "which were cropped equally on both sides",
 }
 SHAPE_TOLERANCE = 0.01
 """Share by which the sides of frames and calibration may differ in proportion without somebody saying why."""

@@ -49,10 +49,10 @@ def with_masks(layout: Layout, folder: Path, *, follow_links: bool) -> Layout:
     n_cameras = len(entries)
     if found:
         which = f"all {n_cameras} cameras" if len(found) == n_cameras else f"{len(found)} of {n_cameras} cameras"
-        said.append(f"{FOLDER}/ has masks of what moves for {which}, which count as motion: {shortened(found)}.")
+        said.append(f"{FOLDER}/ has motion masks for {which}: {shortened(found)}.")
     elif len(said) == len(layout.warnings) and all(entry.masks is None for entry in entries):
         names = shortened([entry.name for entry in entries])
-        said.append(f"The folder {FOLDER} has nothing for any camera; its folders would be called {names}.")
+        said.append(f"The folder {FOLDER} has no masks for any camera; expected folders are {names}.")
     return replace(layout, cameras=tuple(entries), warnings=tuple(said))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from engine.capture.frames import FrameSource, IndexedFrames
 from engine.capture.limits import FPS_RANGE
 from engine.errors import CaptureError
+from engine.text import rate_text
 
 RATE_TOLERANCE = 0.02
 """Share by which the rates of two cameras may differ and still count as the same: 29.97 and 30 do, 25 and 30 do not."""
@@ -62,17 +63,17 @@ class Clock:
         """One or two sentences that say what was made of the recordings, and how well they meet."""
         spread = f"{_seconds_text(self.errors_s.mean())} on average and {_seconds_text(self.errors_s.max())} at worst"
         if self.is_as_recorded:
-            return f"Frames are taken one by one as recorded; cameras miss each other by {spread}."
+            return f"Frames are paired by index; cameras are apart by {spread}."
         n_least, n_most = int(self.n_recorded.min()), int(self.n_recorded.max())
         recorded = f"{n_least}" if n_least == n_most else f"{n_least} to {n_most}"
         spacing = "" if self.is_even else ", unevenly spaced,"
         text = (
-            f"Of {recorded} recorded frames per camera, {self.n_frames} moments at {self.fps:.4g} per second{spacing} "
-            f"are shown by all cameras; the nearest frame of each is taken, off by {spread}."
+            f"Of {recorded} recorded frames per camera, {self.n_frames} moments at {rate_text(self.fps)} per "
+            f"second{spacing} are common to all cameras; the nearest frame of each is used, off by {spread}."
         )
         n_repeated = int((np.diff(self.frame_indices, axis=1) == 0).sum())
         if n_repeated:
-            text += f" {n_repeated} times a camera has no frame of its own for a moment and repeats the one before."
+            text += f" {n_repeated} times a camera has no frame of its own for a moment and repeats the previous one."
         return text
 
     def source(self, camera_index: int, source: FrameSource) -> FrameSource:
@@ -118,9 +119,9 @@ def common_clock(
         late = names[int(np.argmax([times_s[0] for times_s in times]))]
         early = names[int(np.argmin([times_s[-1] for times_s in times]))]
         raise CaptureError(
-            f'There is no moment that all cameras show: camera "{late}" starts {_seconds_text(first - last)} after '
+            f'No moment is common to all cameras: camera "{late}" starts {_seconds_text(first - last)} after '
             f'camera "{early}" has ended.',
-            hint="Correct the time offsets, or take one of these cameras out.",
+            hint="Correct the time offsets, or remove one of these cameras.",
         )
     if fps is not None and abs(fps / slowest - 1) > RATE_TOLERANCE:
         moments = first + np.arange(np.floor((last - first) * fps + 0.5 + 1e-6)) / fps

@@ -27,7 +27,7 @@ def read_frame_times_table(path: Path) -> dict[str, np.ndarray]:
     Raises:
         CaptureError: It cannot be read, has no such columns, or a time that is not a number.
     """
-    hint = f"It needs the columns {CAMERA_COLUMNS[0]} and {TIME_COLUMN}; take it away to do without."
+    hint = f"It needs the columns {CAMERA_COLUMNS[0]} and {TIME_COLUMN}; or remove the file."
     try:
         text = read_bytes(path, max_bytes=MAX_BYTES).decode("utf-8-sig")
     except OSError as error:
@@ -59,5 +59,5 @@ def _time(text: str, line: int, path: Path) -> float:
         time_s = math.nan
     if not math.isfinite(time_s):
         said = f"The time in line {line} is {shown(text)}."
-        raise CaptureError(said, hint="Correct it, or take the file away.", path=path)
+        raise CaptureError(said, hint="Correct it, or remove the file.", path=path)
     return time_s

@@ -38,7 +38,7 @@ def at_common_moments(
         if own is None or n_times != entry.source.n_frames:
             raise CaptureError(
                 f'Camera "{entry.name}" has {entry.source.n_frames} frames, but times of {n_times}.',
-                hint="Correct the file of times, or take it away: frames then count as taken together.",
+                hint="Correct the file of times, or remove it; frames then count as simultaneous.",
                 path=entry.source.path,
             )
         times.append(own)

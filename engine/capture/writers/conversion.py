@@ -54,7 +54,7 @@ def convert(
         DiskError: The disk refused. Nothing is left behind, whatever is raised.
     """
     if out.exists() and not (out.is_dir() and _is_empty(out)):
-        raise CaptureError("There is something under this name already.", hint="Give a new folder.", path=out)
+        raise CaptureError("This name is already taken.", hint="Give a new folder.", path=out)
     try:
         with atomic_folder(out) as partial:
             lines = _write(layout, partial, target, frames=frames, is_binary=is_binary, report=report)
@@ -71,7 +71,7 @@ def _write(
         and frames == "none"
         and any(_is_part_of_a_video(entry, layout) for entry in layout.cameras)
     ):
-        text = "transforms.json cannot say which frames of its videos the capture shows."
+        text = "transforms.json cannot state which frames of the videos the capture uses."
         raise CaptureError(
             text, hint="Write them as pictures with --frames png, or convert to capture.json.", path=folder
         )
@@ -109,11 +109,11 @@ def _unsaid(layout: Layout, target: Target, frames: Frames) -> list[str]:
             lines.append("The list of held-out cameras is not written.")
     if frames == "none" and target == "colmap":
         lines.append(
-            "The image names in the model are placeholders, so that the folder holds cameras and does not open as a "
-            "capture: --frames link makes one that does."
+            "The image names in the model are placeholders, so the folder does not open as a capture; --frames link "
+            "makes one that does."
         )
     elif frames in ("none", "link"):
-        lines.append("Frames stay where they are: open the folder with --follow-links.")
+        lines.append("Frames are not copied; open the folder with --follow-links.")
     return lines
 
 

@@ -96,9 +96,7 @@ def _lens(lens: Lens) -> dict[str, Any]:
         values: tuple[float, ...] = ()
     elif lens.model not in ("opencv", "fisheye") or any(lens.params[len(names) :]):
         hint = "Convert to capture.json or to colmap instead."
-        raise CaptureError(
-            f"transforms.json has no words for its {lens.model} lens with all its parameters.", hint=hint
-        )
+        raise CaptureError(f"transforms.json cannot express all parameters of its {lens.model} lens.", hint=hint)
     else:
         values = lens.params[: len(names)]
     model = "OPENCV_FISHEYE" if lens.model == "fisheye" else "OPENCV"

@@ -150,7 +150,7 @@ def build_moving_cloud(
     points, presence = points[is_kept], presence[is_kept]
     started = time.perf_counter()
     colors = keep(
-        "colours of what moves",
+        "colours of moving points",
         lambda: {"colors": _colors(points, presence, frames, masks, projections, gains, size=size, near=near)},
     )["colors"]
     report(f"Moving cloud: {len(points):,} points, {(~is_kept).sum():,} outliers removed")

@@ -46,7 +46,7 @@ def _finding(name: str, frames: list[int], n_looked_at: int, word: str) -> Findi
         frames=() if is_all else tuple(frames),
         text=f"{name} is {word} in {where}.",
         certainty=0.98,
-        advice="Leave this camera out, or cut the capture so that these frames are not in it.",
+        advice="Leave this camera out, or cut these frames from the capture.",
         fix=Corrections(is_excluded={name: True}),
         evidence=(PictureEvidence(name, frames[0], f"{name}, frame {frames[0]}"),),
     )

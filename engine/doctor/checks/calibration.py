@@ -68,11 +68,9 @@ def check_calibration(
     if unknown:
         text = (
             f"{listed(unknown)} {'shares' if len(unknown) == 1 else 'share'} fewer than {MIN_MATCHES} features with "
-            "the cameras beside, too few to check the calibration."
+            "neighbouring cameras, too few to check the calibration."
         )
-        advice = (
-            "Look at their pictures: plain walls and cameras far apart give few features, which need not be a fault."
-        )
+        advice = "Check their pictures: plain walls and cameras far apart give few features, which may be harmless."
         findings.append(Finding("few features", "note", tuple(unknown), (), text, 1.0, advice))
     return findings
 
@@ -153,7 +151,7 @@ def _finding(
         text=f"{_what(name, fit)}: features miss by {fit.before_px:.1f} px (usual here {usual:.1f} px), after that "
         f"change by {fit.after_px:.1f} px; {fit.n_matches} features shared with {fit.n_partners} cameras.",
         certainty=certainty,
-        advice="Calibrate this camera again, or leave it out: a wrong camera blurs what all others see.",
+        advice="Calibrate this camera again, or leave it out: a wrong camera blurs the whole result.",
         fix=Corrections(is_excluded={name: True}),
         evidence=_worst_pairs(rig, pairs, errors, fit.camera, frame),
     )
@@ -169,7 +167,7 @@ def _what(name: str, fit: Refit) -> str:
         return f"{name} is turned by {turn} against its calibration"
     if fit.model == "rotation and focal":
         return f"{name} is turned by {turn}, and its focal length is {focal}"
-    moved = f"{name} is turned by {turn} and stands {shift} away from where its calibration says"
+    moved = f"{name} is turned by {turn} and is {shift} away from its calibrated position"
     return moved if fit.model == "pose" else f"{moved}, and its focal length is {focal}"
 
 

@@ -64,7 +64,7 @@ def measure_coverage(rig: CameraRig) -> Coverage:
 def check_coverage(rig: CameraRig, coverage: Coverage) -> list[Finding]:
     """Cameras that see what others do not, and gaps between neighbours."""
     if len(rig) < 2:
-        text = "There is only one camera: depth cannot be seen."
+        text = "With only one camera, depth cannot be measured."
         return [Finding("coverage", "error", rig.names, (), text, 1.0, "Training needs at least two cameras.")]
     names = np.array(rig.names)
     found = []
@@ -76,7 +76,7 @@ def check_coverage(rig: CameraRig, coverage: Coverage) -> list[Finding]:
             f"{listed(low)} {counted(low, 'sees', 'see')} much that fewer than {N_OTHERS} others see: of "
             f"{names[worst]}'s picture {100 * coverage.shares[worst]:.0f} % is covered."
         )
-        advice = "Expect little depth there. Turn these cameras towards the scene, or add cameras beside them."
+        advice = "Expect little depth there. Turn these cameras towards the scene, or add cameras next to them."
         found.append(Finding("coverage", "note", low, (), text, 0.8, advice))
     is_far = coverage.nearest_deg > WIDE_DEG
     if is_far.any():
@@ -84,7 +84,7 @@ def check_coverage(rig: CameraRig, coverage: Coverage) -> list[Finding]:
         widest = float(coverage.nearest_deg[is_far].max())
         how_far = f"up to {widest:.0f} degrees from the nearest other camera"
         if widest >= 180.0:
-            how_far = "where no other camera looks the same way"
+            how_far = "with no other camera facing the same way"
         text = f"{listed(far)} {counted(far, 'stands', 'stand')} {how_far}."
         advice = "Surfaces are hard to match over such angles. Cameras 10 to 20 degrees apart give the best depth."
         found.append(Finding("gaps", "note", far, (), text, 0.9, advice))

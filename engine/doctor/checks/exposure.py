@@ -31,7 +31,8 @@ def check_exposure(survey: ExposureSurvey) -> list[Finding]:
                 text=f"The exposure of {len(small)} of {survey.n_cameras} cameras changes by more than "
                 f"{100 * CHANGE_LIMIT:g} %, at most by {100 * most:.1f} %.",
                 certainty=0.9,
-                advice="Nothing: training measures it in every frame and removes it. Next time lock the exposure.",
+                advice="No action needed: training measures and removes it in every frame. Lock the exposure next "
+                "time.",
             )
         )
     return found
@@ -53,7 +54,7 @@ def _large(name: str, curve: ExposureCurve) -> Finding:
         frames=(first, last),
         text=f"The exposure of {name} changes by {100 * float(np.ptp(curve.levels)):.0f} %{color}{step}.",
         certainty=0.85,
-        advice="Training removes what it can; what is cut off at black or white stays lost. Lock exposure and white "
+        advice="Training removes what it can; clipped blacks and whites stay lost. Lock exposure and white "
         "balance next time, or leave this camera out.",
         fix=Corrections(is_excluded={name: True}),
         evidence=(PictureEvidence(name, first, f"{name}, frame {first}"), PictureEvidence(name, last, f"frame {last}")),

@@ -34,7 +34,7 @@ def check_frame_counts(capture: Capture) -> list[Finding]:
                 cameras=short,
                 frames=(),
                 text=f"{listed(short)} {counted(short, 'has', 'have')} {_span(counts[is_short])} frames, most cameras "
-                f"have {usual}; only the {capture.n_frames} frames that all have are used.",
+                f"have {usual}; only the {capture.n_frames} frames they share are used.",
                 certainty=1.0,
                 advice=f"Copy the missing part, or leave {counted(short, 'this camera', 'these cameras')} out: that "
                 f"gives {usual - least} frames more.",
@@ -42,7 +42,7 @@ def check_frame_counts(capture: Capture) -> list[Finding]:
             )
         )
     elif len(set(counts.tolist())) > 1:
-        text = f"Cameras have {_span(counts)} frames; the {capture.n_frames} that all have are used."
+        text = f"Cameras have {_span(counts)} frames; the {capture.n_frames} they share are used."
         advice = "Check that all of them were started at the same moment: see synchronisation."
         found.append(Finding("frame counts", "note", (), (), text, 1.0, advice))
     return found

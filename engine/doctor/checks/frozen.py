@@ -69,11 +69,12 @@ def _frozen(look: Look, row: int, frames: list[int], n_looked_at: int) -> Findin
         severity="warning",
         cameras=(name,),
         frames=tuple(frames),
-        text=f"{name} repeats the picture before in {many} (frames {spans(frames)}) while the other cameras go on.",
+        text=f"{name} repeats its previous picture in {many} (frames {spans(frames)}) while the other cameras "
+        "continue.",
         certainty=0.95 if len(frames) > 1 else 0.85,
         advice="Leave this camera out, or export its video again without repeated frames."
         if is_bad
-        else "A few repeated frames blur what moves there; export the video again, or leave the camera out.",
+        else "Repeated frames blur motion; export the video again, or leave the camera out.",
         fix=Corrections(is_excluded={name: True}),
         evidence=(
             PictureEvidence(name, first - 1, f"{name}, frame {first - 1}"),
@@ -94,9 +95,9 @@ def _repeated(look: Look, frames: np.ndarray, n_cameras: int) -> list[Finding]:
             cameras=(),
             frames=tuple(listed_frames),
             text=f"Nearly all of {n_cameras} cameras show {len(listed_frames)} moments twice (frames "
-            f"{spans(listed_frames)}{every}): the recording was probably brought to a higher frame rate.",
+            f"{spans(listed_frames)}{every}): the recording was probably converted to a higher frame rate.",
             certainty=0.85,
-            advice="Export the videos at the rate at which they were taken; repeated frames make motion stutter.",
+            advice="Export the videos at their recorded rate; repeated frames make motion stutter.",
             evidence=(
                 PictureEvidence(name, first - 1, f"{name}, frame {first - 1}"),
                 PictureEvidence(name, first, f"frame {first}: the same moment"),

@@ -80,8 +80,8 @@ def check_holdout(rig: CameraRig, holdout: Sequence[str], doubtful: Collection[i
     if not bad or not better:
         return []
     text = (
-        f"{listed(bad)} {counted(bad, 'is', 'are')} held out, but {counted(bad, 'stands', 'stand')} at the edge of the "
-        f"arrangement or {counted(bad, 'is', 'are')} doubtful; figures measured there tell little."
+        f"{listed(bad)} {counted(bad, 'is', 'are')} held out, but {counted(bad, 'stands', 'stand')} at the edge of "
+        f"the rig or {counted(bad, 'is', 'are')} doubtful; figures measured there mean little."
     )
     advice = f"{listed(better)} would be better."
     return [Finding("hold out", "note", bad, (), text, 0.7, advice, Corrections(holdout=better))]

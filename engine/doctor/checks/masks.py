@@ -24,6 +24,6 @@ def check_masks(capture: Capture) -> list[Finding]:
                 break
     if not found:
         return []
-    text = f"There are masks of what moves for {len(found)} of {len(capture.rig)} cameras, which are not used."
-    advice = "Use them: where something moves is then known and need not be guessed."
+    text = f"Motion masks of {len(found)} of {len(capture.rig)} cameras are not used."
+    advice = "Use them, so that motion is known rather than estimated."
     return [Finding("masks", "note", tuple(found), (), text, 0.9, advice, Corrections(masks=found))]

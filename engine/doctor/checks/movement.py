@@ -67,10 +67,10 @@ def _finding(look: Look, row: int, frames: list[int], found: np.ndarray, has_mov
         severity="warning",
         cameras=(name,),
         frames=(until,),
-        text=f"{name} moves: against frame {start} its picture lies up to {found[worst] * width:.1f} px beside; "
-        f"it begins between frames {since} and {until}.",
+        text=f"{name} moves: against frame {start} its picture is shifted by up to {found[worst] * width:.1f} px; "
+        f"this begins between frames {since} and {until}.",
         certainty=min(0.6 + 0.05 * n_moved + 20.0 * (float(found[worst]) - MOVED_SHARE), 0.97),
-        advice="Cameras have to stand still. Leave this one out, or train only the frames before it moves.",
+        advice="Cameras must stand still. Leave this one out, or train only the frames before it moves.",
         fix=Corrections(is_excluded={name: True}),
         evidence=(
             PictureEvidence(name, start, f"{name}, frame {start}"),

@@ -25,8 +25,8 @@ def check_sizes(capture: Capture) -> list[Finding]:
     if is_off.any():
         names = tuple(np.array(rig.names)[is_off].tolist())
         text = (
-            f"The optical axis of {listed(names)} lies up to {100 * float(off.max()):.0f} % of the picture's size away "
-            "from its middle."
+            f"The optical axis of {listed(names)} lies up to {100 * float(off.max()):.0f} % of the picture's size off "
+            "its centre."
         )
         found.append(_finding(names, text))
     if is_wide.any():
@@ -38,5 +38,5 @@ def check_sizes(capture: Capture) -> list[Finding]:
 
 
 def _finding(names: tuple[str, ...], text: str) -> Finding:
-    advice = "Check that the calibration was made with pictures of this size, neither cropped nor stretched since."
+    advice = "Check that the calibration was made at this picture size, with no later cropping or stretching."
     return Finding("image size", "warning", names, (), text, 0.6, advice)

@@ -48,8 +48,8 @@ def offset_findings(capture: Capture, found: Synchronisation) -> list[Finding]:
                 text=f"{listed([_said(camera) for camera in sure])}, measured by "
                 f"{listed(sorted({str(camera.source) for camera in sure}))}.",
                 certainty=min(camera.confidence for camera in sure),
-                advice=f"Shift {counted(sure, 'this camera', 'these cameras')}: what moves is otherwise blurred by "
-                "that much.",
+                advice=f"Shift {counted(sure, 'this camera', 'these cameras')}; otherwise motion is blurred by that "
+                "much.",
                 fix=fix,
                 evidence=_evidence(capture, found, sure[0]),
             )
@@ -63,12 +63,12 @@ def offset_findings(capture: Capture, found: Synchronisation) -> list[Finding]:
                 frames=(),
                 text=f"Perhaps {listed([_said(camera) for camera in unsure])}.",
                 certainty=max(camera.confidence for camera in unsure),
-                advice="Compare the moments of one quick motion in these cameras, or use sound or a clapperboard.",
+                advice="Compare one quick motion in these cameras, or use sound or a clapperboard.",
                 evidence=_evidence(capture, found, unsure[0]),
             )
         )
     findings += [
-        Finding("synchronisation", "note", (found.cameras[one.camera_index].name,), (), one.text, 0.5, "Look at both.")
+        Finding("synchronisation", "note", (found.cameras[one.camera_index].name,), (), one.text, 0.5, "Check both.")
         for one in found.disagreements
         if {one.source, one.other} <= STRONG
     ]

@@ -35,7 +35,7 @@ def check_twins(rig: CameraRig) -> list[Finding]:
                     frames=(),
                     text=f"{name} and {second} stand {share:.2g} % of the rig's extent apart and look the same way.",
                     certainty=0.9,
-                    advice="If one of them was listed twice, leave it out; else check their calibration.",
+                    advice="If one of them was listed twice, leave it out; otherwise check their calibration.",
                     fix=Corrections(is_excluded={second: True}),
                     evidence=(PairEvidence(name, second, 0, "nearly the same view"),),
                 )

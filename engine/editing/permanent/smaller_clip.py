@@ -27,7 +27,7 @@ def without_anchors(state: ClipState, own: Chosen, inherited: Chosen, gone_from_
     Returns:
         With a fingerprint of its own; its reference is still that of before.
     Raises:
-        ProjectError: The arrays do not fit together.
+        ProjectError: The arrays are inconsistent.
     """
     others = {
         name: array for name, array in state.arrays.items() if own_kind(name) is None and not is_said_of_anchors(name)
@@ -41,7 +41,7 @@ def without_anchors(state: ClipState, own: Chosen, inherited: Chosen, gone_from_
             if role in own:
                 records[role] = _own_without(records[role], own[role])
         except (IndexError, ValueError) as error:
-            raise ProjectError(f"The {role} anchors of clip {state.header.clip_index} do not fit together.") from error
+            raise ProjectError(f"The {role} anchors of clip {state.header.clip_index} are inconsistent.") from error
     arrays = dict(others)
     for role, record in records.items():
         arrays |= record.arrays(role)

@@ -62,7 +62,7 @@ def read(file: BinaryIO) -> Splats:
     elements = read_header(file)
     names = tuple(elements.get("vertex", (0, ()))[1])
     if names not in (COLUMNS, FULL_COLUMNS):
-        raise damaged("its columns are others")
+        raise damaged("its columns differ")
     rows = read_rows(file, elements["vertex"][0], len(names), "<f4")
     rows = rows[:, [names.index(name) for name in COLUMNS]]
     return Splats(

@@ -124,10 +124,11 @@ def _notes(bits: int, ln_scales: np.ndarray) -> tuple[str, ...]:
     low, high = np.exp(LN_SCALES)
     if (ln_scales > LN_SCALES[1]).any():
         notes.append(
-            f"Some Gaussians are larger than {high:.0f} units, the largest that SPZ stores; they have that size."
+            f"Some Gaussians are larger than {high:.0f} units, the largest that SPZ stores; they are stored at that "
+            "size."
         )
     if (ln_scales < LN_SCALES[0]).mean() > _MANY:
         notes.append(
-            f"Many Gaussians are thinner than {low:.2g} units, the least that SPZ stores; they have that size."
+            f"Many Gaussians are thinner than {low:.2g} units, the least that SPZ stores; they are stored at that size."
         )
     return tuple(notes)

@@ -239,7 +239,7 @@ def make_plan(
     same = [known for known in same if not known.is_still]
     phases = _phase_lines(footage, clip, config, is_source=is_source)
     if is_still and is_source:
-        nothing = "nothing moves in the pictures looked at, so there is nothing to learn"
+        nothing = "nothing moves in the sampled pictures, so there is nothing to learn"
         phases = [replace(line, value=0, reason=nothing) for line in phases]
     steps = {line.name.removesuffix(" steps"): int(line.value or 0) for line in phases}
     n_static, n_moving = expected_anchors(footage, config, reference)
@@ -263,7 +263,7 @@ def make_plan(
     )
     disk = expected_from(same, "disk_mb") or Expected(None, "not known before a clip of this kind is trained")
     if is_still and is_source:
-        disk = Expected(None, "next to nothing")
+        disk = Expected(None, "negligible")
     return TrainingPlan(
         clip_index=clip.clip_index,
         start=clip.start,
@@ -372,7 +372,7 @@ def _distance_lines(clip: Clip, reference: ClipHeader | None, exposure: tuple[fl
     if exposure is not None:
         low, high = (round(100 * share, 1) + 0.0 for share in exposure)
         shown = "unchanged" if low == high == 0 else f"{low:+.1f} to {high:+.1f} %"
-        lines.append(PlanLine("exposure", shown, "", "against the reference clip, in the middle frame; is removed"))
+        lines.append(PlanLine("exposure", shown, "", "against the reference clip, in the middle frame; removed"))
     return lines
 
 

@@ -237,7 +237,7 @@ def _residual_budget(presence: np.ndarray, n_used: int, config: TrainConfig) -> 
     rest, n_alive = config.max_moving_points - n_used, int(presence.sum(0).max(initial=0))
     if rest >= n_alive:
         return rest, f"at most {config.max_moving_points} a clip, {n_used} inherited ones in use"
-    return n_alive, "as many as are there in the busiest frame"
+    return n_alive, "as many as in the busiest frame"
 
 
 def _within_budget(cloud: MovingCloud, is_new: np.ndarray, budget: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

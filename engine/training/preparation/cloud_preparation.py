@@ -189,13 +189,13 @@ def _given_points(layout: Layout, backgrounds: Backgrounds, rig: CameraRig, say:
     try:
         cloud = points_of(layout)
     except CaptureError as error:
-        say(f"The point cloud that came along is not used. {error}")
+        say(f"The capture's point cloud is not used. {error}")
         return np.zeros((0, 3))
     if cloud is None:
         return np.zeros((0, 3))
     found = true_points(cloud.points, backgrounds.images, backgrounds.is_stable, rig)
     numbers = f"neighbouring cameras agree in {100 * found.share:.0f} % of its {found.n_seen} points that they see"
-    say(f"The point cloud that came along is {'used' if found.is_used else 'not used'}: {numbers}")
+    say(f"The capture's point cloud is {'used' if found.is_used else 'not used'}: {numbers}")
     return found.points
 
 
@@ -473,13 +473,13 @@ def read_backgrounds(prep_dir: Path, key: dict) -> Backgrounds | None:
     except FileNotFoundError:
         return None
     except (OSError, ArraysError, KeyError) as error:
-        logger.warning("the kept backgrounds cannot be read (%s) and are made again - %s", error, path)
+        logger.warning("the stored backgrounds cannot be read (%s) and are rebuilt - %s", error, path)
         return None  # a cache: estimated again by the caller
     if metadata.get("key") != json.dumps(key, sort_keys=True):
         return None
     (width, height), n_cameras = key["size"], len(key["cameras"])
     shapes = [(n_cameras, height, width, 3), (n_cameras, height, (width + 7) // 8)]
     if [images.shape, packed.shape] != shapes or {images.dtype, packed.dtype} != {np.dtype(np.uint8)}:
-        logger.warning("the kept backgrounds do not fit the cameras and are made again - %s", path)
+        logger.warning("the stored backgrounds do not match the cameras and are rebuilt - %s", path)
         return None
     return Backgrounds(images, np.unpackbits(packed, axis=-1, count=width).astype(bool))

@@ -48,7 +48,7 @@ def kept_cloud(prep_dir: Path, start: int, key: dict[str, Any], build: Callable[
     try:
         write_arrays(prep_dir / name, arrays, {"key": words}, what="The cloud")
     except DiskError as error:  # it would only be found again
-        logger.warning("a cloud was not kept: %s", error)
+        logger.warning("a cloud was not stored: %s", error)
     return cloud
 
 
@@ -60,10 +60,10 @@ def _read(path: Path, words: str) -> FramesCloud | None:
         n_points = len(arrays["points"])
         is_whole = all(arrays[kind].dtype == dtype for kind, dtype in _ARRAYS.items())
         if not is_whole or arrays["points"].shape != (n_points, 3) or arrays["colors"].shape != (n_points, 3):
-            raise ArraysError("its arrays do not fit together")
+            raise ArraysError("its arrays are inconsistent")
         return FramesCloud(**{kind: arrays[kind] for kind in _ARRAYS}, spacing=float(arrays["spacing"][0]))
     except FileNotFoundError:
         return None
     except (OSError, ArraysError, KeyError, IndexError) as error:
-        logger.warning("a kept cloud cannot be read (%s) and is made again - %s", error, path)
+        logger.warning("a stored cloud cannot be read (%s) and is rebuilt - %s", error, path)
         return None

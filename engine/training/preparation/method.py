@@ -46,8 +46,8 @@ class Method:
 
     def words(self, config: TrainConfig) -> str:
         """What becomes of what a source clip takes over, in one line."""
-        moving = ", moving ones learning on" if config.inherit == "moving" else ""
-        return f"inherited anchors kept as they are{moving}, decoder kept as it is"
+        moving = ", moving ones keep learning" if config.inherit == "moving" else ""
+        return f"inherited anchors kept{moving}, decoder kept"
 
     def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
         """The heads of a source clip: those of the reference clip, as they are.

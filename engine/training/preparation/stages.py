@@ -87,9 +87,9 @@ class Stages:
                 continue
             found |= {name.rpartition("/")[0]: path for name in sizes}
         if n_stale:
-            self._say(f"{n_stale} files of an earlier preparation do not fit any more; removed")
+            self._say(f"{n_stale} files of an earlier preparation are outdated and were removed")
         if found:
-            self._say(f"{len(found)} steps of the preparation were done in an earlier attempt and are taken over")
+            self._say(f"{len(found)} steps of the preparation are reused from an earlier attempt")
         return found
 
     def _read(self, name: str, path: Path) -> Arrays | None:
@@ -113,11 +113,11 @@ class Stages:
             self._is_refused = False
         except DiskError as error:  # costs time when it is stopped, and nothing else
             if not self._is_refused:
-                self._say(f"{error.message} The preparation goes on; stopping it would cost all of it")
+                self._say(f"{error.message} Preparation continues, but stopping it would lose all of it")
             self._is_refused = True
 
     def _drop(self, path: Path, reason: str) -> None:
-        self._say(f"{path.name} is damaged ({reason}); removed, and its part of the preparation is done again")
+        self._say(f"{path.name} is damaged ({reason}) and was removed; its part of the preparation is repeated")
         discard(path)
 
     def _say(self, message: str) -> None:

@@ -72,12 +72,12 @@ class VariantMethod(Method):
 
     def words(self, config: TrainConfig) -> str:
         anchors = {
-            "frozen": "kept as they are",
-            "moving": "kept as they are if static, learning on if moving",
-            "trainable": "learning on",
+            "frozen": "kept",
+            "moving": "kept if static, learning if moving",
+            "trainable": "learning",
             "off": "left out",
         }
-        heads = {"frozen": "kept as it is", "finetune": "learning on", "new": "new"}
+        heads = {"frozen": "kept", "finetune": "learning", "new": "new"}
         return f"inherited anchors {anchors[self._inherit]}, decoder {heads[self._decoder]}"
 
     def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
@@ -185,8 +185,8 @@ def _continue_field(model: ClipModel, previous: ClipState, clip: Clip) -> str:
     if field.shape.n_knots < clip.n_frames:
         raise ProjectError(
             f"The field of clip {index} has {field.shape.n_knots} frames, clip {clip.clip_index} has "
-            f"{clip.n_frames}, so it cannot go on there.",
+            f"{clip.n_frames}, so it cannot continue there.",
             hint="Take a clip of full length as reference, or field=per_clip.",
         )
     model.attach_field(field)
-    return f"the field of clip {index} goes on"
+    return f"the field of clip {index} continues"

@@ -139,7 +139,7 @@ def test_doubtful_cameras_are_written_as_excluded_and_listed(videos: Path, made_
     kept = CalibrationRequest(videos, is_replacing=True, keeps_doubtful=True)
     outcome = run_calibration(kept, report=lambda _: None)
     assert open_capture(videos).rig.names == NAMES[:3]
-    assert outcome.lines[-1].endswith("look at them before you train: cam02.")
+    assert outcome.lines[-1].endswith("check them before training: cam02.")
 
 
 def test_a_calibration_that_matches_contradict_writes_nothing_and_ends_with_1(
@@ -152,7 +152,7 @@ def test_a_calibration_that_matches_contradict_writes_nothing_and_ends_with_1(
     assert main(["calibrate", str(videos), "--quiet"]) == 1
     said = capsys.readouterr().out
     assert not (videos / "capture.json").exists()
-    assert "  cam00  cam01     154 matches,  18% explained" in said
+    assert "  cam00  cam01     154 matches,  18 % explained" in said
     assert "1 of 2 pairs have 30 matches or more" in said
     assert "Caliscope" in said
     assert "--keep-doubtful" in said

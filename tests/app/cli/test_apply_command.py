@@ -31,4 +31,4 @@ def test_it_says_what_would_go_and_then_does_it(run, tmp_path: Path):
     assert json.loads(out) == {"schema": 1, "n_anchors": 8, "clips": [0, 1], "kept_edits": []}
     code, _, said = run("apply", folder, "--quiet")
     assert code != 0
-    assert "nothing to apply" in said
+    assert "Nothing to apply" in said

@@ -26,7 +26,7 @@ def test_a_fault_of_the_program_is_one_line_and_in_the_log(run, capture_folder, 
     code, _, err = run("train", capture_folder, "--project", tmp_path / "p")
     assert code == 1
     assert err.count("\n") == 1
-    assert "fault of the program" in err
+    assert "bug in the program" in err
     log = Path(err.rpartition("Details are in ")[2].strip().rstrip("."))
     assert "ZeroDivisionError" in log.read_text()
 
@@ -134,8 +134,8 @@ def test_what_a_command_does_not_know_is_said_with_its_own_help(run, arguments, 
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["train", "c", "--project", "p"], "What was learned is kept; the same command goes on from there."),
-        (["ablate", "c", "--project", "p"], "What was learned is kept; the same command goes on from there."),
+        (["train", "c", "--project", "p"], "Progress is kept; the same command resumes from there."),
+        (["ablate", "c", "--project", "p"], "Progress is kept; the same command resumes from there."),
         (["eval", "p", "--json", "-"], "The result was not written."),
         (["report", "p"], "The page was not written."),
         (["render", "p", "--camera", "0", "--out", "o"], "Nothing was written."),

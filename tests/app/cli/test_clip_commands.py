@@ -65,7 +65,7 @@ def test_versions_are_listed_brought_back_and_removed(folder: Path, run: Run) ->
     assert header.header is not None
     assert header.header.fingerprint == "old"
     code, out, _ = run("versions", folder, "--free", "versions", "--dry-run")
-    assert "That would free" in out
+    assert "This would free" in out
     code, out, _ = run("versions", folder, "--free", "versions", "--json")
     assert json.loads(out)["n_bytes_freed"] > 0
     assert "no earlier versions" in run("versions", folder, "--clip", 1)[1]
@@ -90,7 +90,7 @@ def test_cameras_and_frames_are_excluded_and_included(folder: Path, run: Run) ->
     assert code == 0
     code, out, _ = run("exclude", folder, "--frames", "1:3", "--json")
     assert json.loads(out)["frames"] == [{"camera": None, "first": 1, "stop": 3}]
-    assert "trained with other pictures" in run("clips", folder)[1]
+    assert "trained on other pictures" in run("clips", folder)[1]
     assert run("exclude", folder, "--cameras", "nobody")[0] == 2
     assert run("exclude", folder, "--frames", "4:99")[0] == 2
     code, out, _ = run("exclude", folder, "--frames", ":", "--include")

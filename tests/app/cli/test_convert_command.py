@@ -25,7 +25,7 @@ def test_it_writes_a_capture_that_opens(tmp_path: Path, capsys: pytest.CaptureFi
 def test_a_folder_that_is_there_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written_colmap.write(tmp_path / "old", make_scene(lens="pinhole", n_frames=1), lens="pinhole")
     assert main(["convert", str(tmp_path / "old"), "--to", "transforms", "--out", str(tmp_path / "old")]) == 2
-    assert "something under this name" in capsys.readouterr().err
+    assert "already taken" in capsys.readouterr().err
 
 
 def test_what_is_left_out_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -202,15 +202,15 @@ def test_a_name_is_shown_in_one_line(run, folder):
     [
         (("--delete", "--hide"), "--hide and --delete are given together"),
         (("--move", 0, 0, 0, "--exposure", 1), "are given together"),
-        (("--frame", 3), "Nothing says what the edit does"),
-        (("--name", "x"), "Nothing says what the edit does"),
-        (BALL, "Nothing says what the edit does"),
+        (("--frame", 3), "No edit is given"),
+        (("--name", "x"), "No edit is given"),
+        (BALL, "No edit is given"),
         (("--delete", "--sphere", 0, 0, 0, 0), "--sphere is not valid: a sphere with the radius 0.0 is empty"),
         (("--delete", "--sphere", 0, 0, "nan", 1), "not finite"),
         (("--delete", "--box", 0, 0, 0, 1, 0, 1), "--box is not valid"),
         (("--delete", "--turned-box", 0, 0, 0, 1, 1, 1, 1, 1, 0, 0), "not a rotation"),
-        (("--scale", 0), "--scale is not valid: a transform with the scale 0 makes everything vanish"),
-        (("--rotate", 0, 0, 0, 90), "--rotate is not valid: there is no axis"),
+        (("--scale", 0), "--scale is not valid: a scale of 0 makes everything vanish"),
+        (("--rotate", 0, 0, 0, 90), "--rotate is not valid: the axis"),
         (("--rotate", 0, 1, 0, 90, "--quat", 1, 0, 0, 0), "given together"),
         (("--exposure", 99), "--exposure is not valid: stops is 99.0; it has to be a number between -16 and 16"),
         (("--hold", -1), "--hold is not valid: frame_index is -1; it has to be a whole number between 0 and"),
@@ -258,4 +258,4 @@ def test_where_an_edit_acts_is_said_before_it_is_made_and_in_the_list(run, tmp_p
     assert out.splitlines()[1].endswith("of clip 1, frames 3-5 only")
     code, out, err = run("edit", trained, "--where", "motion=static", "--at", 4, "--hide", "--from", 9)
     assert (code, out) == (2, "")
-    assert "The edit can never act (from 9 on): what is selected exists in frames 0-5 only." in err
+    assert "The edit can never act (from 9 on): the selection exists in frames 0-5 only." in err

@@ -45,16 +45,16 @@ def test_a_clip_is_exported_and_printed_as_json(run, project: Path, tmp_path: Pa
 
 def test_edits_that_go_along_are_named(run, project: Path, tmp_path: Path):
     run("edit", project, "--delete", "--sphere", 0, 0, 0, 1)
-    said = "1 edit goes along: delete sphere of radius 1"
+    said = "1 edit is included: delete sphere of radius 1"
     export = ("export", project, "--format", "ply", "--frames", "1:2", "--out")
     render = ("render", project, "--turntable", "--frames", "1:2", "--size", "32x24", "--out")
     for name, command in (("export", export), ("render", render)):
         code, _, err = run(*command, tmp_path / name)
         assert (code, said in err) == (0, True)
         code, _, err = run(*command, tmp_path / f"{name} plain", "--without-edits")
-        assert (code, "goes along" in err) == (0, False)
+        assert (code, "is included" in err) == (0, False)
     code, _, err = run("export", project, "--format", "metrics-csv", "--out", tmp_path / "figures.csv")
-    assert (code, "goes along" in err) == (0, False)
+    assert (code, "is included" in err) == (0, False)
 
 
 def test_every_nth_of_all_frames(run, project: Path, tmp_path: Path):
@@ -73,7 +73,7 @@ def test_it_names_what_is_wrong_with_its_arguments(run, project: Path, tmp_path:
         (("--clip", 7), "There is no clip 7. The project has clips 0 to 1."),
         (("--step", 0), "--step is 0"),
         (("--scale", 0), "Scale is 0.0; it has to be a number between 0.000001 and 1000000"),
-        (("--out", tmp_path / "file"), "something under this name already"),
+        (("--out", tmp_path / "file"), "already taken"),
         (("--out", tmp_path / "file" / "x"), "is a file"),
         (("--out", project), "inside of the project"),
     ):

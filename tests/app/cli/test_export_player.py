@@ -28,7 +28,7 @@ def test_the_size_is_said_before_the_page_is_written(run, project: Path, tmp_pat
 def test_clips_go_into_a_folder_on_request(run, project: Path, tmp_path: Path):
     code, _, err = run("export", project, "--player", tmp_path / "scene.html", "--data-folder", "--clip", 1)
     assert code == 0
-    assert "folder scene_data, which has to stay beside the page" in err
+    assert "folder scene_data, which must stay next to the page" in err
     assert sorted(path.name for path in (tmp_path / "scene_data").iterdir()) == ["clip00001.js", "shared.js"]
 
 

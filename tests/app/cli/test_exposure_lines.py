@@ -40,9 +40,9 @@ def test_a_calm_capture_takes_one_line():
 
 def test_what_was_not_looked_at_is_said():
     late = exposure_lines(survey_of({"x": "It is gone."}, 9, is_late=True, a=[0] * 5))
-    assert late[0] == "Note: camera x could not be looked at: It is gone."
-    assert "1 of 9 cameras: more take longer than 20 s" in late[1]
-    assert "there are so many" in exposure_lines(survey_of(n_cameras=900, a=[0] * 5))[0]
+    assert late[0] == "Note: camera x could not be checked: It is gone."
+    assert "1 of 9 cameras: more would take longer than 20 s" in late[1]
+    assert "there are too many" in exposure_lines(survey_of(n_cameras=900, a=[0] * 5))[0]
     assert exposure_document(survey_of(n_cameras=900, a=[0] * 5))["is_complete"] is False
 
 
@@ -59,7 +59,7 @@ def test_inspecting_measures_the_pictures_of_a_capture(run, tmp_path):
     code, out, err = run("inspect", folder)
     assert code == 0
     first, *others = err.splitlines()
-    assert first.startswith("The doctor takes up to about ")
+    assert first.startswith("The doctor uses up to about ")
     assert all(line.startswith("Capture doctor ") for line in others)  # progress
     assert re.search(r"step of -(9\.[5-9]|10\.[0-5]) % between frames 2 and 3 \(auto exposure\)", out)
     found = json.loads(run("inspect", folder, "--json")[1])["exposure"]

@@ -44,7 +44,7 @@ def test_inspecting_a_project_counts_the_bytes_of_its_clips(run, capture_folder,
     assert re.search(r"positions +\d", out)
     capture.rename(tmp_path / "elsewhere")
     assert json.loads(run("inspect", project, "--json")[1])["mb_per_minute"] is None
-    assert "the capture is not there" in run("inspect", project)[1]
+    assert "the capture is missing" in run("inspect", project)[1]
 
 
 def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_anchor(run, capture_folder, tmp_path):
@@ -57,7 +57,7 @@ def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_
     write_clip_state(path, with_header(state, coverage=coverage | {"reason": "at most 3500"}))
     clips = json.loads(run("inspect", project, "--json")[1])["clips"]
     assert [clip["coverage"] and clip["coverage"]["share"] for clip in clips] == [None, 0.9876]
-    said = "clip 1 98.8 % with 3,000 residual anchors, 500 points beyond the budget left to those beside them"
+    said = "clip 1 98.8 % with 3,000 residual anchors, 500 points beyond the budget left to their neighbours"
     assert said in run("inspect", project)[1]
 
 
@@ -221,4 +221,4 @@ def test_frames_of_quite_another_shape_are_refused_until_it_is_said_what_became_
     assert (code, "Written" in out) == (0, True)
     code, out, _ = run("inspect", folder, "--quick")
     assert code == 0
-    assert "as they were cropped at the left and upper border" in out
+    assert "which were cropped at the left and upper border" in out

@@ -60,7 +60,7 @@ def test_a_turntable_of_depths_is_written_with_its_unit(run, project, tmp_path):
         *("--size", "33x21", "--frames", "1:4", "--out", out),
     )
     assert code == 0, err
-    assert "One level of the 16 bits is 0.000" in err
+    assert "One of the 16-bit levels is 0.000" in err
     assert "3 pictures of 33 x 21" in err
     assert sorted(path.name for path in out.iterdir()) == [f"frame_{frame:06d}.png" for frame in (1, 2, 3)]
     assert np.asarray(Image.open(out / "frame_000002.png")).dtype == np.uint16

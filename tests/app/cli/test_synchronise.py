@@ -42,7 +42,7 @@ def test_offsets_are_found_shown_and_applied(run, tmp_path):
     assert "Written to" in out
     code, out, _ = run("synchronise", folder)
     assert code == 0
-    assert "All cameras are in step." in out
+    assert "All cameras are synchronised." in out
 
 
 def test_plain_videos_need_no_calibration_but_cannot_be_corrected(run, tmp_path):

@@ -48,7 +48,7 @@ def test_trained_clips_are_not_trained_again(run, capture_folder, tmp_path):
     [
         (["--clips", "0:9"], "clips 0 to 0"),
         (["--clips", "x"], "not a range A:B"),
-        (["--clips", "1:1"], "empty or reaches outside"),
+        (["--clips", "1:1"], "empty or out of range"),
         (["--holdout", "0,99"], "no camera '99'"),
         (["--holdout", "0,1,2"], "leaves 1 for training"),
         (["--scale", "0"], "scale is 0"),
@@ -189,7 +189,7 @@ def test_interrupting_stops_cleanly_and_keeps_what_was_learned(tmp_path, capture
         cwd=tmp_path,
     )
     assert done.returncode == 130, done.stderr
-    assert "What was learned is kept" in done.stderr
+    assert "Progress is kept" in done.stderr
     assert "Traceback" not in done.stderr
     assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header.step > 0
     open_project(tmp_path / "p").close()

@@ -177,7 +177,7 @@ def test_going_back_beyond_the_last_project_json_needs_no_history(tmp_path: Path
     found = store.read()
     assert as_bytes(found.present) == as_bytes(history.present)
     if lost == "history.json":
-        assert "cannot be taken back" in store.notes[0]
+        assert "cannot be undone" in store.notes[0]
     else:
         same(found, history)
     history = happen(store, found, Undone(), marked(found, 6))
@@ -199,7 +199,7 @@ def test_a_journal_that_breaks_off_costs_the_last_step_and_says_so(tmp_path: Pat
         n_whole = sum(end <= cut for end in known.ends) - 1
         same(store.read(), states[n_whole])
         n_missing = len(states) - 1 - n_whole
-        said = f"{n_missing} later steps were" if n_missing > 1 else "1 later step was" if n_missing else "not written"
+        said = f"{n_missing} later steps are" if n_missing > 1 else "1 later step is" if n_missing else "not written"
         assert store.notes[0].startswith(f"The journal breaks off after step {n_whole}: ")
         assert said in store.notes[0]
     assert len(states) == 5
@@ -301,7 +301,7 @@ def test_a_journal_of_an_earlier_version_goes_on_and_counts_nothing(tmp_path: Pa
     path.write_bytes(b"".join(lines[:2]))
     again.read()
     assert "breaks off after step 1" in again.notes[0]
-    assert "not known how many" in again.notes[0]
+    assert "how many is unknown" in again.notes[0]
 
 
 def test_a_damaged_count_costs_nothing(tmp_path: Path) -> None:
@@ -351,7 +351,7 @@ def test_a_damaged_history_costs_the_way_back_and_says_so(tmp_path: Path) -> Non
     read = store.read()
     assert as_bytes(read.present) == as_bytes(history.present)
     assert len(read.past) == 1
-    assert "cannot be taken back" in store.notes[0]
+    assert "cannot be undone" in store.notes[0]
 
 
 def test_a_project_json_edited_by_hand_is_taken_where_nothing_waits(tmp_path: Path) -> None:
@@ -401,4 +401,4 @@ def test_a_damaged_project_file_names_the_command_that_says_what_is_left(tmp_pat
     (tmp_path / "p" / "project.json").write_text("{")
     with pytest.raises(ProjectError) as caught:
         DocumentStore(tmp_path / "p").read()
-    assert caught.value.hint == f'"clipgstream repair {tmp_path / "p"}" says what can be kept.'
+    assert caught.value.hint == f'"clipgstream repair {tmp_path / "p"}" shows what can be kept.'

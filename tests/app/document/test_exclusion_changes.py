@@ -61,7 +61,7 @@ def test_strokes_of_the_same_frames_are_one_mask() -> None:
     assert [mask.camera for mask in without_masks(found, camera="a").exclusions.masks] == ["b"]
     assert len(without_masks(found, camera="b", frame=9).exclusions.masks) == 2
     assert without_masks(found, frame=4).exclusions == NOTHING_EXCLUDED
-    with pytest.raises(ProjectError, match="Nothing is painted there"):
+    with pytest.raises(ProjectError, match="nothing to erase"):
         painted(EMPTY, "a", 0, 30, erasing)
     assert document_of(plain_document(found)) == found
     assert without_exclusions(found) == EMPTY

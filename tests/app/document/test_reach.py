@@ -18,7 +18,7 @@ CLIPS = (
 )
 STILL, MOVING = (RowSet("ref", 0, "static"), 100), (RowSet("ref", 0, "moving"), 20)
 ONE = RowSet("one", 1, "residual"), 50
-HINT = " A box or a sphere acts in all clips."
+HINT = " A box or sphere acts in all clips."
 
 
 def note(*picked: tuple[RowSet, int], scope: Scope = EVERYWHERE, is_inverted: bool = False) -> str:
@@ -62,7 +62,7 @@ def test_how_much_of_a_selection_ends_is_said() -> None:
 
 def test_other_clips_show_what_moves_by_gaussians_of_their_own_too() -> None:
     assert note(MOVING) == (
-        "Other clips show what moves partly by Gaussians of their own, which are not selected." + HINT
+        "Other clips show what moves partly with their own Gaussians, which are not selected." + HINT
     )
     assert note(MOVING, scope=Scope(0, 10)) == ""
     assert note(MOVING, scope=Scope(is_reference_only=True)) == "", "that is what was asked for"
@@ -72,7 +72,7 @@ def test_other_clips_show_what_moves_by_gaussians_of_their_own_too() -> None:
 def test_an_edit_that_can_never_act_is_refused(scope: Scope) -> None:
     reach = reach_of([ONE], scope, CLIPS)
     assert reach.is_nowhere
-    with pytest.raises(ProjectError, match="what is selected exists in frames 10-19 only"):
+    with pytest.raises(ProjectError, match="the selection exists in frames 10-19 only"):
         check_acts(reach, scope)
     assert acting_text(scope, reach).startswith("acts in no frame (")
 
@@ -80,7 +80,7 @@ def test_an_edit_that_can_never_act_is_refused(scope: Scope) -> None:
 def test_a_selection_that_is_inverted_means_everything_where_it_is_not() -> None:
     reach = reach_of([ONE], Scope(5, 25), CLIPS, is_inverted=True)
     assert (reach.acts, reach.empty) == (((5, 25),), ((5, 10), (20, 25)))
-    words = "Nothing that is selected exists in frames 5-9 and 20-24: there it acts on everything."
+    words = "The selection does not exist in frames 5-9 and 20-24; there the edit acts on everything."
     assert note(ONE, scope=Scope(5, 25), is_inverted=True) == words
     assert note(STILL, is_inverted=True) == ""
 

@@ -94,7 +94,7 @@ def test_where_nothing_can_be_read_nothing_is_touched(tmp_path: Path) -> None:
     found = look_for_recovery(tmp_path)
     assert found is not None
     assert (found.step, found.plain_step) == (None, None)
-    with pytest.raises(ProjectError, match="nothing can be kept"):
+    with pytest.raises(ProjectError, match="the document is lost"):
         recover(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == before
 
@@ -139,7 +139,7 @@ def test_a_journal_that_was_cut_off_is_said_by_every_command(
     path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:4]))
     assert main([command, str(tmp_path)]) == 0
     said = capsys.readouterr()
-    assert f"breaks off after step 22: {n_steps - 2} later steps were kept and are missing" in said.out + said.err
+    assert f"breaks off after step 22: {n_steps - 2} later steps are missing" in said.out + said.err
     assert "whole" not in said.out
 
 
@@ -148,4 +148,4 @@ def test_a_damaged_history_is_said_on_the_command_line_once(tmp_path: Path, caps
     (tmp_path / "history.json").write_text("{")
     assert main(["gate", str(tmp_path), "--forget"]) == 0
     said = capsys.readouterr().err
-    assert said.count("cannot be taken back") == 1
+    assert said.count("cannot be undone") == 1

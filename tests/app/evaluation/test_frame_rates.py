@@ -158,9 +158,9 @@ def test_what_another_program_says_is_read(program):
     [
         ("raise SystemExit(7)", "ended with code 7"),
         ("import os; os.abort()", "ended with code"),
-        ("print('hello')", "nothing that can be read"),
-        ("pass", "nothing that can be read"),
-        ('print(\'{"laps": [["a", 1, 2]], "renderer": "", "reason": ""}\')', "nothing that can be read"),
+        ("print('hello')", "nothing readable"),
+        ("pass", "nothing readable"),
+        ('print(\'{"laps": [["a", 1, 2]], "renderer": "", "reason": ""}\')', "nothing readable"),
     ],
 )
 def test_a_program_that_fails_costs_the_laps_only(program, source, expected):
@@ -176,7 +176,7 @@ def test_a_program_that_hangs_is_ended(program, monkeypatch):
 
 def test_without_a_window_s_program_nothing_is_drawn(monkeypatch, tmp_path):
     monkeypatch.setattr(window_drawing, "_module", "")
-    assert drawn_laps(tmp_path) == Drawn([], "", "no window belongs to this program")
+    assert drawn_laps(tmp_path) == Drawn([], "", "this program has no window")
     monkeypatch.setattr(window_drawing, "_module", "anything")
     monkeypatch.setattr(sys, "executable", str(tmp_path / "nothing here"))
     assert "could not be started" in drawn_laps(tmp_path).reason

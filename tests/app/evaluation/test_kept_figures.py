@@ -74,7 +74,7 @@ def test_an_evaluation_that_was_killed_goes_on_and_ends_the_same(tmp_path, sent)
     n_kept = sum(b'"row"' in line for line in lines_of(project))
     assert 10 <= n_kept < 240
     if sent == signal.SIGTERM:
-        assert f"Interrupted. {n_kept} of 240 pictures were measured and are kept; the same command goes on" in said
+        assert f"Interrupted. {n_kept} of 240 pictures were measured and are kept; the same command resumes" in said
     assert not (tmp_path / "out.json").exists()
     done = subprocess.run(command, stderr=subprocess.PIPE, text=True, env=os.environ, timeout=DEADLINE_S, check=True)
     first = re.search(r"(\d+)/240", done.stderr)

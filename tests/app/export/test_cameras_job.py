@@ -53,7 +53,7 @@ def test_cameras_that_training_has_moved_are_where_it_saw_them(opened: TrainedPr
     arrays = {**opened.reference.arrays, CORRECTIONS: corrections}
     refined = replace(opened, reference=ClipState(arrays, opened.reference.header))
     result = run(refined, CamerasJob(tmp_path / "c"), nothing)
-    assert "1 camera was refined in training and written so; all others are as in the capture." in result.lines
+    assert "1 camera was refined in training and exported as refined; all others are as in the capture." in result.lines
     found = read_rig(tmp_path / "c" / "sparse" / "0").cameras
     expected = corrected(opened.capture.layout.rig(), ("1", "2", "3"), corrections)
     for row, camera in enumerate(found):
@@ -75,7 +75,7 @@ def test_a_folder_that_is_taken_and_a_cancelled_export(opened: TrainedProject, t
     taken = tmp_path / "taken"
     taken.mkdir()
     (taken / "a").write_text("a")
-    with pytest.raises(ProjectError, match="something under this name"):
+    with pytest.raises(ProjectError, match="already taken"):
         run(opened, CamerasJob(taken), nothing)
 
     def cancel(progress: ExportProgress) -> None:

@@ -281,7 +281,7 @@ def test_untrained_clips_are_named_before_anything_is_made(opened: TrainedProjec
         run(opened, GaussiansJob(tmp_path / "out", frames=range(6)), quiet)
     assert "--frames 0:3" in error.value.hint
     assert names(tmp_path) == before
-    run(opened, GaussiansJob(tmp_path / "out"), quiet)  # all that are trained
+    run(opened, GaussiansJob(tmp_path / "out"), quiet)  # all trained frames
     assert len(names(tmp_path / "out")) == 4
 
 
@@ -311,7 +311,7 @@ def test_bad_input_is_an_error_in_words(opened: TrainedProject, tmp_path: Path, 
 def test_targets_that_are_taken_are_refused(opened: TrainedProject, tmp_path: Path):
     taken = tmp_path / "file.ply"
     taken.write_text("mine")
-    for out, said in ((taken, "something under this name"), (taken / "x", "is a file"), (tmp_path, "something under")):
+    for out, said in ((taken, "already taken"), (taken / "x", "is a file"), (tmp_path, "already taken")):
         with pytest.raises(ProjectError, match=said):
             run(opened, GaussiansJob(out), quiet)
     assert taken.read_text() == "mine"
@@ -337,7 +337,7 @@ def test_many_measured_files_are_one_line(opened: TrainedProject, tmp_path: Path
     monkeypatch.setattr(gaussian_sequence, "_MOST_LINES", 2)
     lines = run(opened, GaussiansJob(tmp_path / "out"), quiet).lines
     assert len(lines) == 2
-    assert lines[1].startswith("3 files were read back; the worst is p_0000.ply: 100.0 dB")
+    assert lines[1].startswith("3 files were read back and compared; the worst is p_0000.ply: 100.0 dB")
 
 
 def test_large_pictures_are_compared_smaller(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

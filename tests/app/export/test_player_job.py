@@ -119,7 +119,9 @@ def test_a_large_scene_gets_a_folder_unless_one_file_is_asked_for(
         "shared.js",
     ]
     assert READER["Page"](out).frame(4)["means"].shape[1] == 3
-    with pytest.raises(ProjectError, match="folder scene_data beside the page, and there is something") as error:
+    with pytest.raises(
+        ProjectError, match="folder scene_data next to the page, but this name is already taken"
+    ) as error:
         run(opened, PlayerJob(out), ignore)  # the clips of one page are never mixed with another's
     assert "Delete scene_data, or choose another name" in str(error.value.hint)
     assert run(opened, PlayerJob(out, has_folder=False), ignore).n_files == 1

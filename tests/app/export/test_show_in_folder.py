@@ -41,8 +41,8 @@ def test_what_fails_is_said_with_the_place(tmp_path: Path, monkeypatch: pytest.M
     with pytest.raises(ProjectError, match="ended with code 3") as raised:
         show_in_folder(tmp_path)
     assert raised.value.path == tmp_path
-    with pytest.raises(ProjectError, match="not there any more"):
+    with pytest.raises(ProjectError, match="no longer exists"):
         show_in_folder(tmp_path / "gone")
     monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
-    with pytest.raises(ProjectError, match="no file manager"):
+    with pytest.raises(ProjectError, match="No file manager"):
         show_in_folder(tmp_path)

@@ -80,9 +80,9 @@ def test_targets_are_refused_before_work_starts(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "full" / "x").write_text("x")
     check_target(tmp_path / "file")
     check_target(tmp_path / "new" / "deep", is_folder=True)
-    with pytest.raises(ProjectError, match="something under this name"):
+    with pytest.raises(ProjectError, match="already taken"):
         check_target(tmp_path / "full", is_folder=True)
-    with pytest.raises(ProjectError, match="something under this name"):
+    with pytest.raises(ProjectError, match="already taken"):
         check_target(tmp_path / "file", is_folder=True)
     with pytest.raises(ProjectError, match="a folder, not a file"):
         check_target(tmp_path / "full")
@@ -99,7 +99,7 @@ def test_too_little_room_is_said_before_work_starts(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(staging.shutil, "disk_usage", lambda _: Usage)
     check_target(tmp_path / "a.ply", n_bytes=30_000_000)
-    with pytest.raises(ProjectError, match="About 40 MB are to be written, but only 52 MB are free"):
+    with pytest.raises(ProjectError, match="About 40 MB will be written, but only 52 MB are free"):
         check_target(tmp_path / "a.ply", n_bytes=40_000_000)
 
 
@@ -111,10 +111,10 @@ def test_a_table_needs_little_room_and_little_room_is_told_in_kilobytes(
 
     monkeypatch.setattr(staging.shutil, "disk_usage", lambda _: Usage)
     check_target(tmp_path / "a.csv", n_bytes=30_000)
-    with pytest.raises(ProjectError, match="About 400 kB are to be written, but only 600 kB are free"):
+    with pytest.raises(ProjectError, match="About 400 kB will be written, but only 600 kB are free"):
         check_target(tmp_path / "a.csv", n_bytes=400_000)
     Usage.free = 100_000
-    with pytest.raises(ProjectError, match="262 kB have to be free, but only 100 kB are free"):
+    with pytest.raises(ProjectError, match="262 kB must be free, but only 100 kB are free"):
         check_target(tmp_path / "a.csv")
 
 
@@ -123,15 +123,15 @@ def test_a_file_system_without_room_for_files_is_told_from_a_full_one(tmp_path: 
         free = total = 0
 
     monkeypatch.setattr(staging.shutil, "disk_usage", lambda _: Usage)
-    with pytest.raises(ProjectError, match="holds no files of users"):
+    with pytest.raises(ProjectError, match="cannot hold files"):
         check_target(tmp_path / "a.csv", n_bytes=30_000)
 
 
 def test_nothing_is_written_into_what_is_exported(opened: TrainedProject):
     project, capture = opened.project.folder, Path(opened.capture.path)
     for path in (project / "project.json", project / "exports" / "a.ply", capture / "cam00.mp4"):
-        with pytest.raises(ProjectError, match="inside of the"):
+        with pytest.raises(ProjectError, match="inside the"):
             check_target(path, opened=opened)
-    with pytest.raises(ProjectError, match="inside of the project"):
+    with pytest.raises(ProjectError, match="inside the project"):
         check_target(project / "exports", opened=opened, is_folder=True)
     check_target(project.parent / "a.ply", opened=opened)

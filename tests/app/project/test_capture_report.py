@@ -26,7 +26,7 @@ def test_a_report_says_what_there_is(capture_folder):
     assert rows["Cameras"] == "4 cameras, 32 x 24"
     assert rows["Frames"] == "6 at 30 per second (0.2 s)"
     assert rows["Lenses"] == "no distortion; 56 degrees wide"
-    assert rows["Came along"] == "no masks, no point cloud; neither is needed"
+    assert rows["Extras"] == "no masks, no point cloud; neither is needed"
     assert [camera.is_default_holdout for camera in report.cameras] == [True, False, False, False]
     assert report.up == pytest.approx([0, 0, 1], abs=1e-6)
     assert all(camera.center @ camera.forward < 0 for camera in report.cameras)

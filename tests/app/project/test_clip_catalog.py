@@ -149,7 +149,7 @@ def test_a_checkpoint_of_another_reference_cannot_be_gone_on_from(tmp_path: Path
     catalog = ClipCatalog(project, 4)
     assert states(catalog) == ["trained", "stopped", "untrained", "untrained"]
     assert [catalog[index].resume_step for index in range(4)] == [None, 3, None, None]
-    assert "trained again after the stop" in catalog[2].reason
+    assert "retrained after the stop" in catalog[2].reason
     assert "cannot be read" in catalog[3].reason
 
 

@@ -227,5 +227,5 @@ def test_who_may_only_read_brings_nothing_back(tmp_path: Path) -> None:
     train(project, 0, "a")
     train(project, 0, "b")
     reader = open_project(project.folder, is_writable=False)
-    with pytest.raises(ProjectError, match="reading only"):
+    with pytest.raises(ProjectError, match="read-only"):
         restore_version(reader, 0, 1)

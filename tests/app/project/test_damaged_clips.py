@@ -43,7 +43,7 @@ def test_the_version_before_it_that_fits_is_offered(tmp_path: Path) -> None:
     assert "--clip 1 --restore 1" in recovery_hint(project, 1)
     version_path(project, 1, 1).write_bytes(b"damaged as well")
     assert best_version(project, 1) is None
-    assert "Restore it from a copy" in recovery_hint(project, 1)
+    assert "Restore it from a" in recovery_hint(project, 1)
 
 
 def test_a_damaged_file_is_put_aside_whatever_takes_its_place(tmp_path: Path) -> None:
@@ -79,7 +79,7 @@ def test_another_reference_makes_all_clips_stale_until_it_is_taken_back(tmp_path
     catalog = ClipCatalog(project, 3)
     assert [catalog[index].state for index in range(3)] == ["stale"] * 3
     assert "clip 1 now" in catalog[0].reason
-    assert "it is the reference itself now" in catalog[1].reason
+    assert "now it is the reference itself" in catalog[1].reason
     assert best_version(project, 1) is None, "its versions were trained on another reference"
     project.change(before, "back")
     assert [ClipCatalog(project, 3)[index].state for index in range(3)] == ["trained"] * 3

@@ -91,7 +91,7 @@ def test_mended_clips_take_their_place_and_come_back(project: Project) -> None:
 
 def test_a_clip_that_was_trained_meanwhile_is_left_alone(project: Project) -> None:
     write_header(project.clip_path(2), of(2, "trained"))
-    with pytest.raises(ProjectError, match="Clip 2 was trained or brought back while it was mended"):
+    with pytest.raises(ProjectError, match="Clip 2 was trained or restored while it was mended"):
         put_in_place(project, RECORD, drafts(project))
     assert current(project) == ["old-1", "trained"]
     assert not record_numbers(project)
@@ -231,6 +231,6 @@ def test_old_records_go(project: Project) -> None:
 def test_a_damaged_record_is_a_typed_error(project: Project, text: str) -> None:
     keep_record(project, RECORD)
     (records_dir(project) / "0001.json").write_text(text)
-    with pytest.raises(ProjectError, match="record of what was mended"):
+    with pytest.raises(ProjectError, match="mending record"):
         kept_record(project, 1)
     assert kept_record(project, 7) is None

@@ -65,9 +65,9 @@ def test_a_copy_takes_no_place_that_is_taken(tmp_path: Path) -> None:
     taken = tmp_path / "taken"
     taken.mkdir()
     (taken / "file").touch()
-    with pytest.raises(ProjectError, match="under this name already"):
+    with pytest.raises(ProjectError, match="already taken"):
         copy_project(project, taken, nothing)
-    with pytest.raises(ProjectError, match="in the project itself"):
+    with pytest.raises(ProjectError, match="inside the project itself"):
         copy_project(project, project.folder / "copy", nothing)
     assert [path.name for path in taken.iterdir()] == ["file"]
     project.close()

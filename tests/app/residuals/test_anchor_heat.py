@@ -105,7 +105,7 @@ def test_a_reason_where_there_is_none(open_residuals, project):
     heat = opened.residuals.anchor_heat(opened.timeline, "error")
     assert (len(heat.values), heat.note) == (0, "Clip 1 is not trained.")
     opened.timeline.seek(0)
-    assert opened.residuals.anchor_heat(opened.timeline, "E").note == "Frame 0 has no frame before it."
+    assert opened.residuals.anchor_heat(opened.timeline, "E").note == "Frame 0 has no previous frame."
     assert finished(opened, "error", 0).note == ""
 
 

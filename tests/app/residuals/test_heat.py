@@ -82,9 +82,9 @@ def test_two_clips_at_one_instant(open_residuals, document):
         heat = opened.heat(opened.opened.rig.names.index(row["camera"]), 3, "clips")
         assert heat.mean == pytest.approx(LEVELS * mean, rel=ROUNDING)
         assert heat.is_extrapolated
-        assert "Clip 0 ends before this frame: its last one stands in, which shows no more than R" in heat.note
+        assert "Clip 0 ends before this frame; its last frame stands in, which shows no more than R" in heat.note
     assert (
-        "Clip 1 begins after this frame: its first one stands in, which shows no more than R"
+        "Clip 1 begins after this frame; its first frame stands in, which shows no more than R"
         in opened.heat(0, 2, "clips").note
     )
     for frame, note in (
@@ -116,13 +116,13 @@ def test_a_reason_where_there_is_none(open_residuals, project):
     (project / "clips" / "0001.safetensors").unlink()
     opened = open_residuals()
     for kind in ("R", "G", "E"):
-        assert opened.heat(0, 0, kind).note == "Frame 0 has no frame before it."
+        assert opened.heat(0, 0, kind).note == "Frame 0 has no previous frame."
     for kind in ("R", "E", "error", "luminance", "flip", "clips"):
         heat = opened.heat(0, 3, kind)
         assert heat.values is None
         assert heat.mean is None
         assert heat.note == "Clip 1 is not trained."
-    assert opened.heat(0, 2, "clips").note == "There is no render of the neighbour's picture: clip 1 is not trained."
+    assert opened.heat(0, 2, "clips").note == "No render of the neighbour's picture: clip 1 is not trained."
     assert opened.heat(0, 3, "G").values is not None  # needs no render
 
 

@@ -87,7 +87,7 @@ def test_a_clip_that_cannot_be_read_is_told_once_and_marked(open_session, launch
     poll_until(session, lambda: len(session.notices) > 0, what="the notice")
     (notice,) = session.notices
     assert notice.title == "The residual cannot be shown"
-    assert "does not say what the cameras make of its colours" in notice.detail
+    assert "does not hold the cameras' colours" in notice.detail
     session.residuals.heat(session.timeline, 0, "flip")
     for _ in range(5):
         session.poll()

@@ -126,8 +126,8 @@ def test_what_cannot_be_an_edit(trained):
             (("expose",), {"stops": "much"}, "not a number"),
             (("hide",), {"stops": 1.0}, "not known"),
             ((Delete(),), {"stops": 1.0}, "Delete is given with 'stops' beside it"),
-            ((Delete(), Sphere(flat, 1.0)), {}, "makes no sense"),
-            ((Delete(), 3), {}, "makes no sense"),
+            ((Delete(), Sphere(flat, 1.0)), {}, "is not valid"),
+            ((Delete(), 3), {}, "is not valid"),
         )
         for arguments, values, message in wrong:
             with pytest.raises(ProjectError, match=message):
@@ -151,7 +151,7 @@ def test_the_document_is_changed_by_functions_and_by_plain_data(trained):
             with pytest.raises(ProjectError, match=message):
                 project.put(entries)
         fixed = replace(project.document, settings=replace(project.document.settings, clip_length=2))
-        with pytest.raises(ProjectError, match="fixed once a clip is finished"):
+        with pytest.raises(ProjectError, match="fixed once one is finished"):
             project.change(fixed, "change the clip length")
 
 
@@ -167,7 +167,7 @@ def test_reading_only(trained):
                 lambda: project.train_clip(0),
                 lambda: project.change(project.document, "x"),
             ):
-                with pytest.raises(ProjectError, match="reading only") as caught:
+                with pytest.raises(ProjectError, match="read-only") as caught:
                     forbidden()
                 assert caught.value.hint == "It was opened read-only. Open it for writing to change something."
         assert writing.is_writable
@@ -181,7 +181,7 @@ def test_edits_that_act_in_some_frames_only_say_so(trained):
     with opened(trained) as project:
         own = project.open_trained().header(1).origin
         picked = Picked((PickedRows(1, own, "residual", pack_rows(np.arange(3))),))
-        with pytest.raises(ProjectError, match=r"can never act \(frames 0-2\): what is selected exists in frames 3-5"):
+        with pytest.raises(ProjectError, match=r"can never act \(frames 0-2\): the selection exists in frames 3-5"):
             project.apply_edit("delete", picked, scope=project.scope_of_clip(0))
         with pytest.raises(ProjectError, match=r"can never act \(from 6 on\): the capture has frames 0-5"):
             project.apply_edit("delete", BALL, scope=Scope(6))
@@ -190,7 +190,7 @@ def test_edits_that_act_in_some_frames_only_say_so(trained):
             edit = project.apply_edit("delete", picked)
         assert project.reaches[edit.edit_id].acts == ((3, 6),)
         project.replace_edit(replace_struct(edit, scope=Scope(0, 2)), on_note=told.append)
-        assert told == ["The edit can never act (frames 0-1): what is selected exists in frames 3-5 only."]
+        assert told == ["The edit can never act (frames 0-1): the selection exists in frames 3-5 only."]
     Path(project.document.settings.capture).rename(trained.parent / "gone")
     with opened(trained) as project:  # which is nothing to an edit
         project.apply_edit("delete", picked, scope=Scope(0, 2))
@@ -206,7 +206,7 @@ def test_pictures_and_files(trained, tmp_path):
         assert files.n_files == 4
         table = project.export(tmp_path / "t.csv", format="metrics-csv")
         assert table.n_files == 1
-        with pytest.raises(ProjectError, match="something under this name already"):
+        with pytest.raises(ProjectError, match="already taken"):
             project.export(tmp_path / "o")
         with pytest.raises(ProjectError, match="frames without gaps"):
             project.render(tmp_path / "x", camera="1", frames=range(0, 6, 2))
@@ -288,7 +288,7 @@ def test_gaussians_are_picked_by_place_and_attribute(trained):
         project.switch_edit(edit.edit_id, is_on=False)
         for where, frame_index, message in (
             ("opacity<0", 0, "Nothing is selected in frame 0"),
-            ("opacity", 0, "The condition 'opacity' makes no sense. Write opacity<0.05; attributes are opacity, size"),
+            ("opacity", 0, "The condition 'opacity' is not valid. Write opacity<0.05; attributes are opacity, size"),
             ("error>3", 0, "There is no attribute 'error' to select by"),
             ("size=large", 0, "'large' is not a value of size. Write a number."),
             ("motion=fast", 0, "Write a number or one of static, moving."),
@@ -318,7 +318,7 @@ def test_what_cannot_be_mended(trained):
     with opened(trained) as project:
         wrong: Any = ({}, {"boundary": 1, "frames": range(3)}, {"frames": range(0, 6, 2)})
         for arguments in wrong:
-            with pytest.raises(ProjectError, match="Name what is to be mended"):
+            with pytest.raises(ProjectError, match="Name what to mend"):
                 project.mend(**arguments)
         with pytest.raises(ProjectError):
             project.mend(boundary=7)

@@ -224,7 +224,7 @@ def test_one_of_several_views_goes_along_while_the_others_look_on(session):
 
 def test_looking_along_ends_with_the_path_and_needs_keys(session):
     session.dispatch(p.LookAlongPath())
-    assert "no camera path with keys" in session.notices[-1].detail
+    assert "No camera path with keys" in session.notices[-1].detail
     assert not session.paths.is_along
     add_keys(session, 0)
     session.dispatch(p.LookAlongPath())
@@ -266,7 +266,7 @@ def test_what_cannot_be_is_told_and_changes_nothing(session, command):
     add_keys(session, 1)
     before = session.paths
     session.dispatch(command)
-    assert session.notices[-1].title == "That cannot be done with the camera path"
+    assert session.notices[-1].title == "The camera path cannot be changed"
     assert session.paths == before
     assert len(on_disk(session)) == 1
 
@@ -308,7 +308,7 @@ def test_a_project_that_another_program_writes_to_is_left_alone(make_session):
     assert len(on_disk(first)) == 1
     second = make_session()
     poll_until(second, lambda: len(second.paths.paths) == 1, what="the paths of the other program")
-    assert "reading only" in second.paths.why_not
+    assert "read-only" in second.paths.why_not
     second.dispatch(p.SetCameraKey())
     assert second.notices[-1].kind == "error"
     assert len(on_disk(first)[0].keys) == 1

@@ -49,7 +49,7 @@ def test_an_edit_outside_of_the_frames_of_its_selection_is_refused(session: Sess
     session.dispatch(AddEdit(Delete(), scope=Scope(0, 3)))
     assert session.edits.edits == ()
     [notice] = session.notices
-    assert "The edit can never act (frames 0-2): what is selected exists in frames 3-5 only." in notice.detail
+    assert "The edit can never act (frames 0-2): the selection exists in frames 3-5 only." in notice.detail
     assert len(session.selecting.selection) == 4, "it can be made in other frames"
 
 

@@ -86,7 +86,7 @@ def test_what_cannot_be_is_said_and_changes_nothing(session):
     session.dispatch(AddEdit(Hide(), BOX, Scope(-3)))
     session.dispatch(SetUp((0.0, 0.0, 0.0)))
     session.dispatch(MoveMarker(3, 4))
-    assert [notice.title for notice in session.notices] == ["That cannot be edited"] * 4
+    assert [notice.title for notice in session.notices] == ["The edit cannot be made"] * 4
     assert session.history.past == ()
 
 

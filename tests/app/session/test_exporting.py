@@ -60,7 +60,7 @@ class Bench:
 
     def _show(self, path: Path) -> None:
         self.shown.append(path)
-        raise ProjectError("There is no file manager that could show it.", path=path)
+        raise ProjectError("No file manager found.", path=path)
 
     def ask(self, trained: tuple[int, ...] = (0, 1)) -> None:
         self.exporting.ask(self.opened, self.timeline, trained)
@@ -173,7 +173,7 @@ def test_the_plan_tells_files_bytes_and_room(bench: Bench):
     ("out", "said"),
     [
         ("", "Say where"),
-        ("relative.csv", "whole path"),
+        ("relative.csv", "full path"),
         ("{folder}/p/m.csv", "inside of the project"),
         ("{folder}/ring/m.csv", "inside of the capture"),
         ("{folder}/p/project.json/m.csv", "inside of the project"),
@@ -231,7 +231,7 @@ def test_the_plan_names_the_edits_that_go_along(tmp_path: Path):
         project.switch_edit(project.apply_edit("hide", name="not now").edit_id, is_on=False)
     opened = open_trained(open_project(folder, is_writable=False))
     context = msgspec.structs.replace(CONTEXT, clips=((0, 3), (3, 6)), trained=(0, 1), has_edits=True)
-    said = "2 edits go along: delete sphere of radius 1, brighter"
+    said = "2 edits are included: delete sphere of radius 1, brighter"
     for kind, takes_edits in (("gaussians", True), ("video", True), ("player", True), ("metrics", False)):
         choices = ExportChoices(kind=kind, out=str(tmp_path / "x"))
         choices = choices.changed(out=f"{choices.out}{Answers(context, choices).suffix}")
@@ -265,7 +265,7 @@ def test_all_that_are_trained_may_have_gaps(tmp_path: Path, kind: str, step: int
         ("video", "mp4", "film.webm", "has to end in .mp4"),
         ("video", "mp4", "film", "has to end in .mp4"),
         ("video", "mp4", "film.MP4", ""),
-        ("video", "png", "film.mp4", "folder is written"),
+        ("video", "png", "film.mp4", "export is a folder"),
         ("video", "png", "film", ""),
         ("metrics", "json", "m.csv", "has to end in .json"),
         ("player", "", "m.mp4", "ends in .html"),
@@ -290,7 +290,7 @@ def test_what_another_export_will_write_is_taken(bench: Bench):
     for name in ("p-metrics.csv", "../out/p-metrics.csv", "p-metrics.csv/more.csv"):
         assert bench.plan(METRICS.changed(out=str(out / name))).problems == (TAKEN,)
     assert bench.plan(METRICS.changed(out=str(out / "other.csv"))).problems == ()
-    with pytest.raises(ProjectError, match="Another export"):
+    with pytest.raises(ProjectError, match="Another running or waiting export"):
         bench.exporting.start(METRICS.changed(out=str(out / "p-metrics.csv")))
     assert len(bench.exporting.statuses) == 1
     bench.started[0].events.append(ExportFailed("The disk is full.", ""))
@@ -298,7 +298,7 @@ def test_what_another_export_will_write_is_taken(bench: Bench):
     assert bench.suggest(METRICS) == str(out / "p-metrics.csv")
     assert bench.plan(METRICS.changed(out=str(out / "p-metrics.csv"))).problems == ()
     bench.exporting.start(METRICS.changed(out=str(out / "p-metrics.csv")))
-    with pytest.raises(ProjectError, match="Another export"):
+    with pytest.raises(ProjectError, match="Another running or waiting export"):
         bench.exporting.retry(1)
 
 
@@ -369,7 +369,7 @@ def test_a_file_manager_that_is_missing_is_told(bench: Bench):
     bench.exporting.show(1)
     bench.until(lambda: len(bench.notices) > 0)
     assert bench.shown == [result.path]
-    assert "no file manager" in bench.notices[0].detail
+    assert "No file manager" in bench.notices[0].detail
 
 
 def test_a_session_asks_and_closes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -60,7 +60,7 @@ def test_without_a_project_it_answers_and_trains_nothing(desk: Desk):
     assert training.train(0, is_confirmed=True) is None
     for act in (training.pause, training.resume, training.stop, training.give_back_snapshot):
         act()
-    assert [notice.title for notice in desk.notices] == ["There is nothing to train yet"] * 2
+    assert [notice.title for notice in desk.notices] == ["Nothing to train yet"] * 2
     assert (training.status(0).state, training.clip_states(), training.plan()) == ("idle", [], None)
     assert training.state_of(0) is None
     assert (training.is_busy, training.unread_clip) == (False, None)

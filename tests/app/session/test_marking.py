@@ -90,7 +90,7 @@ def test_window_and_command_line_keep_the_same_file(make_session, capsys):
     assert plain_document(open_project(folder, is_writable=False).document) == by_window
     said = capsys.readouterr().out
     assert "static in the sphere of 2 around (0, 0, 0)" in said
-    assert "Marks apply to clips whose training starts from now on." in said
+    assert "Marks apply to clips trained from now on." in said
 
 
 def test_regions_come_back_when_the_project_is_opened_again(make_session):
@@ -181,7 +181,7 @@ def test_a_project_that_another_program_writes_to_is_left_alone(make_session, ca
     second = make_session()
     poll_until(second, lambda: second.regions.regions == (BALL,), what="the regions of the other program")
     assert not second.regions.can_mark
-    assert "reading only" in second.regions.why_not
+    assert "read-only" in second.regions.why_not
     n_notices = len(second.notices)
     for command in (MARK_OTHER, c.RemoveRegion(0)):
         second.dispatch(command)
@@ -209,9 +209,9 @@ def test_what_could_not_be_kept_is_not_shown_as_if_it_were(make_session, monkeyp
 def test_it_is_said_which_clips_a_mark_reaches(make_session):
     session = ready(make_session())
     session.dispatch(c.SetClipLength(3))
-    assert session.regions.effect == "Marks apply to clips whose training starts from now on."
+    assert session.regions.effect == "Marks apply to clips trained from now on."
     train_next(session)
-    assert "Clip 0 has started already: it stays as it is until it is trained again." in session.regions.effect
+    assert "Clip 0 has already started and does not change until retrained." in session.regions.effect
     assert "Clips 0 to 2, 5 have started already" in effect_text([5, 0, 1, 2], gate="hull")
     assert "gate=off" in effect_text([], gate="off")
 
@@ -219,7 +219,7 @@ def test_it_is_said_which_clips_a_mark_reaches(make_session):
 def test_without_a_gate_it_is_said_that_marks_do_nothing(make_session):
     session = ready(make_session())
     session.dispatch(c.SetTrainSetting("gate", "off"))
-    assert session.regions.effect.startswith("Without effect here")
+    assert session.regions.effect.startswith("No effect here")
 
 
 def test_another_capture_brings_its_own_regions(make_session, tmp_path, capture_folder):

@@ -132,7 +132,7 @@ def test_what_was_picked_in_a_clip_is_not_lost_by_mending_it(session: Session) -
 
 def test_what_cannot_be_mended_says_why(session: Session, make_session: Make) -> None:
     session.dispatch(AskMend(after=2))
-    assert "no boundary before clip 2" in list(session.notices)[-1].detail
+    assert "Clip 2 has no boundary" in list(session.notices)[-1].detail
     session.dispatch(AskMend(frames=(0, 3)))
     assert "reference clip" in page_of(session).why_not
     session.dispatch(StartMend())
@@ -147,7 +147,7 @@ def test_without_a_capture_there_is_nothing_to_mend(make_session: Make) -> None:
     session = make_session(is_open=False)
     for command in (AskMend(after=1), StartMend(), RevertMend(), CompareMended()):
         session.dispatch(command)
-    assert {notice.title for notice in session.notices} == {"That cannot be mended"}
+    assert {notice.title for notice in session.notices} == {"Mending cannot start"}
     session.dispatch(CloseMend())
     assert session.mending.page is None
 
@@ -254,5 +254,5 @@ def test_nothing_is_mended_while_a_clip_trains(session: Session, monkeypatch: py
     session.dispatch(StartMend())
     assert (page_of(session).state, page_of(session).why_not) == (
         "asking",
-        "A clip trains at the moment. Mend when it has ended.",
+        "A clip is being trained. Mend when it has ended.",
     )

@@ -1,4 +1,4 @@
-"""Notices: what the user can act on, and what is a fault of the program."""
+"""Notices: what the user can act on, and what is a bug in the program."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_fault_of_the_program_says_so_and_is_logged(caplog: pytest.LogCaptureF
     with caplog.at_level(logging.ERROR):
         notice = notices.add_failure("The picture could not be drawn", ValueError("shapes differ"))
     assert notice.detail == "ValueError: shapes differ"
-    assert "fault of the program" in notice.hint
+    assert "bug in the program" in notice.hint
     assert "shapes differ" in caplog.text
     assert not notices.has_told(ValueError("shapes differ")), "each of them is worth a look"
 

@@ -70,7 +70,7 @@ def test_what_cannot_be_applied_is_a_notice(session: Session):
     session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(2))))
     session.dispatch(ApplyDeletions())
     poll_until(session, lambda: bool(len(session.notices)), what="the notice")
-    assert "no edit that is on deletes" in next(iter(session.notices)).detail
+    assert "no active edit deletes" in next(iter(session.notices)).detail
     assert session.question is None
 
 
@@ -80,7 +80,7 @@ def test_edits_that_change_meanwhile_stop_it(session: Session):
     session.dispatch(ApplyDeletions(is_confirmed=True))
     session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(2))))
     poll_until(session, lambda: bool(len(session.notices)), what="the notice")
-    assert "changed meanwhile" in next(iter(session.notices)).detail
+    assert "changed in the meantime" in next(iter(session.notices)).detail
     assert n_static(session) == before
     assert not (project_of(session).folder / "exchange").exists()
     assert len(session.edits.edits) == 2
@@ -108,6 +108,6 @@ def test_clips_stay_as_long_as_the_disk_does_not_keep_what_was_edited(
 
     monkeypatch.setattr(project_of(session).store, "write", refuse)
     session.dispatch(ApplyDeletions(is_confirmed=True))
-    poll_until(session, lambda: any("kept yet" in notice.detail for notice in session.notices), what="the notice")
+    poll_until(session, lambda: any("saved yet" in notice.detail for notice in session.notices), what="the notice")
     assert n_static(session) == before
     assert not (project_of(session).folder / "exchange").exists()

@@ -45,7 +45,7 @@ def test_what_was_edited_before_a_kill_is_there_and_said(make_session, together)
     session = opened(make_session, c.OpenProject(together / "project"))
     assert len(session.regions.regions) == 4
     (notice,) = [notice for notice in session.notices if "recovered" in notice.title]
-    assert "4 steps were taken from the journal, up to: mark a region." in notice.detail
+    assert "4 steps were recovered from the journal, up to: mark a region." in notice.detail
     for _ in range(4):
         session.dispatch(c.Undo())
     assert session.regions.regions == ()
@@ -117,10 +117,10 @@ def test_reading_only_changes_nothing_and_says_why(make_session, together):
     before = {path.name: path.read_bytes() for path in (together / "project").rglob("*") if path.is_file()}
     session = opened(make_session, c.OpenProject(together / "project", ProjectChoices(is_read_only=True)))
     assert len(session.regions.regions) == 4
-    assert "opened so" in session.regions.why_not
+    assert "open it again" in session.regions.why_not
     session.dispatch(c.Undo())
     assert len(session.regions.regions) == 4
-    assert "reading only" in session.notices[-1].detail
+    assert "read-only" in session.notices[-1].detail
     assert {path.name: path.read_bytes() for path in (together / "project").rglob("*") if path.is_file()} == before
     session.dispatch(c.OpenProject(together / "project"))
     poll_until(session, lambda: session.regions.can_mark, what="the project, for writing")
@@ -129,14 +129,14 @@ def test_reading_only_changes_nothing_and_says_why(make_session, together):
 def test_a_capture_without_a_project_is_not_opened_for_reading_only(make_session, capture_folder):
     session = opened(make_session, c.OpenCapture(capture_folder, choices=ProjectChoices(is_read_only=True)))
     assert session.project is None
-    assert "no project of this capture" in session.notices[0].detail
+    assert "has no project yet" in session.notices[0].detail
 
 
 def test_two_windows_on_one_project(make_session, together):
     first = opened(make_session, c.OpenProject(together / "project"))
     second = opened(make_session, c.OpenProject(together / "project"))
     assert len(second.regions.regions) == 4
-    assert [notice.title for notice in second.notices] == ["The project is open for reading only"]
+    assert [notice.title for notice in second.notices] == ["The project is open read-only"]
     second.dispatch(MARKS[0])
     assert "open for writing" in second.regions.why_not
     first.dispatch(MARKS[0])
@@ -165,7 +165,7 @@ def test_saving_as_can_be_cancelled_and_refuses_what_is_taken(make_session, toge
     n_before = len(session.notices)
     session.dispatch(SaveProjectAs(together / "capture"))
     poll_until(session, lambda: len(session.notices) > n_before)
-    assert "under this name already" in session.notices[-1].detail
+    assert "already taken" in session.notices[-1].detail
     assert session.question is None
 
     def wait(project, folder, report):

@@ -49,7 +49,7 @@ def test_without_a_capture_every_command_is_told_that_there_is_nothing(make_sess
     session = make_session(is_open=False)
     for command in (c.TrainAll(), c.TrainClips((0,)), c.MoveInQueue(0, 1), c.RestoreVersion(0, 1)):
         session.dispatch(command)
-    assert set(titles(session)) == {"There is nothing to train yet"}
+    assert set(titles(session)) == {"Nothing to train yet"}
     assert (session.queue.waiting, session.queue.everything) == ((), None)
     assert session.version_state(0, 1) is None
     assert session.clip_versions(0) == ()
@@ -137,7 +137,7 @@ def test_a_clip_moved_before_what_it_needs_waits_no_more(session: Session) -> No
     session.dispatch(c.TrainAll())
     session.dispatch(c.RemoveFromQueue(2))
     assert [clip.clip_index for clip in session.queue.waiting] == [1]
-    assert titles(session)[-1] == "Clips 3, 4, 5 wait no more: they need a clip that is not trained"
+    assert titles(session)[-1] == "Clips 3, 4, 5 left the queue: they need a clip that is not trained"
 
 
 def test_a_failed_clip_shows_its_reason_and_the_others_go_on(make_session: Make) -> None:
@@ -200,7 +200,7 @@ def test_a_version_comes_back_and_dependants_are_out_of_date_as_after_training(s
     session.dispatch(c.RestoreVersion(0, 1))
     session.dispatch(c.RestoreVersion(0, 1))  # a second click
     poll_until(session, lambda: not session.jobs, what="the version")
-    assert titles(session)[-1] == "Clip 0 is back as it was"
+    assert titles(session)[-1] == "Clip 0 is restored"
     assert [state.state for state in session.clip_states[:2]] == ["trained", "trained"]
     assert read_clip_state(project_of(session).clip_path(0)).header.step == N_STEPS
     poll_until(session, lambda: [one.step for one in session.clip_versions(0)] == [9], what="the other version")
@@ -224,8 +224,8 @@ def test_the_reference_does_not_change_under_a_clip_that_trains(make_session: Ma
     wait_idle(session)
     session.dispatch(c.TrainClip(1))
     session.dispatch(c.RestoreVersion(0, 1))
-    assert titles(session)[-1] == "The version cannot be brought back"
-    assert "Clip 1 trains at the moment" in session.notices[-1].detail
+    assert titles(session)[-1] == "The version cannot be restored"
+    assert "Clip 1 is training" in session.notices[-1].detail
 
 
 def test_a_damaged_version_is_a_notice_and_the_clip_stays(session: Session) -> None:

@@ -292,7 +292,7 @@ def test_what_was_learned_fixes_clip_length_and_hold_out(make_session):
     assert session.holdout == (1,)
     train_next(session)
     session.dispatch(c.SetClipLength(2))
-    assert "fixed once a clip is finished: there is 1 trained clip" in session.notices[-1].detail
+    assert "fixed once one is finished; there is 1 trained clip" in session.notices[-1].detail
     assert session.project.settings.clip_length == 6
 
 
@@ -430,9 +430,9 @@ def test_a_project_that_another_program_writes_to_opens_for_reading(make_session
     second = make_session()
     assert first.training.can_train_next
     assert not second.training.can_train_next
-    assert "reading only" in second.notices[0].title
+    assert "read-only" in second.notices[0].title
     second.dispatch(c.TrainNextClip())
-    assert "reading only" in second.notices[-1].detail
+    assert "read-only" in second.notices[-1].detail
     assert second.training.state == "idle"
 
 

@@ -88,7 +88,7 @@ def test_behind_what_is_opaque_nothing_is_counted() -> None:
     front = ball((0.0, 0.0, 1.0), 1.5, opacity=1.0)
     layers = Gaussians.concatenate([ball((0.0, 0.0, 1.0 + 0.1 * i), 1.5, opacity=1.0) for i in range(5)])
     assert overdraw(front, view())[13, 21] == 1
-    assert overdraw(layers, view())[13, 21] == 2, "0.001 of the light is left behind the first, next to nothing after"
+    assert overdraw(layers, view())[13, 21] == 2, "0.001 of the light is left behind the first, negligible after"
 
 
 def test_a_body_is_seen_where_a_sphere_is() -> None:

@@ -29,17 +29,17 @@ def test_each_camera_that_something_speaks_against_has_a_reason() -> None:
     assert [row for row, doubt in enumerate(doubts) if doubt] == [1, 3, 6, 7]
     assert "bent" in doubts[1]
     assert doubts[3] == "only 20 points"
-    assert doubts[6] == "one camera agrees with its place (cam5); 2 are needed"
-    assert doubts[7] == "no camera agrees with its place; 150 of its 200 matches with cam3 are explained"
+    assert doubts[6] == "one camera agrees with its position (cam5); 2 are needed"
+    assert doubts[7] == "no camera agrees with its position; 150 of its 200 matches with cam3 are explained"
     assert _failure(agreed) == ""
 
 
 def test_a_smaller_group_stands_apart_and_makes_it_fail() -> None:
     agreed = made_up([(0, 1), (1, 2), (0, 2), (2, 3), (1, 3), (3, 4), (2, 4), (5, 6), (6, 7), (5, 7)], [])
     doubts = _doubts(NAMES, np.full(8, 400), agreed, np.zeros(8, bool))
-    assert doubts[5] == "those that agree with its place (cam6, cam7) do not agree with the others"
+    assert doubts[5] == "those that agree with its position (cam6, cam7) do not agree with the others"
     assert [bool(doubt) for doubt in doubts] == [False] * 5 + [True] * 3
-    assert _failure(agreed).startswith("Matches contradict the places of 3 of 8 cameras")
+    assert _failure(agreed).startswith("Matches contradict the positions of 3 of 8 cameras")
 
 
 def test_it_fails_where_nothing_holds_together() -> None:

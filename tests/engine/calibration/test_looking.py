@@ -38,7 +38,7 @@ def test_a_process_finds_key_points_of_background_and_moments() -> None:
 
 def test_a_process_that_fails_names_the_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(module: str, arrays: object, **others: object) -> dict[str, np.ndarray]:
-        raise ChildFailed("the process that looks was killed", is_final=False)
+        raise ChildFailed("the process that finds key points was killed", is_final=False)
 
     monkeypatch.setattr(looking, "work_on_arrays", failing)
     with pytest.raises(PreparationError, match="Key points of cam0 could not be found: the process"):

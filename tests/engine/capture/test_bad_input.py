@@ -35,7 +35,7 @@ def camera(document: dict[str, Any], row: int) -> dict[str, Any]:
 
 def test_a_folder_that_is_not_a_capture_says_what_was_looked_for(tmp_path: Path) -> None:
     message = str(problem_of(tmp_path))
-    assert "not a capture (nothing of a known layout was recognised)" in message
+    assert "not a capture (no known layout was recognised)" in message
     assert "In it: nothing." in message
     assert "docs/capture_formats.md" in message
     assert list(tmp_path.iterdir()) == []

@@ -150,7 +150,7 @@ def test_cameras_of_different_sizes_share_one_picture_size(
         (lambda d: d["cameras"][1].update(K=[[1, 2], [3, 4]]), "no 3x3 K"),
         (lambda d: d["cameras"][1].update(lens={"model": "pinhole", "params": [1]}), "pinhole has 0"),
         (lambda d: d["cameras"][1].update(lens={"model": "magic"}), "lens"),
-        (lambda d: d["cameras"][1].update(offset_frames=100), "No frame is left"),
+        (lambda d: d["cameras"][1].update(offset_frames=100), "No frame is common"),
         (lambda d: d["cameras"][1].update(name="cam00"), 'called "cam00"'),
         (lambda d: d["cameras"][1].update(frames=[0, 6]), "go beyond the 6"),
         (lambda d: d["cameras"][1].update(frames=[]), "go beyond the 6"),

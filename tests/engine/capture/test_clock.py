@@ -21,7 +21,7 @@ def test_cameras_in_step_keep_their_frames():
     assert clock.is_even
     assert clock.fps == 30
     assert clock.errors_s.max() < 1e-9
-    assert "one by one as recorded" in clock.note()
+    assert "paired by index" in clock.note()
 
 
 def test_whole_offsets_and_unequal_lengths_leave_what_all_cameras_show():

@@ -145,7 +145,7 @@ def test_a_second_model_and_files_of_newer_versions_change_nothing(tmp_path: Pat
         (tmp_path / "sparse/0" / name).write_bytes(b"\x01" * 50)
     write_model(tmp_path / "sparse/1", scene, "OPENCV")
     capture = check_reads_as(tmp_path, scene)
-    assert any("other models" in text for text in capture.warnings)
+    assert any("Other models" in text for text in capture.warnings)
 
 
 Spoil = Callable[[Path], object]
@@ -180,7 +180,7 @@ def replaced(name: str, old: bytes, new: bytes) -> Spoil:
         (put("sparse/0/images.bin", b""), "ends too early"),
         (put("sparse/0/images.bin", b"\0" * 8), "no images"),
         (put("sparse/0/cameras.bin", b"\xff" * 8), "announces 18446744073709551615"),
-        (put("sparse/0/images.bin", b"\x89PNG\r\n\x1a\n" * 100), "damaged or not of COLMAP"),
+        (put("sparse/0/images.bin", b"\x89PNG\r\n\x1a\n" * 100), "damaged or not a COLMAP file"),
         (put("sparse/0/images.bin", b"\0" * 8 + b"more"), "left over"),
         (unlink("cam2.mp4"), "no frames for 1 of 4 cameras: 'cam2'"),
         (put("cam2.mp4", b""), "cam2"),
@@ -210,7 +210,7 @@ def test_what_is_wrong_with_a_rig_is_said(tmp_path: Path, spoil: Spoil, said: st
         (put("sparse/0/images.txt", b"1 0.5 0 0 0 0 0 1 1 cam1.jpg\n\n"), "is not a rotation"),
         (put("sparse/0/images.txt", b"1 0 0 0 0 0 0 1 1 cam1.jpg\n\n"), "is not a rotation"),
         (put("sparse/0/images.txt", b"1 1 0 0 0 0 0 1 77 cam1.jpg\n\n"), "camera 77"),
-        (put("sparse/0/images.txt", b"1 a 0 0 0 0 0 1 77 cam1.jpg\n\n"), "are not numbers"),
+        (put("sparse/0/images.txt", b"1 a 0 0 0 0 0 1 77 cam1.jpg\n\n"), "are not finite numbers"),
     ],
 )
 def test_what_is_wrong_with_a_model_in_text_is_said(tmp_path: Path, spoil: Spoil, said: str) -> None:

@@ -48,7 +48,7 @@ def test_without_frames_it_opens_or_says_that_it_does_not(tmp_path: Path, target
     if target == "colmap":
         assert any("does not open as a capture" in line for line in done.lines)
     else:
-        assert "Frames stay where they are: open the folder with --follow-links." in done.lines
+        assert "Frames are not copied; open the folder with --follow-links." in done.lines
         check_reads_as(tmp_path / "new", scene, follow_links=True)
 
 
@@ -57,7 +57,7 @@ def test_part_of_a_video_cannot_be_referred_to_by_transforms(tmp_path: Path) -> 
     written_colmap.write(tmp_path / "old", scene, lens="pinhole")
     layout = open_capture(tmp_path / "old").layout
     late = tuple(replace(entry, source=IndexedFrames(entry.source, np.arange(1, 5))) for entry in layout.cameras)
-    with pytest.raises(CaptureError, match="cannot say which frames of its videos"):
+    with pytest.raises(CaptureError, match="cannot state which frames of the videos"):
         convert(replace(layout, cameras=late, n_frames=4), tmp_path / "new", "transforms")
     assert not (tmp_path / "new").exists()
 
@@ -134,7 +134,7 @@ def test_what_is_there_is_never_touched(tmp_path: Path) -> None:
     layout = open_capture(tmp_path / "old").layout
     (tmp_path / "file").touch()
     for name in ("old", "file"):
-        with pytest.raises(CaptureError, match="something under this name"):
+        with pytest.raises(CaptureError, match="already taken"):
             convert(layout, tmp_path / name, "colmap")
     (tmp_path / "empty").mkdir()
     convert(layout, tmp_path / "empty", "colmap")

@@ -43,5 +43,5 @@ def test_no_correction_is_a_pinhole() -> None:
 
 @pytest.mark.parametrize("coefficients", [(2e-6, -3e-12, 1e-18), (float("nan"), 0, 0), (1e300, 1e300, 1e300)])
 def test_a_lens_that_cannot_be_said_is_refused(coefficients: tuple[float, ...]) -> None:
-    with pytest.raises(CaptureError, match="cannot be said in OpenCV's model: that is off by"):
+    with pytest.raises(CaptureError, match="does not fit OpenCV's model: the error is"):
         lens_of_correction(K, SIZE, np.array([400.0, 545]), np.array(coefficients), path=PATH)

@@ -23,7 +23,7 @@ def test_copies_are_told_once_for_each_group(tmp_path):
 def test_the_same_file_is_told_as_such(tmp_path):
     one = camera(tmp_path, "a", b"x")
     (problem,) = check_duplicates({"a": one, "b": one})
-    assert "use the same file, a-0" in problem.message
+    assert "use the same file: a-0" in problem.message
 
 
 def test_files_that_differ_at_their_ends_alone_are_different(tmp_path):

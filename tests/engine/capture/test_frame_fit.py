@@ -66,12 +66,12 @@ def test_another_shape_is_warned_about_with_numbers_until_something_is_said(fold
     before = open_capture(folder)
     (warning,) = (text for text in before.warnings if "another shape" in text)
     assert "cam1 240x136, calibrated at 242x136" in warning
-    assert "If they were cropped, that is wrong by up to 2 px at the border" in warning
+    assert "if they were cropped, that is wrong by up to 2 px at the border" in warning
     assert before.layout.misfit_px == 2
     write_corrections(before.layout, folder, Corrections(fit="cropped_start"))
     after = open_capture(folder)
-    assert not any("If they were cropped" in text for text in after.warnings)
-    assert any("as they were cropped at the left and upper border" in text for text in after.warnings)
+    assert not any("if they were cropped" in text for text in after.warnings)
+    assert any("which were cropped at the left and upper border" in text for text in after.warnings)
     scale = 240 / 242
     for old, new in zip(before.layout.cameras, after.layout.cameras, strict=True):
         assert np.isclose(new.K[0, 0], old.K[0, 0] / scale)
@@ -86,7 +86,7 @@ def test_another_shape_is_warned_about_with_numbers_until_something_is_said(fold
 def test_other_corrections_leave_it_open(folder: Path) -> None:
     write_corrections(open_capture(folder).layout, folder, Corrections(holdout=["cam2"]))
     assert "fit" not in json.loads((folder / "capture.json").read_text())
-    assert any("If they were cropped" in text for text in open_capture(folder).warnings)
+    assert any("if they were cropped" in text for text in open_capture(folder).warnings)
 
 
 def test_a_very_different_shape_opens_only_where_something_is_said(folder: Path) -> None:

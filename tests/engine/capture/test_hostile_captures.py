@@ -109,7 +109,7 @@ def test_a_video_of_an_unknown_kind(make_sample: MakeCapture) -> None:
     folder = make_sample()
     path = folder / "cam01.mp4"
     path.write_bytes(path.read_bytes().replace(b"avc1", b"zzzz"))
-    assert "of a kind that is not known" in refusal(folder)
+    assert "has an unknown format" in refusal(folder)
 
 
 def test_postscript_is_not_run_as_an_image(make_panoptic: MakeCapture) -> None:
@@ -311,7 +311,7 @@ def test_poses_of_transforms_json_beyond_all_numbers_are_refused_without_a_warni
 def test_two_cameras_with_one_file(make_sample: MakeCapture) -> None:
     folder = make_sample(edit=lambda d: camera(d, 2).update(file="cam01.mp4"))
     message = refusal(folder)
-    assert 'Cameras "cam01" and "cam02" use the same file, cam01.mp4.' in message
+    assert 'Cameras "cam01" and "cam02" use the same file: cam01.mp4.' in message
     assert "take one out" in message
 
 
@@ -376,7 +376,7 @@ def test_what_is_missing_or_disagrees_about_time_is_said(make_sample: MakeCaptur
         document["fps"] = 25
 
     warnings = open_capture(make_sample(edit=edit)).warnings
-    assert "does not say n_frames; the 6 frames of the videos are taken" in warnings[0]
+    assert "does not state n_frames; the 6 frames of the videos are taken" in warnings[0]
     assert "fps is 25, but these videos state another rate: cam00 30" in warnings[1]
 
 

@@ -121,16 +121,16 @@ HEADER = (
         (
             "a.ply",
             (HEADER % 1).replace(b"binary_little_endian", b"ascii") + b"end_header\n1 2 x\n",
-            "else than numbers",
+            "values that are not numbers",
         ),
         ("points3D.bin", b"\xff" * 8, "announces"),
         ("points3D.bin", b"\0" * 9, "left over"),
         ("points3D.txt", b"1 2 3\n", "no position and colour"),
-        ("points3D.txt", b"1 a b c 1 2 3\n", "else than numbers"),
-        ("points3D.txt", b"\x00" * 100, "no position and colour|else than numbers"),
+        ("points3D.txt", b"1 a b c 1 2 3\n", "values that are not numbers"),
+        ("points3D.txt", b"\x00" * 100, "no position and colour|values that are not numbers"),
         ("a.npz", b"PK\x03\x04", "not an archive"),
         ("a.npz", b"hello", "not an archive"),
-        ("a.xyz", b"1 2 3", "not a point cloud"),
+        ("a.xyz", b"1 2 3", "not a supported point cloud"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, name: str, data: bytes, said: str) -> None:
@@ -152,7 +152,7 @@ def test_an_archive_that_unpacks_to_far_more_is_refused(tmp_path: Path) -> None:
 
 def test_arrays_of_objects_or_of_another_shape_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", data=np.array([None, {}], object))
-    with pytest.raises(CaptureError, match="something else than numbers"):
+    with pytest.raises(CaptureError, match="values that are not numbers"):
         read_points(tmp_path / "a.npz")
     np.savez(tmp_path / "b.npz", data=np.zeros(12))
     with pytest.raises(CaptureError, match="shape"):

@@ -53,7 +53,7 @@ def test_what_names_of_videos_share_is_the_trial(
 
 
 def test_two_trials_are_not_chosen_from() -> None:
-    with pytest.raises(CaptureError, match=r"2 recordings fit the cameras: that of 'cam1' may be 't1_cam1.mp4'"):
+    with pytest.raises(CaptureError, match=r"2 recordings match the cameras: that of 'cam1' may be 't1_cam1.mp4'"):
         by_pattern(("cam1", "cam2"), ("t1_cam1.mp4", "t1_cam2.mp4", "t2_cam1.mp4", "t2_cam2.mp4"))
 
 
@@ -75,14 +75,14 @@ def test_videos_of_a_trial_open(tmp_path: Path) -> None:
     scene = make_scene(lens="opencv5")
     written(tmp_path, scene, {name: f"trial01_{name}" for name in NAMES})
     capture = check_reads_as(tmp_path, scene)
-    assert "Videos are matched by what their names share: cam1 is videos/trial01_cam1.mp4" in capture.warnings[0]
+    assert "Videos are matched by similar names: cam1 is videos/trial01_cam1.mp4" in capture.warnings[0]
 
 
 def test_videos_are_taken_in_order_and_that_is_said(tmp_path: Path) -> None:
     scene = make_scene(lens="opencv5").named(("front", "left", "rear", "right"))
     written(tmp_path, scene, dict(zip(scene.names, ("GX1", "GX2", "GX3", "GX10"), strict=True)))
     capture = check_reads_as(tmp_path, scene)
-    assert "in the order of their names, as Pose2Sim does: front is videos/GX1.mp4" in capture.warnings[0]
+    assert "in name order, as Pose2Sim does: front is videos/GX1.mp4" in capture.warnings[0]
 
 
 @pytest.mark.parametrize("videos", [("cam1", "GX2", "GX3", "GX10"), ("GX1", "GX2", "GX3")])
@@ -90,7 +90,7 @@ def test_neither_order_nor_trial_where_names_or_numbers_say_otherwise(tmp_path: 
     scene = make_scene(lens="opencv5")
     written(tmp_path, scene, dict(zip(NAMES, videos, strict=False)))
     (tmp_path / "cam11.mp4").unlink(missing_ok=True)
-    with pytest.raises(CaptureError, match="There is no video and no folder of images called 'cam2'"):
+    with pytest.raises(CaptureError, match="No video or folder of images is called 'cam2'"):
         open_capture(tmp_path)
 
 
@@ -109,7 +109,7 @@ def test_a_toml_next_to_a_calibration_of_qualisys_is_said(tmp_path: Path) -> Non
     written_toml.write(tmp_path, scene, has_times=False)
     capture = open_capture(tmp_path)
     assert capture.format == "toml"
-    assert any(text.startswith("Calib.qca.txt is not read, but Calib_scene.toml.") for text in capture.warnings)
+    assert any(text.startswith("Calib.qca.txt is ignored in favour of Calib_scene.toml.") for text in capture.warnings)
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def test_inverted_poses_are_recognised():
 def test_a_camera_that_looks_away_is_named():
     poses = RIG.world_to_camera.copy()
     poses[3] = np.diag([-1.0, 1.0, -1.0, 1.0]) @ poses[3]  # turned about its own vertical axis
-    assert f"look away from what the others look at: {RIG.names[3]}." in warnings(moved(RIG, poses))
+    assert f"face away from the scene: {RIG.names[3]}." in warnings(moved(RIG, poses))
 
 
 def test_cameras_in_one_place_are_named_and_all_of_them_there_cannot_be_trained():

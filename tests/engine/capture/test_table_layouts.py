@@ -80,7 +80,7 @@ def test_masks_fit_their_frames_or_are_left_with_a_word(tmp_path: Path) -> None:
     (tmp_path / "masks" / "cam2" / "000001.png").unlink()
     capture = open_capture(tmp_path)
     assert [entry.masks is not None for entry in capture.layout.cameras] == [True, False, True, True]
-    assert 'Masks of camera "cam2" are not used: there is no mask of 1 of 4 frames' in " ".join(capture.warnings)
+    assert 'Masks of camera "cam2" are not used: no mask for 1 of 4 frames' in " ".join(capture.warnings)
 
 
 def test_times_of_frames_set_the_clock(tmp_path: Path) -> None:

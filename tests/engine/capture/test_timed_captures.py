@@ -110,4 +110,4 @@ def test_the_calibration_says_which_way_is_up(tmp_path, size, is_warned):
     described(tmp_path, a={"width": size[0], "height": size[1], "K": K})
     capture = open_capture(tmp_path)
     assert capture.frame(0, 0).shape[:2] == (SIZE[1], SIZE[0]) if is_warned else (SIZE[0], SIZE[1])
-    assert any("Not turned" in warning for warning in capture.warnings) == is_warned
+    assert any("Not rotated" in warning for warning in capture.warnings) == is_warned

@@ -42,7 +42,7 @@ def test_masks_beside_any_layout_are_found_and_said(layout: str, request: pytest
         found = capture.moving_mask(1, frame)
         assert found is not None
         assert np.array_equal(found, masks[frame])
-    assert any("masks of what moves for 1 of" in said and name in said for said in capture.warnings)
+    assert any("motion masks for 1 of" in said and name in said for said in capture.warnings)
 
 
 def test_a_video_of_masks_and_smaller_masks(make_sample: MakeCapture) -> None:
@@ -114,7 +114,7 @@ def test_masks_that_do_not_fit_are_left_out_and_said(make_sample: MakeCapture) -
 def test_a_folder_of_masks_for_nobody_is_said(make_sample: MakeCapture) -> None:
     folder = make_sample(n_cameras=3, n_frames=4)
     (folder / "masks" / "camera0").mkdir(parents=True)
-    assert any("has nothing for any camera" in said for said in open_capture(folder).warnings)
+    assert any("has no masks for any camera" in said for said in open_capture(folder).warnings)
 
 
 def test_masks_outside_of_the_capture_are_not_followed(make_sample: MakeCapture, tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_the_calibration_decides_whether_pictures_are_turned(tmp_path, size, is_
     (tmp_path / "cameras.json").write_text(json.dumps(document))
     capture = open_capture(tmp_path)
     assert capture.frame(0, 1).shape[:2] == size[::-1]
-    assert any("not turned" in warning for warning in capture.warnings) == is_warned
+    assert any("not rotated" in warning for warning in capture.warnings) == is_warned
 
 
 def test_frames_without_times_are_refused(tmp_path):

@@ -79,7 +79,7 @@ def test_a_child_that_does_not_listen_holds_up_nobody(tmp_path) -> None:
         ("fault", r"The child ended with code 1 \(ZeroDivisionError: one of a kind\)", True),
         ("leave", r"The child ended with code 7 \(no message\)", True),
         ("die", "The child was ended by signal 9, perhaps because memory ran out", False),
-        ("lie", "The child said what cannot be read", True),
+        ("lie", "The child sent an unreadable message", True),
         ("unknown", r"The child ended with code 1 \(KeyError: 'unknown'\)", True),
     ],
 )
@@ -108,7 +108,7 @@ def test_one_that_cannot_be_started_is_a_reason(monkeypatch) -> None:
 
 
 def test_one_that_stands_still_is_ended() -> None:
-    with pytest.raises(ChildFailed, match="The child did nothing for 0 s"):
+    with pytest.raises(ChildFailed, match="The child did not respond for 0 s"):
         run_child(AT_ONCE, Ask("sleep"), stall_s=0.5)
 
 

@@ -27,7 +27,7 @@ def test_short_clips_keep_frames_for_their_other_boundary() -> None:
 
 @pytest.mark.parametrize("after", [0, 3, -1])
 def test_there_is_no_boundary_before_the_first_clip_or_behind_the_last(after: int) -> None:
-    with pytest.raises(ProjectError, match=f"no boundary before clip {after}"):
+    with pytest.raises(ProjectError, match=f"Clip {after} has no boundary"):
         boundary_stretch(CLIPS, after)
 
 

@@ -57,7 +57,7 @@ def test_other_sounds_and_silence_tell_nothing(tmp_path):
     write_sound_video(paths[3], np.zeros(0))
     found = audio_estimate(recordings_in_videos(paths), 30.0)
     assert found.n_known == 0
-    assert "no two of them the same" in found.note
+    assert "no two share any" in found.note
     assert audio_estimate([Recording("images", Pictures(np.zeros((2, 2, 2, 3))), np.arange(2.0))], 30).n_known == 0
 
 

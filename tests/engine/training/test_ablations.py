@@ -196,7 +196,7 @@ def test_moving_anchors_that_learn_on_are_those_that_the_clip_uses(tiny, source_
     assert shown.roles() == ["static", "residual", "adapted"]
     assert np.array_equal(
         shown.anchors().inherited_positions, tiny.reference.arrays["sets.static.positions"]
-    )  # no moving anchor is there twice
+    )  # no moving anchor occurs twice
 
 
 @pytest.mark.parametrize("gate", ["off", "static"])
@@ -330,7 +330,7 @@ def test_merging_makes_residual_anchors_moving_ones(streamed):
         ({"independent": True, "field": "continue"}, "cannot continue"),
         ({"independent": True, "decoder": "new", "inherit": "off"}, "decoder=new, inherit=off would change nothing"),
         ({"independent": True, "residual": "full"}, "residual=full would change nothing"),
-        ({"inherit": "off", "residual": "none"}, "without anything that moves"),
+        ({"inherit": "off", "residual": "none"}, "with nothing that moves"),
         ({"start": "previous"}, "needs independent=true"),
         ({"decoder": "fresh"}, "'frozen', 'finetune' or 'new'"),
         ({"residual": "some"}, "'dedup', 'none' or 'full'"),

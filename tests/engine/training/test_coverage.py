@@ -58,7 +58,7 @@ def test_inherited_anchors_in_use_count_and_the_rest_is_left_to_anchors_beside_i
     residual = model.anchor_set("residual")
     assert (len(residual), coverage.n_residual, coverage.n_left_out) == (120, 120, N - 120)
     assert f"at most {N + 120} a clip, {N} inherited ones in use" in coverage.text
-    assert f"{N - 120} points left to the anchors beside them" in coverage.text
+    assert f"{N - 120} points left to neighbouring anchors" in coverage.text
     assert residual.presence is not None
     # every point outside has, in its frame, an anchor no more than a voxel away
     new, frame = cloud.points[N:], cloud.presence[N:].argmax(1)
@@ -73,7 +73,7 @@ def test_the_busiest_frame_always_has_its_anchors():
     model, cloud = scene()
     coverage = add_residual(model, cloud, TrainConfig(max_moving_points=10))
     busiest = int(cloud.presence[N:].sum(0).max())
-    assert (coverage.n_residual, coverage.reason) == (busiest, "as many as are there in the busiest frame")
+    assert (coverage.n_residual, coverage.reason) == (busiest, "as many as in the busiest frame")
     assert 0.5 < coverage.share < 1.0
 
 

@@ -35,7 +35,7 @@ def test_where_nothing_moves_a_later_clip_takes_no_step_and_no_room(still):
     assert training.model.field is None
     assert training.model.roles() == ["static"]
     assert still.n_bytes(1) < MAX_BYTES
-    assert "no steps instead of 160" in still.said[1]["Nothing to learn"]
+    assert "0 steps instead of 160" in still.said[1]["Nothing to learn"]
 
 
 def test_where_nothing_moves_no_pixel_ever_changes(still):

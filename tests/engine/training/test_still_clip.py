@@ -1,4 +1,4 @@
-"""A clip in which nothing moves: no field, no residual anchors, no steps, next to nothing to store."""
+"""A clip in which nothing moves: no field, no residual anchors, no steps, negligible to store."""
 
 from __future__ import annotations
 
@@ -59,5 +59,5 @@ def test_its_plan_says_so(still, tiny):
     )
     assert plan.n_steps == plan.training_s.value == 0
     assert {line.reason for line in plan.lines if line.name == "source steps"} == {
-        "nothing moves in the pictures looked at, so there is nothing to learn"
+        "nothing moves in the sampled pictures, so there is nothing to learn"
     }

@@ -55,7 +55,7 @@ def test_the_last_step_of_the_window_is_done_again_by_the_command(pilot, clipboa
     session = pilot.session
     folder = session.project.folder
     no_step = next(action for action in ACTIONS if action.id == "edit.copy_command")
-    assert no_step.why_not(session, pilot.studio.frame.ui) == "There is no step to copy yet."
+    assert no_step.why_not(session, pilot.studio.frame.ui) == "No step to copy yet."
     session.dispatch(AddEdit(Delete(), Sphere((0.5, -1e-5, 0.0), 0.25), name=NAME))
     made = session.document.content
     run_action(pilot, "edit.copy_command")

@@ -112,7 +112,7 @@ def test_the_question_says_what_becomes_of_the_open_project() -> None:
     asked = CorrectionQuestion("/captures/dance", "Exclude a", Corrections(), "/projects/dance", True)
     said = " ".join(correction_texts(asked))
     assert "capture.json" in said
-    assert "will not fit it any more" in said
+    assert "no longer matches" in said
     assert "/projects/dance" in said
 
 

@@ -111,9 +111,9 @@ def test_a_panel_that_fails_anywhere_costs_one_notice_and_leaves_nothing_open(
         sabotage.fails_at = place
         pilot.draw(4)  # a stack that is not balanced makes Dear ImGui raise at the end of the frame
         assert sabotage.n_calls == place
-        assert told(pilot) == [f"A fault in the panel {title}"] or (title, told(pilot)) == (
+        assert told(pilot) == [f"Error in the panel {title}"] or (title, told(pilot)) == (
             VIEWPORT,
-            ["A fault in view 1"],
+            ["Error in view 1"],
         )
         assert elsewhere <= pilot.rects.keys()
         sabotage.fails_at = None
@@ -155,7 +155,7 @@ def test_a_dialog_that_fails_is_closed_and_is_not_in_the_way(
     for place in (n_calls // 3, n_calls // 2, n_calls - 1):
         sabotage.fails_at = place
         pilot.draw(4)
-        assert told(pilot) == [f"A fault in {part}"]
+        assert told(pilot) == [f"Error in {part}"]
         frame_index = pilot.session.timeline.frame_index
         pilot.click("timeline.track")
         pilot.key(key.RIGHT)
@@ -209,7 +209,7 @@ def test_a_mode_that_fails_in_one_view_leaves_the_others(
     for look in pilot.session.views.shown:
         look.overlays.mode, look.overlays.compare = mode, "wipe"
     pilot.draw(3)
-    assert told(pilot) == ["A fault in view 2"]
+    assert told(pilot) == ["Error in view 2"]
     assert composed[-3:] == [0, 2, 3]
     pilot.tap(*pilot.rects["viewport.view1"].center)
     assert pilot.session.views.active_index == 1, "the view that fails can still be chosen, and shown otherwise"
@@ -229,11 +229,11 @@ def test_a_fault_that_comes_and_goes_is_told_again_only_after_its_notice_was_dis
         pilot.draw(2)
         sabotage.fails_at = None
         pilot.draw(2)
-    assert told(pilot) == ["A fault in the panel Timeline"]
+    assert told(pilot) == ["Error in the panel Timeline"]
     _forget(pilot, caplog)
     sabotage.fails_at = 2
     pilot.draw(2)
-    assert told(pilot) == ["A fault in the panel Timeline"]
+    assert told(pilot) == ["Error in the panel Timeline"]
     _forget(pilot, caplog)  # while it goes on
     assert told(pilot) == []
 
@@ -246,5 +246,5 @@ def test_a_fault_between_two_frames_ends_neither_the_loop_nor_what_it_draws(
 
     monkeypatch.setattr(Scene, "has_news", fail)
     pilot.draw(4)
-    assert told(pilot) == ["Something between two frames went wrong"]
+    assert told(pilot) == ["An error occurred between two frames"]
     assert "viewport.canvas" in pilot.rects

@@ -207,7 +207,7 @@ def test_an_earlier_version_that_is_not_there_says_so() -> None:
     assert other_label(overlays) == "Version 3"
     assert missing_words(overlays, versions) == "This clip has no version 3"
     assert missing_words(overlays, [VersionStatus(3)]) == "Version 3 is being drawn"
-    assert missing_words(Overlays(), versions) == "Captured picture is being read"
+    assert missing_words(Overlays(), versions) == "Reading the captured picture"
     for other in (CAPTURED, "depth", "version", "version x", "version -1", "version ²"):
         assert version_number(other) is None
 

@@ -62,7 +62,7 @@ def test_it_is_asked_before_clips_are_written(panel: Pilot, button: str, command
 
 def test_the_question_says_what_stays() -> None:
     whole = " ".join(clip_question_texts(DeletionsQuestion(1234, 3, 0)))
-    assert "3 clips will be written again without 1,234 anchors" in whole
+    assert "3 clips will be rewritten without 1,234 anchors" in whole
     assert "not trained" not in whole
     assert "1 clip is not trained" in " ".join(clip_question_texts(DeletionsQuestion(1, 1, 1)))
 

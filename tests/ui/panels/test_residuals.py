@@ -123,8 +123,8 @@ def test_words_say_what_is_shown_and_why_not() -> None:
     assert heat_words(kind, shown) == "E: excess flicker, frame 5, mean 1.2 x 1/255"
     little = HeatMap(np.zeros((2, 2), np.float32), "E", 1, 0, 5, 0, mean=0.0452)
     assert heat_words(kind, little) == "E: excess flicker, frame 5, mean 0.045 x 1/255"
-    nothing = HeatMap(None, "E", None, 0, 0, 0, note="Frame 0 has no frame before it.")
-    assert "no frame before" in heat_words(kind, nothing)
+    nothing = HeatMap(None, "E", None, 0, 0, 0, note="Frame 0 has no previous frame.")
+    assert "no previous frame" in heat_words(kind, nothing)
     assert "being measured" in heat_words(kind, None)
 
 
@@ -241,7 +241,7 @@ def test_words_of_a_heat_map_lie_over_the_wipe_and_fit_into_the_picture(
     pilot: Pilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[str] = []
-    note = "Clip 0 ends before this frame: its last one stands in, which shows no more than R"
+    note = "Clip 0 ends before this frame; its last frame stands in, which shows no more than R"
     plain = pilot.session.heat
     monkeypatch.setattr(pilot.session, "heat", lambda kind: replace(plain(kind), note=f"{note}; {note}"))
     monkeypatch.setattr(

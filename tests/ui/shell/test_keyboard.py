@@ -168,8 +168,8 @@ def test_events_wait_for_the_frame_of_a_key_and_keep_their_order() -> None:
         (key.N, (SHIFT,), "No clip is waiting."),
         (key.UP, (SHIFT,), "There is no marker before this frame."),
         (key._3, (CTRL,), "There is no bookmark 3 yet."),
-        (key.V, (SHIFT,), "There is one view."),
-        (key.Z, (CTRL,), "There is nothing to take back."),
+        (key.V, (SHIFT,), "There is only one view."),
+        (key.Z, (CTRL,), "Nothing to undo."),
     ],
 )
 def test_a_key_that_cannot_act_says_why_once(

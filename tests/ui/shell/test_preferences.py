@@ -169,7 +169,7 @@ def test_a_configuration_that_cannot_be_written_is_one_notice(open_pilot: Callab
         pilot.studio.frame.remembering.save(pilot.session)
     pilot.draw(3)
     (notice,) = pilot.session.notices
-    assert (notice.kind, notice.title) == ("warn", "Preferences cannot be kept")
+    assert (notice.kind, notice.title) == ("warn", "Preferences cannot be saved")
     assert str(tmp_path / "config") in notice.detail
     pilot.key(key.SPACE)
     assert pilot.session.timeline.is_playing
@@ -223,4 +223,4 @@ def test_the_folder_of_projects_is_named_again_only_where_the_box_does_not_show_
     assert projects_words("/films").startswith("New projects go here. ")
     assert projects_words("films").startswith(f"New projects go to {Path('films').absolute()}. ")
     monkeypatch.setenv(VARIABLE, "/named")
-    assert projects_words("/films").startswith(f"New projects go to /named. {VARIABLE} names it. ")
+    assert projects_words("/films").startswith(f"New projects go to /named. Set by {VARIABLE}. ")

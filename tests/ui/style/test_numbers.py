@@ -11,3 +11,8 @@ from ui.style.numbers import number_format
 )
 def test_an_input_field_shows_no_exponent(value: float, text: str) -> None:
     assert number_format(value) % value == text
+
+
+def test_a_field_shows_nothing_finer_than_its_range_needs() -> None:
+    assert number_format(2.38e-5, 0.001) % 2.38e-5 == "0.000"
+    assert number_format(0.998, 0.001) % 0.998 == "0.998"

@@ -94,7 +94,7 @@ def test_where_a_typed_time_leads(text, frame_index):
     [
         ("5000", 999, "The last frame is 999."),
         ("99999s", 999, "The last frame is 999."),
-        ("-60", 0, "There is nothing before frame 0."),
+        ("-60", 0, "The first frame is 0."),
         ("clip 100", 990, "The last clip is 99."),
         ("9" * 39, 999, "The last frame is 999."),
         ("99:00:00:00", 999, "The last frame is 999."),

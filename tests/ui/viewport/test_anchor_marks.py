@@ -69,8 +69,8 @@ def test_an_anchor_in_a_region_says_so_until_its_clip_was_trained_with_it():
     regions = [sphere_region("static", (0.0, 0.0, 1.5), 1.0), sphere_region("dynamic", (0.0, 0.0, 2.0), 0.1)]
     marks = anchor_marks(POSITIONS, CODES, REASONS, most=10, color=SKY)
     first, second, third, _ = (marks.text(row, regions).splitlines() for row in range(4))
-    assert first[1:] == ["in a region marked as moving, which counts from the next training on"]  # the later one
-    assert second[1:] == [reason_text(LIGHT), "in a region marked as static, which counts from the next training on"]
+    assert first[1:] == ["in a region marked as moving, in effect from the next training on"]  # the later one
+    assert second[1:] == [reason_text(LIGHT), "in a region marked as static, in effect from the next training on"]
     assert len(third) == 1
     heeded = np.array([USER_DYNAMIC, USER_STATIC, NO_REASON, NO_REASON], np.uint8)
     marks = anchor_marks(POSITIONS, CODES, heeded, most=10, color=SKY)

@@ -102,7 +102,7 @@ def test_what_failed_is_not_on_its_way():
 def test_a_cloud_that_stands_in_for_a_clip_that_loads_says_what_is_missing():
     text = text_of(ShownPicture(kind=CLOUD, size=(800, 500), full_size=(800, 500)), replace(WANTED, is_loaded=False))
     assert text.pending == "loading clip 0"
-    assert text.note == "point cloud of what stands still, not the trained result"
+    assert text.note == "point cloud of static parts, not the trained result"
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_cloud_that_stands_in_for_a_clip_that_loads_says_what_is_missing():
             CLOUD,
             "preparing",
             "preparing",
-            "point cloud of what stands still, moving objects are missing: clip 0 preparing",
+            "point cloud of static parts, moving objects are missing: clip 0 preparing",
         ),
         (CAPTURED, "stale", "out of date", "captured picture: clip 0 is out of date"),
     ],

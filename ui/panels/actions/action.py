@@ -70,9 +70,9 @@ class Action:
         is_tool_used = ui.selecting.is_active or ui.editing.is_active or is_asking_to_mend(session)
         if self.needs_choosing and not (ui.regions.is_active or (self.leaves_tool and is_tool_used)):
             if not self.moves_keys:
-                return "Only while a region is being chosen."
+                return "Only available while placing a region."
             if session.paths.key is None:
-                return "Only while a region is being chosen, or a key of the camera path."
+                return "Only available while placing a region or with a camera key chosen."
         lacks = "" if self.lacks is None else self.lacks(session)
         if not lacks and self.needs_edit and session.edits.edit(ui.editing.chosen) is None:
             return "Choose an edit first."

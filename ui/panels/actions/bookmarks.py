@@ -59,7 +59,7 @@ def _numbered(number: int) -> tuple[Action, Action]:
         ),
         Action(
             f"bookmark.keep{number}",
-            f"Keep this view as bookmark {number}{others}",
+            f"Save this view as bookmark {number}{others}",
             BOOKMARKS,
             _keep(number),
             keys=(f"Ctrl+Shift+{number}",),

@@ -133,7 +133,7 @@ def _cannot_edit_path(session: SessionView) -> str:
 
 
 def _cannot_edit_key(session: SessionView) -> str:
-    return _cannot_edit(session) or ("No key of a camera path is chosen." if session.paths.key is None else "")
+    return _cannot_edit(session) or ("No camera key is chosen." if session.paths.key is None else "")
 
 
 def _is_loop(session: SessionView) -> bool:
@@ -141,10 +141,12 @@ def _is_loop(session: SessionView) -> bool:
 
 
 ACTIONS = (
-    Action("path.key", "Camera key at the playhead from this view", PATH, _set_key, keys=("C",), lacks=_cannot_edit),
+    Action(
+        "path.key", "Add a camera key at the playhead from this view", PATH, _set_key, keys=("C",), lacks=_cannot_edit
+    ),
     Action(
         "path.along",
-        "Look along the camera path while time goes by",
+        "Follow the camera path during playback",
         PATH,
         _along,
         keys=("P",),
@@ -155,7 +157,7 @@ ACTIONS = (
     Action("path.next_key", "Next camera key", PATH, _key_by(1), keys=("Alt+Right",), lacks=_no_keys),
     Action(
         "path.earlier",
-        "Chosen camera key one frame earlier",
+        "Move the chosen camera key one frame earlier",
         PATH,
         _time_by(-1),
         keys=("Alt+Shift+Left",),
@@ -164,22 +166,22 @@ ACTIONS = (
     ),
     Action(
         "path.later",
-        "Chosen camera key one frame later",
+        "Move the chosen camera key one frame later",
         PATH,
         _time_by(1),
         keys=("Alt+Shift+Right",),
         repeats=True,
         lacks=_cannot_edit_key,
     ),
-    Action("path.aim", "Chosen camera key takes this view", PATH, _aim, keys=("Shift+C",), lacks=_cannot_edit_key),
+    Action("path.aim", "Set the chosen camera key to this view", PATH, _aim, keys=("Shift+C",), lacks=_cannot_edit_key),
     Action("path.new", "New camera path from this view", PATH, _make(NewCameraPath), lacks=_cannot_edit),
     Action(
-        "path.turntable", "New turntable round what this view looks at", PATH, _make(MakeTurntable), lacks=_cannot_edit
+        "path.turntable", "New turntable around the centre of this view", PATH, _make(MakeTurntable), lacks=_cannot_edit
     ),
     Action(
         "path.fly_through", "New fly-through from camera to camera", PATH, _make(MakeFlyThrough), lacks=_cannot_edit
     ),
     Action("path.next", "Choose the next camera path", PATH, _next_path, lacks=_no_path),
-    Action("path.loop", "Camera path: a loop, or not", PATH, _close, is_on=_is_loop, lacks=_cannot_edit_path),
+    Action("path.loop", "Loop the camera path on or off", PATH, _close, is_on=_is_loop, lacks=_cannot_edit_path),
     Action("path.delete", "Delete the camera path", PATH, _delete, lacks=_cannot_edit_path),
 )

@@ -50,7 +50,7 @@ def _split(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 def _cannot_split(session: SessionView) -> str:
     clip = session.timeline.clip
     if clip is None or session.timeline.frame_index == clip.start:
-        return "Move the playhead behind the first frame of a clip."
+        return "Move the playhead past the first frame of a clip."
     return _something_trains(session)
 
 
@@ -63,7 +63,7 @@ def _merge(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 def _cannot_merge(session: SessionView) -> str:
     clip = session.timeline.clip
     if clip is None or clip.stop >= session.timeline.n_frames:
-        return "There is no clip after the one under the playhead."
+        return "No clip follows the one under the playhead."
     return _something_trains(session)
 
 
@@ -74,7 +74,7 @@ def _make_reference(session: SessionView, dispatch: Dispatch, ui: UiState) -> No
 
 
 def _something_trains(session: SessionView) -> str:
-    return "" if session.training.state in ("idle", "failed") else "Stop the training first: what was learned is kept."
+    return "" if session.training.state in ("idle", "failed") else "Stop training first; progress is kept."
 
 
 def _free_versions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
@@ -88,7 +88,7 @@ def _apply_deletions(session: SessionView, dispatch: Dispatch, ui: UiState) -> N
 ACTIONS = (
     Action(
         "clips.compare_version",
-        "Compare this clip with what it was before, side by side",
+        "Compare this clip with its previous version, side by side",
         TRAIN,
         _compare_version,
         keys=("Shift+G",),
@@ -96,7 +96,7 @@ ACTIONS = (
     ),
     Action(
         "clips.train_stale",
-        "Train every clip again that is out of date",
+        "Retrain every clip that is out of date",
         TRAIN,
         _train_stale,
         keys=("Alt+T",),
@@ -106,17 +106,17 @@ ACTIONS = (
     Action("clips.merge", "Merge this clip with the next one", TRAIN, _merge, keys=("Alt+M",), lacks=_cannot_merge),
     Action(
         "clips.reference",
-        "Let the other clips inherit from this one",
+        "Make this clip the reference clip",
         TRAIN,
         _make_reference,
         lacks=_something_trains,
     ),
     Action(
         "clips.apply_deletions",
-        "Apply deletions permanently: write clips without what edits delete",
+        "Apply deletions permanently: rewrite clips without deleted anchors",
         TRAIN,
         _apply_deletions,
         lacks=_something_trains,
     ),
-    Action("clips.free", "Make room: delete earlier versions of clips", TRAIN, _free_versions),
+    Action("clips.free", "Free disk space: delete earlier versions of clips", TRAIN, _free_versions),
 )

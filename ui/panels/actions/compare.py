@@ -142,14 +142,14 @@ ACTIONS = (
     _overlay("show_residual", "Show or hide residual anchors", "3"),
     Action(
         "show.cloud",
-        "Point cloud, also in place of a trained picture",
+        "Show the point cloud, even in place of a trained picture",
         COMPARE,
         _toggle_cloud,
         keys=("4",),
         is_on=_is_cloud_shown,
     ),
     _overlay("show_regions", "Show or hide marked regions", "5"),
-    _overlay("show_coverage", "Show or hide what inherited anchors cover", "9"),
-    _overlay("show_trails", "Show or hide the trails of what moves", "0"),
+    _overlay("show_coverage", "Show or hide the space covered by inherited anchors", "9"),
+    _overlay("show_trails", "Show or hide motion trails", "0"),
     _overlay("show_paths", "Show or hide the camera path", "Shift+P"),
 )

@@ -31,7 +31,7 @@ def _training(session: SessionView) -> CommandText:
 
 
 def _no_step(session: SessionView) -> str:
-    return "" if session.history.undo else "There is no step to copy yet."
+    return "" if session.history.undo else "No step to copy yet."
 
 
 ACTIONS = (
@@ -42,7 +42,9 @@ ACTIONS = (
         for id_, words, way in _WAYS
     ),
     *(
-        Action(f"train.copy_{id_}", f"Copy training of this clip as {words}", TRAIN, _copy(way, _training), menu=MENU)
+        Action(
+            f"train.copy_{id_}", f"Copy the training of this clip as {words}", TRAIN, _copy(way, _training), menu=MENU
+        )
         for id_, words, way in _WAYS
     ),
 )

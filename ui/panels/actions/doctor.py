@@ -14,4 +14,4 @@ def _examine(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(ExamineCapture())
 
 
-ACTIONS = (Action("doctor.examine", "Examine the capture: what is wrong with it", WINDOW, _examine, menu="File"),)
+ACTIONS = (Action("doctor.examine", "Examine the capture for problems", WINDOW, _examine, menu="File"),)

@@ -117,18 +117,18 @@ ACTIONS = (
         for making in MAKINGS
     ),
     Action(
-        "edit.moving", "Set moving: mark what is selected or drawn as moving", EDIT, mark_moving, lacks=_cannot_edit
+        "edit.moving", "Set moving: mark the selection or drawn volume as moving", EDIT, mark_moving, lacks=_cannot_edit
     ),
-    Action("edit.unhide", "Show again what was hidden last", EDIT, _show_again, keys=("Alt+H",), lacks=_no_edits),
-    Action("edit.outside", "Edit everything outside of what was drawn", EDIT, _outside, keys=("Shift+I",)),
-    Action("edit.next_scope", "Let new edits hold elsewhere: the next choice", EDIT, _next_scope, keys=("Shift+U",)),
+    Action("edit.unhide", "Unhide what was hidden last", EDIT, _show_again, keys=("Alt+H",), lacks=_no_edits),
+    Action("edit.outside", "Edit everything outside the drawn volume", EDIT, _outside, keys=("Shift+I",)),
+    Action("edit.next_scope", "Change the scope of new edits", EDIT, _next_scope, keys=("Shift+U",)),
     *(
         Action(
             f"scope.{choice}",
-            f"New edits hold: {SCOPE_WORDS[choice]}",
+            f"Scope of new edits: {SCOPE_WORDS[choice]}",
             EDIT,
             _hold_in(choice),
-            menu="Edit/New edits hold",
+            menu="Edit/Scope of new edits",
             is_in_help=False,
         )
         for choice in SCOPE_CHOICES
@@ -139,7 +139,7 @@ ACTIONS = (
     ),
     Action(
         "edit.raise",
-        "Chosen edit one up: later",
+        "Move the chosen edit up: applied later",
         EDIT,
         _of_chosen(_moved_by(1)),
         keys=("Alt+Shift+Up",),
@@ -149,7 +149,7 @@ ACTIONS = (
     ),
     Action(
         "edit.lower",
-        "Chosen edit one down: earlier",
+        "Move the chosen edit down: applied earlier",
         EDIT,
         _of_chosen(_moved_by(-1)),
         keys=("Alt+Shift+Down",),
@@ -159,7 +159,7 @@ ACTIONS = (
     ),
     Action(
         "edit.toggle",
-        "Chosen edit on or off",
+        "Turn the chosen edit on or off",
         EDIT,
         _of_chosen(lambda session, edit: ToggleEdit(edit.edit_id)),
         keys=("Ctrl+H",),
@@ -187,13 +187,18 @@ ACTIONS = (
         menu=STACK,
         lacks=_no_edits,
     ),
-    Action("world.up_of_view", "Up is as in this view", EDIT, _up_of_view, menu="Edit/World", lacks=_cannot_edit),
+    Action("world.up_of_view", "Set up from this view", EDIT, _up_of_view, menu="Edit/World", lacks=_cannot_edit),
     Action(
-        "world.ground", "Up by three points of the ground", EDIT, _ask("ground"), menu="Edit/World", lacks=_cannot_edit
+        "world.ground",
+        "Set up from three points on the ground",
+        EDIT,
+        _ask("ground"),
+        menu="Edit/World",
+        lacks=_cannot_edit,
     ),
     Action(
         "world.length",
-        "Scale by two points of known length",
+        "Set the scale from two points at a known distance",
         EDIT,
         _ask("length"),
         menu="Edit/World",
@@ -205,7 +210,7 @@ ACTIONS = (
         EDIT,
         _step_by(-1_000_000),
         menu="Edit/History",
-        lacks=lambda session: "" if session.history.undo else "There is nothing to take back.",
+        lacks=lambda session: "" if session.history.undo else "Nothing to undo.",
     ),
     Action(
         "history.last",
@@ -213,6 +218,6 @@ ACTIONS = (
         EDIT,
         _step_by(1_000_000),
         menu="Edit/History",
-        lacks=lambda session: "" if session.history.redo else "Nothing was taken back.",
+        lacks=lambda session: "" if session.history.redo else "Nothing to redo.",
     ),
 )

@@ -53,7 +53,7 @@ def _paint(scope: str) -> Run:
 ACTIONS = (
     Action(
         "exclude.camera",
-        "Exclude this camera from training, or not",
+        "Exclude this camera from training, or include it",
         TRAIN,
         _exclude_camera,
         keys=("Alt+X",),
@@ -63,7 +63,7 @@ ACTIONS = (
     ),
     Action(
         "exclude.picture",
-        "Exclude this frame of this camera from training, or not",
+        "Exclude this frame of this camera from training, or include it",
         TRAIN,
         _exclude_picture,
         keys=("Shift+X",),
@@ -72,7 +72,7 @@ ACTIONS = (
     ),
     Action(
         "exclude.frame",
-        "Exclude this frame of all cameras from training, or not",
+        "Exclude this frame of all cameras from training, or include it",
         TRAIN,
         _exclude_frame,
         is_on=lambda session: _is_out(session, None),
@@ -80,7 +80,7 @@ ACTIONS = (
     ),
     Action(
         "exclude.paint",
-        "Paint over what training does not see of this camera",
+        "Paint a training mask for this camera",
         TRAIN,
         _paint("all"),
         keys=("Alt+N",),
@@ -89,7 +89,7 @@ ACTIONS = (
     ),
     Action(
         "exclude.paint_clip",
-        "Paint over what training does not see of this camera, in this clip",
+        "Paint a training mask for this camera, in this clip",
         TRAIN,
         _paint("clip"),
         lacks=_no_camera,
@@ -97,7 +97,7 @@ ACTIONS = (
     ),
     Action(
         "exclude.paint_frame",
-        "Paint over what training does not see of this camera, in this frame",
+        "Paint a training mask for this camera, in this frame",
         TRAIN,
         _paint("frame"),
         lacks=_no_camera,

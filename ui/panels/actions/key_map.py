@@ -40,12 +40,12 @@ class KeyMap:
         known = {action.id for action in actions}
         for action_id, labels in list(self.chosen.items()):
             if action_id not in known:
-                logger.warning("keys of an action that does not exist are ignored: %s", ascii(action_id[:80]))
+                logger.warning("ignoring keys of an unknown action: %s", ascii(action_id[:80]))
                 del self.chosen[action_id]
                 continue
             sound = [label for label in labels if _is_key(label)]
             if len(sound) < len(labels):
-                logger.warning("keys of %s that make no sense are ignored: %s", action_id, ascii(labels)[:200])
+                logger.warning("ignoring invalid keys of %s: %s", action_id, ascii(labels)[:200])
                 if sound:
                     self.chosen[action_id] = sound
                 else:  # what cannot be read is not the wish to have no key

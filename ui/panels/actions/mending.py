@@ -23,7 +23,7 @@ def _mend_seam(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _one_clip(session: SessionView) -> str:
-    return "There is one clip, and so no seam." if len(session.timeline.clips) < 2 else _is_running(session)
+    return "A project with one clip has no seams." if len(session.timeline.clips) < 2 else _is_running(session)
 
 
 def _mend_frames(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
@@ -35,13 +35,13 @@ def _mend_frames(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 def _no_frames(session: SessionView) -> str:
     timeline = session.timeline
     if timeline.in_frame is None or timeline.out_frame is None:
-        return "Choose the frames that flicker by I and O first."
+        return "Set the in and out points around the flicker first (I and O)."
     return _is_running(session)
 
 
 def _is_running(session: SessionView) -> str:
     page = session.mending.page
-    return "Something is being mended already." if page is not None and page.state == "running" else ""
+    return "Mending is already running." if page is not None and page.state == "running" else ""
 
 
 def _compare(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
@@ -55,7 +55,7 @@ def _revert(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 def _nothing_mended(session: SessionView) -> str:
     page = session.mending.page
     is_there = page is not None and page.state == "done" and page.record is not None and page.record.has_helped
-    return "" if is_there else "Nothing was mended just now; the menu of a clip has its versions."
+    return "" if is_there else "No mend to revert; earlier versions are in the clip menu."
 
 
 def _close(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
@@ -64,13 +64,13 @@ def _close(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _nothing_shown(session: SessionView) -> str:
-    return "Nothing is being mended." if session.mending.page is None else ""
+    return "Mending is not running." if session.mending.page is None else ""
 
 
 ACTIONS = (
     Action(
         "mend.seam",
-        "Mend the nearest seam between clips; again: begin",
+        "Mend the nearest seam between clips; again: start",
         TRAIN,
         _mend_seam,
         keys=("Shift+M",),
@@ -81,12 +81,14 @@ ACTIONS = (
     ),
     Action(
         "mend.compare",
-        "Mended clip beside what it was, or no more",
+        "Compare the mended clip with the one before, on or off",
         TRAIN,
         _compare,
         keys=("Alt+B",),
         lacks=_nothing_mended,
     ),
-    Action("mend.revert", "Take back what was mended", TRAIN, _revert, keys=("Alt+Shift+Z",), lacks=_nothing_mended),
-    Action("mend.close", "Stop mending, or keep what was mended", TRAIN, _close, keys=("Alt+K",), lacks=_nothing_shown),
+    Action("mend.revert", "Revert the mend", TRAIN, _revert, keys=("Alt+Shift+Z",), lacks=_nothing_mended),
+    Action(
+        "mend.close", "Stop mending, or keep the mended clips", TRAIN, _close, keys=("Alt+K",), lacks=_nothing_shown
+    ),
 )

@@ -104,7 +104,7 @@ def _toggle_easing(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
 
 def up_words(name: str) -> str:
     """How the window calls one of UP_AXES."""
-    return "as the cameras stand" if UP_AXES[name] is None else name.upper()
+    return "as the cameras suggest" if UP_AXES[name] is None else name.upper()
 
 
 def _up(name: str) -> Action:
@@ -141,9 +141,9 @@ ACTIONS = (
         keys=("Num 5", "Alt+5"),
         is_on=lambda session: session.view.is_orthographic,
     ),
-    Action("view.lean_left", "Lean to the left", NAVIGATE, _lean(-LEAN_STEP), keys=("Shift+[",), repeats=True),
-    Action("view.lean_right", "Lean to the right", NAVIGATE, _lean(LEAN_STEP), keys=("Shift+]",), repeats=True),
-    Action("view.upright", "Stand upright again", NAVIGATE, _stand_upright, keys=("Shift+\\",)),
+    Action("view.lean_left", "Roll left", NAVIGATE, _lean(-LEAN_STEP), keys=("Shift+[",), repeats=True),
+    Action("view.lean_right", "Roll right", NAVIGATE, _lean(LEAN_STEP), keys=("Shift+]",), repeats=True),
+    Action("view.upright", "Reset the roll", NAVIGATE, _stand_upright, keys=("Shift+\\",)),
     Action("view.wider", "Wider field of view", NAVIGATE, _scale_fov(FOV_STEP), keys=("Alt+-",), repeats=True),
     Action(
         "view.narrower", "Narrower field of view", NAVIGATE, _scale_fov(1 / FOV_STEP), keys=("Alt++",), repeats=True
@@ -155,5 +155,5 @@ ACTIONS = (
         )
         for name, preset in PRESETS.items()
     ),
-    Action("navigation.eased", "Ease moves of the view, or jump", NAVIGATE, _toggle_easing, needs_capture=False),
+    Action("navigation.eased", "Smooth view moves on or off", NAVIGATE, _toggle_easing, needs_capture=False),
 )

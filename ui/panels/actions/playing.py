@@ -78,26 +78,22 @@ ACTIONS = (
         keys=("Shift+Space",),
         is_on=lambda session: session.timeline.plays_every_frame,
     ),
-    Action("play.in", "Play from this frame on", PLAY, _on_timeline(Timeline.set_in), keys=("I",)),
-    Action("play.out", "Play up to this frame", PLAY, _on_timeline(Timeline.set_out), keys=("O",)),
-    Action("play.whole", "Play the whole capture", PLAY, _on_timeline(Timeline.clear_range), keys=("X",)),
+    Action("play.in", "Set the in point: play from this frame", PLAY, _on_timeline(Timeline.set_in), keys=("I",)),
+    Action("play.out", "Set the out point: play up to this frame", PLAY, _on_timeline(Timeline.set_out), keys=("O",)),
+    Action("play.whole", "Clear the in and out points", PLAY, _on_timeline(Timeline.clear_range), keys=("X",)),
     Action(
         "play.around",
-        "Play around the nearest seam between clips, or no more",
+        "Play around the nearest seam between clips, on or off",
         PLAY,
         _on_timeline(Timeline.toggle_around),
         keys=("/",),
         is_on=lambda session: session.timeline.around is not None,
     ),
     Action("timeline.fit", "Timeline: the whole capture, or this clip", PLAY, _toggle_fit, keys=("Z",)),
-    Action("timeline.closer", "Timeline: closer", PLAY, _zoom_by(1), keys=("Alt+Page Up",), repeats=True),
-    Action("timeline.farther", "Timeline: farther", PLAY, _zoom_by(-1), keys=("Alt+Page Down",), repeats=True),
-    Action(
-        "timeline.earlier", "Timeline: show what is before", PLAY, _pan_by(-1), keys=("Shift+Page Up",), repeats=True
-    ),
-    Action(
-        "timeline.later", "Timeline: show what comes after", PLAY, _pan_by(1), keys=("Shift+Page Down",), repeats=True
-    ),
+    Action("timeline.closer", "Timeline: zoom in", PLAY, _zoom_by(1), keys=("Alt+Page Up",), repeats=True),
+    Action("timeline.farther", "Timeline: zoom out", PLAY, _zoom_by(-1), keys=("Alt+Page Down",), repeats=True),
+    Action("timeline.earlier", "Timeline: scroll back", PLAY, _pan_by(-1), keys=("Shift+Page Up",), repeats=True),
+    Action("timeline.later", "Timeline: scroll forward", PLAY, _pan_by(1), keys=("Shift+Page Down",), repeats=True),
     Action("timeline.unit", "Timeline: frames, seconds or timecode", PLAY, _next_unit, keys=("U",)),
     Action("timeline.menu", "Menu of this clip", PLAY, _clip_menu, keys=("Shift+F10",)),
 )

@@ -61,7 +61,7 @@ def _toggle(name: str) -> Run:
 
 
 def _nothing_to_select(session: SessionView) -> str:
-    return "" if session.selection.can_select else "There are no Gaussians to select in this frame."
+    return "" if session.selection.can_select else "No Gaussians to select in this frame."
 
 
 def _nothing_selected(session: SessionView) -> str:
@@ -69,7 +69,7 @@ def _nothing_selected(session: SessionView) -> str:
 
 
 def _no_before(session: SessionView) -> str:
-    return "" if session.selection.has_before else "There is no selection before this one."
+    return "" if session.selection.has_before else "No previous selection."
 
 
 _TOOL_KEYS: dict[ToolKind, str] = {
@@ -90,12 +90,14 @@ ACTIONS = (
     ),
     Action("select.all", "Select everything that is shown", SELECT, _send(SelectAll), keys=("Ctrl+A",), **_ANY),
     Action("select.none", "Select nothing", SELECT, _send(ClearSelection), keys=("Ctrl+Shift+A",), **_SOME),
-    Action("select.invert", "Select what is not selected", SELECT, _invert, keys=("Ctrl+I",), **_ANY),
-    Action("select.before", "Back to the selection before", SELECT, _send(Reselect), keys=("Alt+Z",), lacks=_no_before),
+    Action("select.invert", "Invert the selection", SELECT, _invert, keys=("Ctrl+I",), **_ANY),
+    Action(
+        "select.before", "Restore the previous selection", SELECT, _send(Reselect), keys=("Alt+Z",), lacks=_no_before
+    ),
     Action("select.grow", "Grow the selection", SELECT, _by_distance(GrowSelection), keys=("Ctrl+]",), **_SOME),
     Action("select.shrink", "Shrink the selection", SELECT, _by_distance(ShrinkSelection), keys=("Ctrl+[",), **_SOME),
-    Action("select.moving", "Select what moves", SELECT, _moving, **_ANY),
-    Action("select.visible", "Select visible ones only, or through", SELECT, _toggle("is_visible_only")),
+    Action("select.moving", "Select everything that moves", SELECT, _moving, **_ANY),
+    Action("select.visible", "Select visible Gaussians only, or through surfaces", SELECT, _toggle("is_visible_only")),
     Action("select.extent", "Select by extent, or by centre", SELECT, _toggle("is_by_extent")),
     Action("select.anchors", "Select whole anchors, or single Gaussians", SELECT, _toggle("is_whole_anchors")),
 )

@@ -110,10 +110,10 @@ ACTIONS = (
     Action("time.second_back", "One second back", TIME, _step_second(-1), keys=("Shift+Left",), repeats=True),
     Action("time.second_forward", "One second forward", TIME, _step_second(1), keys=("Shift+Right",), repeats=True),
     Action("time.first", "First frame", TIME, _first_frame, keys=("Home",)),
-    Action("time.last", "Last frame; there, again: follow the training", TIME, _last_frame, keys=("End",)),
+    Action("time.last", "Last frame; again: follow training", TIME, _last_frame, keys=("End",)),
     Action(
         "time.follow",
-        "Follow the training: stay in the clip with the newest state",
+        "Follow training: stay in the clip with the newest state",
         TIME,
         _follow,
         is_on=lambda session: session.timeline.is_following,
@@ -123,7 +123,7 @@ ACTIONS = (
     ),
     Action("time.next_clip", "Start of the next clip", TIME, _next_clip, keys=("Down",), repeats=True),
     Action("time.jump", "Go to a frame, time or clip", TIME, _jump, keys=("Ctrl+G",)),
-    Action("time.mark", "Mark this frame, or name its marker", TIME, _mark, keys=("Ctrl+M",)),
+    Action("time.mark", "Add a marker at this frame, or name it", TIME, _mark, keys=("Ctrl+M",)),
     Action(
         "time.unmark",
         "Remove the marker of this frame",

@@ -141,11 +141,11 @@ def _toggle_log_loss(session: SessionView, dispatch: Dispatch, ui: UiState) -> N
 ACTIONS = (
     Action("train.next", "Train the next clip, pause or resume", TRAIN, _train, keys=("T",), lacks=_cannot_train),
     Action("train.all", "Train every clip that is not finished", TRAIN, _train_all, keys=("Shift+T",)),
-    Action("train.from_here", "Train this clip and those after it", TRAIN, _train_from_here),
+    Action("train.from_here", "Train this clip and all after it", TRAIN, _train_from_here),
     Action("train.settings", "Train this clip with other settings", TRAIN, _ask_settings),
     Action(
         "train.stop",
-        "Stop training and keep what was learned",
+        "Stop training; progress is kept",
         TRAIN,
         _stop_training,
         keys=("Ctrl+T",),
@@ -153,7 +153,7 @@ ACTIONS = (
     ),
     Action(
         "train.hold_after",
-        "Hold the queue after this clip, or not",
+        "Hold the queue after this clip, on or off",
         TRAIN,
         _hold_after,
         keys=("Ctrl+Shift+T",),
@@ -163,13 +163,13 @@ ACTIONS = (
         Action(f"queue.{name}", words, TRAIN, run, keys=(key,), lacks=_nothing_waits)
         for name, words, run, key in (
             ("next", "Choose the next waiting clip", _next_waiting, "Shift+N"),
-            ("earlier", "Chosen waiting clip earlier", _move_waiting(-1), "Ctrl+Shift+Up"),
-            ("later", "Chosen waiting clip later", _move_waiting(1), "Ctrl+Shift+Down"),
-            ("remove", "Take the chosen clip out of the queue", _remove_waiting, "Ctrl+Delete"),
+            ("earlier", "Move the chosen waiting clip earlier", _move_waiting(-1), "Ctrl+Shift+Up"),
+            ("later", "Move the chosen waiting clip later", _move_waiting(1), "Ctrl+Shift+Down"),
+            ("remove", "Remove the chosen clip from the queue", _remove_waiting, "Ctrl+Delete"),
         )
     ),
-    Action("queue.retry", "Try failed clips again", TRAIN, _retry_failed, lacks=_nothing_failed),
-    Action("train.quality", "Quality over clips, in the training panel", TRAIN, _toggle_quality, keys=("6",)),
+    Action("queue.retry", "Retry failed clips", TRAIN, _retry_failed, lacks=_nothing_failed),
+    Action("train.quality", "Show quality over clips in the training panel", TRAIN, _toggle_quality, keys=("6",)),
     Action("live.off", "Live view off", TRAIN, _live_view("off"), is_on=_is_live_view("off")),
     Action("live.low", "Live view low: about every 10 s", TRAIN, _live_view("low"), is_on=_is_live_view("low")),
     Action("live.live", "Live view", TRAIN, _live_view("live"), is_on=_is_live_view("live")),

@@ -63,14 +63,14 @@ def _next_view(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _one_view(session: SessionView) -> str:
-    return "There is one view." if session.views.n_shown == 1 else ""
+    return "There is only one view." if session.views.n_shown == 1 else ""
 
 
 ACTIONS = (
     Action("view.home", "Frame the whole scene", VIEW, _home, keys=("F",)),
     Action(
         "view.previous_camera",
-        "Look through the previous camera; with a brush, a smaller one",
+        "Look through the previous camera; with a brush, shrink it",
         VIEW,
         _camera_by(-1),
         keys=("[",),
@@ -78,7 +78,7 @@ ACTIONS = (
     ),
     Action(
         "view.next_camera",
-        "Look through the next camera; with a brush, a larger one",
+        "Look through the next camera; with a brush, enlarge it",
         VIEW,
         _camera_by(1),
         keys=("]",),
@@ -88,5 +88,5 @@ ACTIONS = (
     Action("view.two", "Two views side by side", VIEW, _show_views(2), is_on=_shows(2)),
     Action("view.four", "Four views", VIEW, _show_views(4), is_on=_shows(4)),
     Action("view.next_layout", "One, two or four views", VIEW, next_layout, keys=("V",)),
-    Action("view.next_view", "Let keys act on the next view", VIEW, _next_view, keys=("Shift+V",), lacks=_one_view),
+    Action("view.next_view", "Activate the next view", VIEW, _next_view, keys=("Shift+V",), lacks=_one_view),
 )

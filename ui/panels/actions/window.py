@@ -145,8 +145,8 @@ _THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
 
 ACTIONS = (
     Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_FILE),
-    Action("window.open_read_only", "Open a project for reading only ...", WINDOW, _open_read_only, **_FILE),
-    Action("window.new_project", "New project of this capture ...", WINDOW, _new_project, menu="File"),
+    Action("window.open_read_only", "Open a project read-only ...", WINDOW, _open_read_only, **_FILE),
+    Action("window.new_project", "New project from this capture ...", WINDOW, _new_project, menu="File"),
     Action("window.start_over", "Start over with other settings ...", WINDOW, _start_over, menu="File"),
     Action("window.save_as", "Save the project as ...", WINDOW, _save_as, keys=("Ctrl+Shift+S",), menu="File"),
     Action("window.calibrate", "Calibrate plain videos ...", WINDOW, _calibrate, **_FILE),
@@ -156,11 +156,11 @@ ACTIONS = (
     Action("window.keys", "Change keys", WINDOW, _preferences("Keys"), **_FILE),
     Action("window.larger", "Larger interface", WINDOW, _scale_by(1), keys=("Ctrl++",), **_ALWAYS),
     Action("window.smaller", "Smaller interface", WINDOW, _scale_by(-1), keys=("Ctrl+-",), **_ALWAYS),
-    Action("window.own_scale", "Interface at the screen's own size", WINDOW, _reset_scale, keys=("Ctrl+0",), **_ALWAYS),
-    Action("window.next_panel", "To the next panel by keyboard", WINDOW, _step_panel(1), keys=("F6",), **_ALWAYS),
+    Action("window.own_scale", "Reset the interface size", WINDOW, _reset_scale, keys=("Ctrl+0",), **_ALWAYS),
+    Action("window.next_panel", "Focus the next panel", WINDOW, _step_panel(1), keys=("F6",), **_ALWAYS),
     Action(
         "window.previous_panel",
-        "To the panel before by keyboard",
+        "Focus the previous panel",
         WINDOW,
         _step_panel(-1),
         keys=("Shift+F6",),
@@ -195,7 +195,7 @@ ACTIONS = (
         )
         for name in LAYOUTS
     ),
-    Action("window.save_layout", "Keep the layout ...", WINDOW, _save_layout, **_LAYOUTS),
+    Action("window.save_layout", "Save the layout ...", WINDOW, _save_layout, **_LAYOUTS),
     *(
         Action(f"window.theme.{name}", f"Theme: {words}", WINDOW, _theme(name), **_THEMES)
         for name, words in THEMES.items()
@@ -203,6 +203,6 @@ ACTIONS = (
     Action("window.menu", "Menus (also Alt); arrow keys work in them", WINDOW, _menu, keys=("F10",), **_ALWAYS),
     Action("window.help", "Keys and mouse", WINDOW, _help, keys=("F1",), **_HELP),
     Action("window.documents", "Show the folder with the documents", WINDOW, _documents, **_HELP),
-    Action("window.about", "About the program", WINDOW, _about, **_HELP),
-    Action("window.quit", "Quit; what was learned is kept", WINDOW, _quit, keys=("Ctrl+Q",), **_FILE),
+    Action("window.about", "About ClipGStream Studio", WINDOW, _about, **_HELP),
+    Action("window.quit", "Quit; training progress is kept", WINDOW, _quit, keys=("Ctrl+Q",), **_FILE),
 )

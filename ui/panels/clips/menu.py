@@ -25,13 +25,13 @@ def draw_cutting(
     is_free = (project is None or project.is_writable) and session.training.state in ("idle", "failed")
     index = clip.clip_index
     can_split = clip.start < frame_index < clip.stop
-    words = f"{Icon.COLUMNS}  Split it at frame {frame_index}" if can_split else f"{Icon.COLUMNS}  Split it"
+    words = f"{Icon.COLUMNS}  Split at frame {frame_index}" if can_split else f"{Icon.COLUMNS}  Split"
     if _item(ui, "split", words, is_enabled=is_free and can_split):
         dispatch(SplitClip(frame_index))
-    if _item(ui, "merge", f"{Icon.LAYERS}  Merge it with clip {index + 1}", is_enabled=is_free and index + 1 < n_clips):
+    if _item(ui, "merge", f"{Icon.LAYERS}  Merge with clip {index + 1}", is_enabled=is_free and index + 1 < n_clips):
         dispatch(MergeClips(index))
     is_reference = index == session.reference_index
-    if _item(ui, "reference", f"{Icon.HOME}  Let the others inherit from it", is_enabled=is_free and not is_reference):
+    if _item(ui, "reference", f"{Icon.HOME}  Make reference clip", is_enabled=is_free and not is_reference):
         dispatch(SetReferenceClip(index))
 
 

@@ -58,7 +58,7 @@ def dependency_lines(status: DependencyStatus) -> list[str]:
         n = len(status.trained_on_it)
         cost = "" if status.outdated_seconds is None else f", about {duration_text(status.outdated_seconds)}"
         them = "1 clip was" if n == 1 else f"{n} clips were"
-        lines.append(f"{them} trained on it as it is. With another result of it they have to be trained again{cost}.")
+        lines.append(f"{them} trained on it. If it changes, they have to be retrained{cost}.")
     return lines
 
 
@@ -67,9 +67,9 @@ def use_lines(use: DiskUse) -> list[tuple[str, int]]:
     rows = [
         ("Clips", sum(clip.clip for clip in use.clips)),
         (f"Earlier versions ({use.n_versions})", use.versions),
-        ("Trainings that were stopped", sum(clip.checkpoint for clip in use.clips)),
-        ("Not in use (other cuts, damaged files)", use.unused),
-        ("Preparation, made again when needed", use.preparation),
+        ("Stopped trainings", sum(clip.checkpoint for clip in use.clips)),
+        ("Unused (other cuts, damaged files)", use.unused),
+        ("Preparation, rebuilt when needed", use.preparation),
         ("Everything else", use.other),
     ]
     return [row for row in rows if row[1]]
@@ -127,7 +127,7 @@ def draw_clip_section(session: SessionView, dispatch: Dispatch, ui: UiState) -> 
 def _draw_versions(session: SessionView, dispatch: Dispatch, ui: UiState, clip: Clip) -> None:
     versions = session.clip_versions(clip.clip_index)
     if not versions:
-        text_wrapped_dim("No earlier versions. Training a clip again keeps the one before.")
+        text_wrapped_dim("No earlier versions. Retraining a clip keeps its previous result.")
     for version in versions:
         imgui.push_id(version.number)
         text_wrapped_dim(f"Version {version.number}: {version_text(version)}")
@@ -146,7 +146,7 @@ def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState, clip: C
     ui.mark(f"clip.compare{version.number}")
     imgui.same_line()
     imgui.begin_disabled(bool(version.why_not))
-    if imgui.small_button("Bring it back"):
+    if imgui.small_button("Restore"):
         dispatch(RestoreVersion(clip.clip_index, version.number))
     ui.mark(f"clip.restore{version.number}")
     imgui.end_disabled()
@@ -170,7 +170,7 @@ def _draw_use(use: DiskUse, dispatch: Dispatch, ui: UiState, clip_index: int) ->
         ("versions", f"Versions of clip {clip_index}", clip_index, of_clip),
         ("versions", "All versions", None, use.versions),
         ("checkpoints", "Stopped trainings", None, sum(clip.checkpoint for clip in use.clips)),
-        ("unused", "What is not in use", None, use.unused),
+        ("unused", "Unused files", None, use.unused),
     )
     for what, words, of, n_bytes in choices:
         imgui.begin_disabled(not n_bytes)

@@ -47,12 +47,12 @@ class Evidence:
             if isinstance(evidence, PairEvidence):
                 pairs[len(boxes)] = evidence
                 boxes.append((evidence.camera, evidence.frame, f"{evidence.camera}: {evidence.caption}"))
-                boxes.append((evidence.other, evidence.frame, f"{evidence.other}: lines where they ought to lie"))
+                boxes.append((evidence.other, evidence.frame, f"{evidence.other}: lines where the points should lie"))
             else:
                 boxes.append((evidence.camera, evidence.frame, evidence.caption))
         boxes = [box for box in boxes if box[0] in rig.names]
         if not boxes:
-            text_wrapped_dim("No pictures belong to this.")
+            text_wrapped_dim("No pictures for this finding.")
             return
         width, height = (int(value) for value in rig.image_sizes[rig.names.index(boxes[0][0])])
         aspect, room = width / max(height, 1), imgui.get_content_region_avail()

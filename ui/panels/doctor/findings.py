@@ -73,13 +73,11 @@ def _draw_buttons(
                 dispatch(CorrectCapture(fix, words))
         ui.mark("doctor.fix")
     if finding.kind in MISCALIBRATED:
-        if row.button(
-            f"{Icon.CAMERA}  Calibrate ...##calibrate", "Find where the cameras stand anew, from the pictures"
-        ):
+        if row.button(f"{Icon.CAMERA}  Calibrate ...##calibrate", "Find the camera poses again, from the pictures"):
             dispatch(LookAtVideos(folder))
         ui.mark("doctor.calibrate")
     if finding.kind == OUT_OF_STEP:
-        if row.button(f"{Icon.CLOCK}  Synchronise ...##synchronise", "Measure all cameras, and see each offset"):
+        if row.button(f"{Icon.CLOCK}  Synchronise ...##synchronise", "Measure the offset of every camera"):
             dispatch(SynchroniseCameras())
         ui.mark("doctor.synchronise")
     cameras = [rig.names.index(name) for name in finding.cameras if name in rig.names]

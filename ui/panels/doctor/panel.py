@@ -54,7 +54,7 @@ class DoctorPanel:
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Buttons and progress, then findings, pictures and map."""
         if session.capture is None:
-            text_wrapped_dim("What is wrong with a capture, and what helps, is listed here.")
+            text_wrapped_dim("Problems of a capture and their fixes appear here.")
             return
         status, rig = session.doctor_status, session.rig
         if status.revision != self._revision:
@@ -103,7 +103,7 @@ class DoctorPanel:
         found = summary_text(status.findings)
         if status.diagnosis is None:
             memory = f" and up to {status.memory_bytes / 2**30:.1f} GB of memory" if status.memory_bytes else ""
-            words = f"{found} in the numbers. Examining looks at the pictures too: usually less than a minute{memory}."
+            words = f"{found} so far. Examining looks at the pictures, too: usually less than a minute{memory}."
         else:
             words = f"{found}. {status.diagnosis.n_pictures} pictures looked at in {status.diagnosis.seconds:.0f} s."
         imgui.push_text_wrap_pos(0.0)
@@ -114,8 +114,8 @@ class DoctorPanel:
         self, session: SessionView, status: DoctorStatus, rig: CameraRig, dispatch: Dispatch, ui: UiState
     ) -> None:
         if not status.findings:
-            done = "Nothing is wrong with this capture, as far as can be seen."
-            text_wrapped_dim("Nothing odd so far." if status.diagnosis is None else done)
+            done = "No problems found in this capture."
+            text_wrapped_dim("No problems found so far." if status.diagnosis is None else done)
             return
         project, capture = session.project, session.capture
         assert capture is not None

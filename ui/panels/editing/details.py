@@ -39,7 +39,7 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
         dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
     both = isinstance(edit.action, Transform) and isinstance(edit.target, Box | Sphere)
     if both:
-        imgui.text_disabled("Handles of")
+        imgui.text_disabled("Handles")
         for is_shape, words in ((False, "the movement"), (True, "the shape")):
             imgui.same_line()
             if segment(words, ui.editing.is_shape_meant == is_shape):
@@ -69,7 +69,7 @@ def _draw_name(dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
 
 def _draw_scope(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     timeline, scope = session.timeline, edit.scope
-    label_before("Holds")
+    label_before("Scope")
     if imgui.begin_combo("##scope", scope_text(scope, timeline.clips)):
         present = choice_of(scope, timeline)
         for choice in SCOPE_CHOICES:
@@ -176,7 +176,7 @@ def _color_field(ui: UiState, one: Setting, value: Vector) -> Vector | None:
     return _vector([min(max(part, 0.0), 1.0) for part in color]) if is_changed else None
 
 
-def _turn_fields(ui: UiState, name: str, quat: Quat, label: str = "Turned by") -> Quat | None:
+def _turn_fields(ui: UiState, name: str, quat: Quat, label: str = "Rotation") -> Quat | None:
     """A rotation as degrees about the axes of the scene."""
     degrees = tuple(float(value) for value in np.degrees(turns_of_quats(np.array(quat))))
     found = numbers(ui, name, label, degrees, speed=0.25, low=-180.0, high=180.0, text_format="%.1f°")

@@ -30,7 +30,7 @@ PAYLOAD = "edit"
 def draw_edits(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Everything that is edited without training."""
     if session.capture is None:
-        text_wrapped_dim("What you hide, crop, move or recolour is listed here when a capture is open.")
+        text_wrapped_dim("Edits appear here once a capture is open.")
         return
     ui.editing.follow(session.edits.edits)
     if session.edits.why_not:
@@ -59,7 +59,7 @@ def _draw_stack(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """One row per edit, the last one on top: it acts on what the others have left."""
     edits = session.edits.edits
     if not edits:
-        text_wrapped_dim("Nothing is edited: everything is shown as it was trained.")
+        text_wrapped_dim("No edits: everything is shown as it was trained.")
         return
     n_on = sum(edit.is_on for edit in edits)
     imgui.text(f"{len(edits)} edit{'' if len(edits) == 1 else 's'}")
@@ -83,7 +83,7 @@ def _draw_stack(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(ApplyDeletions())
     ui.mark("edits.apply")
     imgui.end_disabled()
-    imgui.set_item_tooltip("Writes clips again without what is deleted everywhere, once you have confirmed it")
+    imgui.set_item_tooltip("Permanently removes deleted anchors from the clip files, after you confirm")
 
 
 def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
@@ -110,7 +110,7 @@ def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit,
     words = words if edit.is_on else f"off, {words}"
     lost = next((one for one in session.edits.lost if one.edit_id == edit.edit_id), None)
     if lost is not None:
-        left = "nothing of the selection is left" if lost.is_all else "part of the selection is gone"
+        left = "the selection is gone" if lost.is_all else "part of the selection is gone"
         words = f"{Icon.WARNING}  {left}, {words}"
     elif reach_note(reach, edit.scope):
         words = f"{Icon.WARNING}  {words}"
@@ -126,7 +126,7 @@ def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit,
     if imgui.button(f"{Icon.TRASH}##remove", ImVec2(BUTTON_WIDTH, 26)):
         dispatch(RemoveEdit(edit.edit_id))
     ui.mark(f"edits.remove{edit.edit_id}")
-    imgui.set_item_tooltip("Remove this edit: what it did is undone, what others did stays")
+    imgui.set_item_tooltip("Remove this edit; the others stay")
     imgui.end_disabled()
     imgui.set_cursor_screen_pos(ImVec2(start.x, start.y + ROW_HEIGHT))
     imgui.dummy(ImVec2(0, 0))
@@ -151,8 +151,8 @@ def _draw_menu(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit
     for label, command, is_possible in (
         ("Switch off" if edit.is_on else "Switch on", ToggleEdit(edit.edit_id), True),
         ("Duplicate", DuplicateEdit(edit.edit_id), True),
-        ("Later: one up", MoveEdit(edit.edit_id, position + 1), position + 1 < n_edits),
-        ("Earlier: one down", MoveEdit(edit.edit_id, position - 1), position > 0),
+        ("Later: move up", MoveEdit(edit.edit_id, position + 1), position + 1 < n_edits),
+        ("Earlier: move down", MoveEdit(edit.edit_id, position - 1), position > 0),
         ("Remove", RemoveEdit(edit.edit_id), True),
     ):
         if imgui.menu_item(label, "", False, can_edit and is_possible)[0]:

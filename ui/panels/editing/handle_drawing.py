@@ -25,8 +25,8 @@ from ui.viewport.scene import SceneView
 HALF, LARGE_HALF = 5.0, 7.0
 LINE, RIM = 1.8, 2.4
 ASKED_WORDS = {
-    "ground": "Click three points of the ground",
-    "length": "Click the two ends of a known length",
+    "ground": "Click three points on the ground",
+    "length": "Click two points at a known distance",
 }
 
 
@@ -60,9 +60,9 @@ def draw_edit_hint(draw: imgui.ImDrawList, tool: EditTool, area: Rect) -> None:
         text = f"{ASKED_WORDS[tool.asking]}: {len(tool.points)} of {N_ASKED[tool.asking]}   Esc leaves"
         chip(draw, area.x0, area.y0, text, color=ON_PICTURE.yellow)
     elif tool.held is not None:
-        text = f"{tool.held.verb.capitalize()}   Ctrl snaps   Esc gives back"
+        text = f"{tool.held.verb.capitalize()}   Ctrl snaps   Esc cancels"
         if tool.held.kind == "face":
-            text += "   Shift moves all of it"
+            text += "   Shift moves the whole volume"
         chip(draw, area.x0, area.y0, text, color=ON_PICTURE.yellow)
 
 

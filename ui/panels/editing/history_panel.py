@@ -23,7 +23,7 @@ class HistoryPanel:
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """The first step on top; what was taken back follows the present one, paler."""
         if session.capture is None:
-            text_wrapped_dim("What you do to a project is listed here, step by step, when a capture is open.")
+            text_wrapped_dim("Your steps appear here once a capture is open.")
             return
         history = session.history
         draw_history(history, dispatch, ui, "history")

@@ -53,7 +53,7 @@ class Making:
 
 def _making(kind: type[Action], first: First, *, name: str = "", **said: Any) -> Making:
     """As the action is declared."""
-    return Making(name or kind.called(), kind.label, kind.tip or f"{kind.label} what is selected", first, **said)
+    return Making(name or kind.called(), kind.label, kind.tip or f"{kind.label} the selection", first, **said)
 
 
 DELETE = _making(Delete, lambda *where: Delete())
@@ -62,7 +62,7 @@ MAKINGS = (
     Making(
         "isolate",
         "Isolate",
-        "Isolate: hide everything but what is selected",
+        "Isolate: hide everything but the selection",
         lambda *where: Hide(),
         ("Shift+H",),
         is_inverted=True,
@@ -74,7 +74,7 @@ MAKINGS = (
     Making(
         "opacity",
         "Opacity",
-        "Change the opacity of what is selected",
+        "Change the opacity of the selection",
         lambda *where: Recolor(opacity=FIRST_OPACITY),
     ),
     _making(Hold, lambda session, volume: Hold(session.timeline.frame_index)),
@@ -130,12 +130,12 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if session.selection.words and volume is None:
             text_wrapped_dim(session.selection.words)
     else:
-        text_wrapped_dim("Select Gaussians, or draw a box or a sphere; colours and light can be changed everywhere.")
+        text_wrapped_dim("Select Gaussians, or draw a box or sphere; colours and light can be changed everywhere.")
     if volume is not None:
-        if imgui.checkbox("Everything outside of it", ui.editing.is_outside)[0]:
+        if imgui.checkbox("Everything outside", ui.editing.is_outside)[0]:
             invert_selection(dispatch, ui)
         ui.mark("edits.outside")
-    imgui.text_disabled("New edits hold")
+    imgui.text_disabled("Scope")
     width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / PER_ROW
     for place, choice in enumerate(SCOPE_CHOICES):
         if place % PER_ROW:
@@ -168,6 +168,6 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.mark("edits.make moving")
     imgui.end_disabled()
     imgui.set_item_tooltip(
-        "Marks what was drawn, or the box around the selection, as moving; clips take it up when they are trained"
+        "Marks the drawn volume, or the box around the selection, as moving from the next training on"
     )
     imgui.end_disabled()

@@ -38,7 +38,7 @@ METHOD_WORDS = {
     "fade": "Fade",
     "joint": "Joint training",
 }
-AUTO_HINT = "One after the other, the cheapest first, until half of the excess flicker is gone"
+AUTO_HINT = "Tries each method, cheapest first, until half of the excess flicker is gone"
 
 
 def is_asking_to_mend(session: SessionView) -> bool:
@@ -94,7 +94,7 @@ def _draw_choice(session: SessionView, page: MendPage, dispatch: Dispatch, ui: U
     else:
         text_wrapped_dim(
             "Each attempt is measured on the training cameras, and kept only if the flicker falls and no clip loses "
-            "more than 0.05 dB. The clips as they are now are kept as versions."
+            "more than 0.05 dB. The present clips are kept as versions."
         )
         if page.estimate_s is not None:
             text_wrapped_dim(f"About {duration_text(page.estimate_s)}, or less if little is needed")
@@ -127,7 +127,7 @@ def _draw_result(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: UiS
         _draw_buttons(page, record, dispatch, ui)
         return
     if page.state == "reverted":
-        _line(Icon.UNDO, theme.SKY, "Taken back: the clips are as before.")
+        _line(Icon.UNDO, theme.SKY, "Reverted: the clips are as before.")
     elif record.has_helped:
         fall = _fall(record.before.excess, record.after.excess)
         _line(Icon.CHECK, theme.GREEN, f"Mended{fall}, in {duration_text(record.seconds)}")
@@ -140,7 +140,7 @@ def _draw_result(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: UiS
         text_warning(record.advice)
         worst = min(record.before.psnr, key=lambda index: record.before.psnr[index], default=None)
         if worst is not None:
-            if imgui.button(f"{Icon.TRAIN}  Train clip {worst} again", ImVec2(-1, 0)):
+            if imgui.button(f"{Icon.TRAIN}  Retrain clip {worst}", ImVec2(-1, 0)):
                 dispatch(TrainClip(int(worst)))
             ui.mark("mend.retrain")
     imgui.spacing()
@@ -154,7 +154,7 @@ def _draw_buttons(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: Ui
         if imgui.button(label, ImVec2(width, 30)):
             dispatch(CompareMended())
         ui.mark("mend.compare")
-        imgui.set_item_tooltip("The clip before next to the clip now; wipe or blink with G")
+        imgui.set_item_tooltip("Compares the clip before and after; G switches to wipe or blink")
         imgui.same_line()
         if imgui.button("Revert", ImVec2(width, 30)):
             dispatch(RevertMend())

@@ -36,7 +36,7 @@ def draw_attribute(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
         return
     spread = session.attribute_spread(chosen.name)
     if spread is None:
-        words = "Anchors are compared with the cameras ..." if chosen.column else "It is not known in this frame."
+        words = "Anchors are compared with the cameras ..." if chosen.column else "Not known in this frame."
         text_wrapped_dim(words)
         ui.redraw_within(0.3)
         return
@@ -51,7 +51,7 @@ def draw_attribute(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
         dispatch(SelectByAttribute(chosen.name, low, high, tool.how()))
     ui.mark("selection.by_range")
     if spread.n_unknown:
-        text_wrapped_dim(f"Of {spread.n_unknown:,} Gaussians it is not known.")
+        text_wrapped_dim(f"Not known for {spread.n_unknown:,} Gaussians.")
 
 
 def _range(tool: SelectTool) -> tuple[float, float]:
@@ -109,11 +109,12 @@ def _draw_numbers(spread: Spread, chosen: Attribute, tool: SelectTool, ui: UiSta
     unit = f"  {chosen.unit}" if chosen.unit else ""
     room = (imgui.get_content_region_avail().x - imgui.calc_text_size(unit).x - 8) / 2
     changed = []
+    finest = 1e-8 if spread.is_log or spread.high <= spread.low else (spread.high - spread.low) / 1000
     for name, value in (("low", low), ("high", high)):
         if name == "high":
             imgui.same_line(0, 4)
         imgui.set_next_item_width(max(room, 40.0))
-        is_changed, typed = imgui.input_float(f"##{name}", value, 0.0, 0.0, number_format(value))
+        is_changed, typed = imgui.input_float(f"##{name}", value, 0.0, 0.0, number_format(value, finest))
         ui.mark(f"selection.{name}")
         changed.append((is_changed, typed))
     if unit:

@@ -38,7 +38,7 @@ def near_distance(session: SessionView, tool: SelectTool) -> float:
 
 
 def select_moving(dispatch: Dispatch, ui: UiState) -> None:
-    """Select what moves, in the way in which tools select."""
+    """Select all moving, in the way in which tools select."""
     dispatch(SelectByAttribute("motion", 1.0, 1.0, ui.selecting.how()))
 
 
@@ -46,18 +46,18 @@ def draw_selection(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
     """Everything of it, from top to bottom."""
     status, tool = session.selection, ui.selecting
     if session.capture is None:
-        text_wrapped_dim("What you select in the picture is counted here when a capture is open.")
+        text_wrapped_dim("The selection appears here once a capture is open.")
         return
     if not status.can_select:
-        text_wrapped_dim("There are no Gaussians to select in this frame yet.")
+        text_wrapped_dim("No Gaussians to select in this frame yet.")
     _draw_counts(status, ui)
     imgui.begin_disabled(not status.can_select)
     imgui.separator_text("Tool")
     _draw_tools(tool, ui)
-    if imgui.button("Select what moves", ImVec2(-1, 0)):
+    if imgui.button("Select all moving", ImVec2(-1, 0)):
         select_moving(dispatch, ui)
     ui.mark("selection.what moves")
-    imgui.set_item_tooltip("Everything that moves in this clip: people and things rather than the room")
+    imgui.set_item_tooltip("Everything that moves in this clip, such as people")
     _draw_options(tool, ui)
     imgui.separator_text("Change")
     _draw_changes(session, dispatch, ui)
@@ -102,9 +102,9 @@ def _draw_tools(tool: SelectTool, ui: UiState) -> None:
 
 def _draw_options(tool: SelectTool, ui: UiState) -> None:
     rows = (
-        ("is_visible_only", "Visible only", "Leave out what is hidden behind something else"),
-        ("is_by_extent", "As far as they are seen", "A Gaussian counts where it is seen, not by its centre alone"),
-        ("is_whole_anchors", "Whole anchors", "With one Gaussian of an anchor, all of them"),
+        ("is_visible_only", "Visible only", "Ignores Gaussians hidden behind others"),
+        ("is_by_extent", "By visible extent", "Tests the visible extent of a Gaussian, not only its centre"),
+        ("is_whole_anchors", "Whole anchors", "One Gaussian of an anchor selects all of them"),
     )
     for name, label, tooltip in rows:
         is_changed, is_on = imgui.checkbox(label, getattr(tool, name))
@@ -120,7 +120,7 @@ def _draw_changes(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
         ("All", "Ctrl+A", SelectAll, True),
         ("None", "Ctrl+Shift+A", ClearSelection, bool(status.words)),
         ("Invert", "Ctrl+I", InvertSelection, True),
-        ("Before", "Alt+Z: the selection before this one", Reselect, status.has_before),
+        ("Before", "Restores the previous selection (Alt+Z)", Reselect, status.has_before),
     )
     width = _width_of(len(buttons))
     for index, (label, tooltip, command, is_possible) in enumerate(buttons):
@@ -146,7 +146,7 @@ def _draw_changes(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
     imgui.set_item_tooltip("Ctrl+[")
     imgui.end_disabled()
     tool.near_share = _slider("Reach", tool.near_share, 0.1, 20.0, "%.1f anchors", ui, is_log=True)
-    imgui.set_item_tooltip("How far neighbours lie apart at most, in distances between anchors; for flood, too")
+    imgui.set_item_tooltip("Largest gap between neighbours, in anchor spacings; also for flood")
 
 
 def _slider(

@@ -43,7 +43,7 @@ def draw_volume_numbers(session: SessionView, dispatch: Dispatch, ui: UiState) -
         ui.mark("selection.radius")
         changed = Sphere(center, min(max(radius, 1e-9), LARGEST) if np.isfinite(radius) else volume.radius)
     tool.volume = changed
-    if primary_button("Select what is in it", ImVec2(imgui.get_content_region_avail().x, 30), ui):
+    if primary_button("Select inside", ImVec2(imgui.get_content_region_avail().x, 30), ui):
         dispatch(SelectVolume(changed, tool.how(), tool.is_by_extent))
     ui.mark("selection.by_volume")
 

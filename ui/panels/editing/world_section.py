@@ -42,21 +42,21 @@ def draw_world(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         imgui.end_combo()
     else:
         ui.mark("world.up")
-    if imgui.button("As in this view"):
+    if imgui.button("From this view"):
         dispatch(SetUp(view_up(session.view)))
     ui.mark("world.view")
-    imgui.set_item_tooltip("What is up in the picture becomes up")
+    imgui.set_item_tooltip("Takes the up direction of this view")
     imgui.same_line()
-    if imgui.button("Three points of the ground"):
+    if imgui.button("Three ground points"):
         tool.ask(None if tool.asking == "ground" else "ground")
     ui.mark("world.ground")
-    imgui.set_item_tooltip("Click three points of the ground in the picture")
+    imgui.set_item_tooltip("Click three points on the ground in the picture")
     label_before("1 unit is")
     is_entered, typed = imgui.input_double(
         "##scale", world.meters_per_unit or 0.0, 0.0, 0.0, "%.6g m", imgui.InputTextFlags_.enter_returns_true
     )
     ui.mark("world.scale")
-    imgui.set_item_tooltip("Length of a unit of the scene, 0 if not known. With it, exports are in metres.")
+    imgui.set_item_tooltip("Length of one scene unit, 0 if unknown; if set, exports are in metres")
     if is_entered and math.isfinite(typed):
         dispatch(SetScale(typed if typed > 0.0 else None))
     label_before("Length")
@@ -64,10 +64,10 @@ def draw_world(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.mark("world.length")
     if math.isfinite(length_m) and SCALES[0] <= length_m <= SCALES[1]:
         tool.length_m = length_m
-    if imgui.button("Two points of that length"):
+    if imgui.button("Two points this far apart"):
         tool.ask(None if tool.asking == "length" else "length")
     ui.mark("world.points")
-    imgui.set_item_tooltip("Click two points in the picture that are known to be so far apart")
+    imgui.set_item_tooltip("Click two points in the picture that are this far apart")
     imgui.end_disabled()
     if world.meters_per_unit is not None:
         text_wrapped_dim(f"Exports are written in metres: {world.meters_per_unit:.6g} m per unit of the scene.")

@@ -73,7 +73,7 @@ class ExcludedDrawing:
 def brush_hint(tool: MaskTool, name: str) -> str:
     """What the brush does, in one line."""
     return (
-        f"Excluding a part of {name} in {SCOPES[tool.scope]}: drag paints, Shift erases, Ctrl+wheel sizes, "
+        f"Masking part of {name} in {SCOPES[tool.scope]}: drag paints, Shift erases, Ctrl+wheel sizes, "
         "the same key or menu entry ends it"
     )
 

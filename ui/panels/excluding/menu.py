@@ -30,11 +30,11 @@ def draw_exclusion_menu(
             dispatch(ExcludeFrames(frame_index, frame_index + 1, camera, not is_out))
     imgui.separator()
     for scope, words in SCOPES.items():
-        if _item(ui, f"paint.{scope}", f"Paint over a part of it, in {words}"):
+        if _item(ui, f"paint.{scope}", f"Paint a mask, in {words}"):
             dispatch(LookThrough(camera_index))
             ui.masks.start(camera_index, scope)
     has_mask = any(one.camera == name for one in found.masks)
-    if _item(ui, "unpaint", "Remove what is painted over it", is_enabled=has_mask):
+    if _item(ui, "unpaint", "Remove the mask", is_enabled=has_mask):
         dispatch(RemoveMasks(camera_index))
 
 

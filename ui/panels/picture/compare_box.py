@@ -30,7 +30,7 @@ def draw_compare_box(session: SessionView, dispatch: Dispatch, ui: UiState, widt
     is_open = imgui.begin_combo("##compare", box_words(compare_words(session), width), box_flags(width))
     ui.mark("viewport.compare")
     if not is_open:
-        imgui.set_item_tooltip("Beside, over or in turn with another picture (G)")
+        imgui.set_item_tooltip("Compare with another picture: side by side, wipe or blink (G)")
         return
     for mode, words in COMPARE_WORDS.items():
         if imgui.selectable(words, shown == mode)[0]:

@@ -52,7 +52,7 @@ def kind_words(kind: str, mode_label: str) -> str:
 def missing_words(overlays: Overlays, versions: Sequence[VersionStatus]) -> str:
     """What stands where the other picture is not there. versions: Of the clip under the playhead."""
     if overlays.compare_with == CAPTURED:
-        return "Captured picture is being read"
+        return "Reading the captured picture"
     number = version_number(overlays.compare_with)
     if number is not None and number not in [version.number for version in versions]:
         return f"This clip has no version {number}"

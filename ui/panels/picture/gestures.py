@@ -16,7 +16,7 @@ GESTURE_WORDS: dict[str, str] = {
     "pan": "Move the view sideways",
     "dolly": "Move nearer or farther",
     "look": "Look around",
-    "roll": "Lean the view to a side",
+    "roll": "Roll the view",
     "lens": "Field of view",
 }
 DEFAULT_PRESET = "studio"
@@ -91,10 +91,10 @@ PRESETS: dict[str, Preset] = {
             _WHEEL,
             look_button="Right",
         ),
-        Preset("supersplat", "SuperSplat: the right button looks around while one flies", _BOTH, _WHEEL, "Right"),
+        Preset("supersplat", "SuperSplat: the right button looks around while flying", _BOTH, _WHEEL, "Right"),
         Preset(
             "touchpad",
-            "Touchpad: two fingers orbit, pinching moves nearer",
+            "Touchpad: two fingers orbit, pinching zooms",
             _BOTH,
             {"": "orbit", "Shift": "pan", "Ctrl": "dolly", "Ctrl+Shift": "lens"},
         ),
@@ -145,16 +145,16 @@ def mouse_help(preset: Preset) -> tuple[tuple[str, str], ...]:
     return (
         *gesture_rows(preset),
         ("W A S D, Q E", "Fly, with Q down and E up; Shift is faster, Alt slower"),
-        ("Double click", "Bring what is under the pointer into the middle"),
+        ("Double click", "Centre the view on what is under the pointer"),
         ("Axes, top right", "A click looks along an axis, a drag orbits"),
-        ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
-        ("Camera click", "Look through the camera whose pyramid it is"),
+        ("Click, wheel", "While placing a region: set its position, change its size (Ctrl + wheel moves the view)"),
+        ("Camera click", "Look through that camera"),
         ("Timeline drag", "Move through time"),
-        ("White line drag", "Wipe between the two pictures that are compared"),
-        ("Hold B", "See the picture that the render is compared with, alone"),
-        ("Timeline wheel", "Move what is shown (also middle drag); with Ctrl closer or farther, double click for all"),
+        ("White line drag", "Wipe between the two compared pictures"),
+        ("Hold B", "Show only the picture that the render is compared with"),
+        ("Timeline wheel", "Scroll (also middle drag); with Ctrl, zoom; double-click shows everything"),
         ("Seam click", "Play around the boundary between two clips"),
-        ("Folder drop", "Open it: a capture or a project; of a new capture, first say what it is"),
+        ("Folder drop", "Open the capture or project; a new capture first asks a few questions"),
     )
 
 

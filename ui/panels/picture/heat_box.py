@@ -39,4 +39,4 @@ def draw_heat_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: 
         ui.mark("viewport.heat.opacity")
         imgui.end_combo()
     ui.mark("viewport.heat")
-    imgui.set_item_tooltip("Where the render differs, from the frame before or from what the camera took (7)")
+    imgui.set_item_tooltip("Where the render differs from the previous frame or from the captured picture (7)")

@@ -34,9 +34,9 @@ def draw_mode_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: 
         imgui.pop_style_color()
     ui.mark("viewport.mode")
     if not is_open:
-        imgui.set_item_tooltip("What colours mean (Shift and a number), and which part of a clip is drawn")
+        imgui.set_item_tooltip("View mode (Shift and a number), and which part of a clip is drawn")
         return
-    imgui.text_disabled("Colours mean")
+    imgui.text_disabled("View mode")
     for mode in MODES.values():
         if imgui.menu_item(mode.label, mode_key(mode.name), overlays.mode == mode.name, True)[0]:
             dispatch(SetMode(mode.name))

@@ -38,7 +38,7 @@ class ViewPopup:
             ui.is_view_popup_wanted = False
             imgui.open_popup(POPUP)
         ui.mark("viewport.look")
-        imgui.set_item_tooltip("Lens, axes, what is up, and bookmarks (Ctrl+B)")
+        imgui.set_item_tooltip("Lens, axes, up direction and bookmarks (Ctrl+B)")
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         imgui.set_next_window_pos(ImVec2(low.x, high.y + 6), imgui.Cond_.appearing)  # not where the pointer is
         imgui.set_next_window_size(ImVec2(WIDTH, 0))
@@ -71,7 +71,7 @@ class ViewPopup:
             view.stand_upright()
         ui.mark("look.upright")
         imgui.end_disabled()
-        imgui.set_item_tooltip("Takes back leaning (Shift+\\)")
+        imgui.set_item_tooltip("Resets the roll (Shift+\\)")
         imgui.separator()
 
     def _draw_bookmarks(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
@@ -87,7 +87,7 @@ class ViewPopup:
         imgui.same_line(0, 8)
         is_clicked = imgui.button(Icon.ADD, ImVec2(imgui.get_frame_height(), 0))
         ui.mark("look.keep")
-        imgui.set_item_tooltip("Keep this view")
+        imgui.set_item_tooltip("Save this view")
         _, self._has_frame = imgui.checkbox("With its frame", self._has_frame)
         ui.mark("look.with_frame")
         if is_entered or is_clicked:
@@ -142,7 +142,7 @@ def _draw_axes(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
             ui.mark(f"look.preset.{name}")
         imgui.end_combo()
     ui.mark("look.preset")
-    is_changed, is_eased = imgui.checkbox("Ease moves of the view", not navigation.is_motion_reduced)
+    is_changed, is_eased = imgui.checkbox("Smooth view moves", not navigation.is_motion_reduced)
     ui.mark("look.eased")
     if is_changed:
         navigation.is_motion_reduced = not is_eased

@@ -172,8 +172,8 @@ class PicturePane:
         ):
             camera, key = self.scene.marks.pointed_camera, self.scene.path.pointed_key
             if key is not None:
-                words = f"{key_words(session.paths, key)}\nDrag moves it, with Ctrl along the view"
-                _tooltip_beside(f"{words}; a double click goes there", area)
+                words = f"{key_words(session.paths, key)}\nDrag to move it, with Ctrl along the view"
+                _tooltip_beside(f"{words}; double-click to go there", area)
             elif camera is not None:
                 is_held_out = " (held out)" if camera in session.holdout else ""
                 _tooltip_beside(f"Camera {session.rig.names[camera]}{is_held_out}\nClick to look through it", area)

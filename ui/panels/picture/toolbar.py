@@ -101,7 +101,7 @@ def _draw_more(session: SessionView, dispatch: Dispatch, ui: UiState, hidden: tu
     if imgui.button(f"{Icon.MORE}##more"):
         imgui.open_popup("more")
     ui.mark("viewport.more")
-    imgui.set_item_tooltip("What has no room in the row")
+    imgui.set_item_tooltip("More tools")
     _put_popup_below()
     if not imgui.begin_popup("more"):
         return
@@ -171,7 +171,7 @@ def _draw_mark(session: SessionView, ui: UiState, *, is_wordy: bool) -> None:
             begin_choosing(session, ui)
     ui.mark("viewport.mark")
     imgui.end_disabled()
-    words = session.regions.why_not or "Say of a part of the scene that it is static, or that it moves (M)"
+    words = session.regions.why_not or "Mark part of the scene as static or moving (M)"
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
         imgui.set_tooltip(words)
 
@@ -196,8 +196,8 @@ def _draw_overlay_menu(session: SessionView, dispatch: Dispatch, ui: UiState) ->
         ("show_residual", "Residual anchors (diamonds)", "3"),
         (cloud_overlay(session), "Point cloud", "4"),
         ("show_regions", "Marked regions", "5"),
-        ("show_coverage", "Covered by inherited anchors", "9"),
-        ("show_trails", "Trails of what moves", "0"),
+        ("show_coverage", "Space of inherited anchors", "9"),
+        ("show_trails", "Motion trails", "0"),
         ("show_paths", "Camera path", "Shift+P"),
     )
     for name, label, key_label in rows:

@@ -32,9 +32,9 @@ from ui.style.theme import Icon
 
 COLUMN_WORDS = {"psnr": "PSNR", "flip": "FLIP", "E": "Flicker"}
 COLUMN_MEANINGS = {
-    "psnr": "Likeness to the captured picture, dB; higher is better",
-    "flip": "Difference that a viewer notices, mean FLIP; lower is better",
-    "E": "Change against the frame before beyond that of the capture, mean E in 1/255; lower is better",
+    "psnr": "Similarity to the captured picture, dB; higher is better",
+    "flip": "Perceived difference, mean FLIP; lower is better",
+    "E": "Change since the previous frame beyond that of the capture, mean E in 1/255; lower is better",
 }
 UNITS = {"psnr": "dB", "flip": "", "E": "x 1/255"}
 N_WORST = 24
@@ -70,13 +70,13 @@ def seam_words(seam: SeamStatus, rig: CameraRig) -> str:
     """What is known of a seam, and what a click does."""
     lines = []
     if seam.ratio is not None:
-        lines.append(f"Change at the seam relative to inside the clips, of what stands still: {seam.ratio:.2f}")
+        lines.append(f"Change of static parts at the seam, relative to inside the clips: {seam.ratio:.2f}")
     if seam.is_provisional:
         lines.append(f"Provisional: measured in {seam.n_cameras} of {seam.n_all} cameras so far.")
     if seam.score is not None:
-        lines.append(f"Excess flicker of it: {seam.score:.2f} x 1/255, mean of {seam.n_cameras} cameras.")
+        lines.append(f"Excess flicker: {seam.score:.2f} x 1/255, mean of {seam.n_cameras} cameras.")
     if seam.worst_camera is not None:
-        lines.append(f"Worst seen by {camera_text(rig.names[seam.worst_camera])}.")
+        lines.append(f"Worst in {camera_text(rig.names[seam.worst_camera])}.")
     return "\n".join([*lines, "Click to look through it and play around the boundary."])
 
 
@@ -89,7 +89,7 @@ def progress_text(status: ResidualStatus, column: str) -> str:
     n_done, n_all = status.measured[column]
     done = f"{COLUMN_WORDS[column]} of {format_count(n_done)} of {format_count(n_all)} pictures measured"
     if status.is_held_back:
-        return f"{done}; the rest follows slowly for the moment."
+        return f"{done}; the rest continues slowly for now."
     if status.is_measuring and status.eta_s is not None:
         return f"{done}; all figures in about {duration_text(status.eta_s)}."
     return f"{done}."
@@ -120,7 +120,7 @@ class ResidualsPanel:
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Progress, seams, matrix, worst pictures."""
         if session.capture is None:
-            text_wrapped_dim("How far renders are from what was captured is shown here when a capture is open.")
+            text_wrapped_dim("Residuals appear here once a capture is open.")
             return
         if session.capture is not self._capture:
             self._thumbnails.release()

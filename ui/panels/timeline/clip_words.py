@@ -28,9 +28,9 @@ def state_note(status: ClipStatus) -> str:
     """What there is to say of a clip's state beyond its word; empty where that says it all."""
     texts = [status.reason]
     if status.resume_step is not None and status.state in ("trained", "stale", "damaged"):
-        texts.append(f"It was being trained again: that was stopped at step {format_count(status.resume_step)}.")
+        texts.append(f"Retraining stopped at step {format_count(status.resume_step)}.")
     elif status.resume_step is not None and status.state in ("stopped", "failed"):
-        texts.append(f"Its training goes on at step {format_count(status.resume_step)}.")
+        texts.append(f"Training resumes at step {format_count(status.resume_step)}.")
     return " ".join(text for text in texts if text)
 
 

@@ -19,7 +19,7 @@ NOTES = {
     SEAMS: "Change at the seam relative to inside the clips: 1 means no seam, above 2 is worth a look,"
     " ~ that not all cameras are measured yet",
     QUALITY: "Held-out PSNR of each clip, and of each frame where it was measured; 20 to 40 dB",
-    CACHE: "Frames that are decoded in memory and shown at once",
+    CACHE: "Frames decoded in memory, shown at once",
     CAMERA: "Keys of the camera path: C at the playhead",
     MARKERS: "Markers: Ctrl+M at the playhead",
 }
@@ -47,7 +47,7 @@ def draw_gutter(rows: dict[str, Rect], x: float, session: SessionView, ui: UiSta
                 ui.timeline.toggle_lane(name)
             ui.mark(f"timeline.fold {name}")
             color = theme.TEXT if imgui.is_item_hovered() else theme.TEXT_DIM
-            imgui.set_item_tooltip(f"{NOTES[name]}\nClick to fold it away; {Icon.LAYERS} brings it back")
+            imgui.set_item_tooltip(f"{NOTES[name]}\nClick to fold; {Icon.LAYERS} brings it back")
         if name in (CLIPS, OVERVIEW) or name in LANES:
             small_text(draw, x + 2, y, text, color)
 

@@ -54,7 +54,7 @@ def parse_jump(text: str, frame_index: int, clips: Sequence[Clip], fps: float) -
 
 def _held(frame_index: int, n_frames: int) -> Jump:
     if frame_index < 0:
-        return Jump(0, "There is nothing before frame 0.")
+        return Jump(0, "The first frame is 0.")
     if frame_index >= n_frames:
         return Jump(n_frames - 1, f"The last frame is {format_count(n_frames - 1)}.")
     return Jump(frame_index)

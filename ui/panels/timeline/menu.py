@@ -53,16 +53,16 @@ def draw_clip_menu(stage: Stage, session: SessionView, dispatch: Dispatch) -> No
 
 def _draw_time(clip: Clip, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
-    if _item(ui, "go", f"{Icon.PLAY}  Go to its first frame"):
+    if _item(ui, "go", f"{Icon.PLAY}  Go to first frame"):
         dispatch(SetFrame(clip.start))
     if _item(ui, "range", f"{Icon.LOOP}  Play this clip only", "I, O"):
         timeline.set_range(clip.start, clip.stop - 1)
     has_range = timeline.in_frame is not None or timeline.out_frame is not None
     if _item(ui, "no range", f"{Icon.LOOP}  Play the whole capture", "X", is_enabled=has_range):
         timeline.clear_range()
-    if clip.clip_index > 0 and _item(ui, "seam", f"{Icon.LOOP}  Play around its beginning", "/"):
+    if clip.clip_index > 0 and _item(ui, "seam", f"{Icon.LOOP}  Play around its start", "/"):
         timeline.play_around(clip.start)
-    if clip.clip_index > 0 and _item(ui, "mend", f"{Icon.MEND}  Mend the seam at its beginning", "Shift+M"):
+    if clip.clip_index > 0 and _item(ui, "mend", f"{Icon.MEND}  Mend the seam at its start", "Shift+M"):
         dispatch(AskMend(after=clip.clip_index))
     if _item(ui, "zoom", f"{Icon.EYE}  Show this clip only", "Z"):
         ui.timeline.show_clip(clip, timeline.n_frames)

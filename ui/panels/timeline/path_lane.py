@@ -50,7 +50,7 @@ def draw_path_lane(stage: Stage, session: SessionView) -> None:
     if pointed is not None and stage.ui.paths.timed is None:
         imgui.begin_tooltip()
         imgui.text_unformatted(key_words(status, pointed))
-        imgui.text_disabled("Drag moves it in time; a double click goes there")
+        imgui.text_disabled("Drag to move it in time; double-click to go there")
         imgui.end_tooltip()
 
 

@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from app.playback.timeline import SPEEDS, Timeline
 from app.session.commands import FollowTraining, TogglePlay
 from app.session.session_view import SessionView
+from engine.text import rate_text
 from ui.panels.actions.time import go_to_frame
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title
@@ -51,7 +52,7 @@ def draw_transport(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
     )
     if width >= ROOM_FOR_RATE:
         imgui.same_line()
-        imgui.text_disabled(f"at {timeline.fps:g} frames per second")
+        imgui.text_disabled(f"at {rate_text(timeline.fps)} frames per second")
     words = played_words(timeline)
     if words:
         imgui.same_line(0, 18)
@@ -87,7 +88,7 @@ def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
         go_to_frame(timeline, dispatch, timeline.n_frames - 1)
     if _icon_button(ui, "loop", Icon.LOOP, "Loop (Ctrl+/)", is_on=timeline.is_looping):
         timeline.is_looping = not timeline.is_looping
-    follow_note = "Follow the training: stay in the clip with the newest state (End twice)"
+    follow_note = "Follow training: stay in the clip with the newest state (End twice)"
     if _icon_button(ui, "follow", Icon.FOLLOW, follow_note, is_on=timeline.is_following):
         dispatch(FollowTraining(not timeline.is_following))
     _draw_speed(timeline, ui)
@@ -106,7 +107,7 @@ def _draw_speed(timeline: Timeline, ui: UiState) -> None:
         imgui.end_combo()
     else:
         ui.mark("timeline.speed")
-        imgui.set_item_tooltip("Speed of playing (Shift+, and Shift+.)")
+        imgui.set_item_tooltip("Playback speed (Shift+, and Shift+.)")
     imgui.same_line(0, 4)
 
 

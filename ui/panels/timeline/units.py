@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from engine.text import rate_text
 from ui.panels.timeline.time_range import TimeRange
 
 FRAMES, SECONDS, TIMECODE = "frames", "seconds", "timecode"
@@ -26,12 +27,12 @@ def unit_note(unit: str, fps: float) -> str:
     if unit == FRAMES:
         return "Frames, counted from 0"
     if unit == SECONDS:
-        return f"Seconds at {fps:g} frames per second"
+        return f"Seconds at {rate_text(fps)} frames per second"
     nominal = frames_per_second_of_timecode(fps)
     note = f"Hours:minutes:seconds:frames, {nominal} frames to the second"
     if abs(fps - nominal) < 1e-6:
         return note
-    return f"{note}, non-drop: the capture has {fps:g}, so that this is not the time of day"
+    return f"{note}, non-drop: the capture has {rate_text(fps)}, so that this is not the time of day"
 
 
 def timecode(frame_index: int, fps: float) -> str:

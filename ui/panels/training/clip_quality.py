@@ -54,7 +54,7 @@ class ClipQuality:
         """How far exposure goes, and what became of that."""
         largest = np.nanmax(self.exposure) if np.isfinite(self.exposure).any() else 0.0
         if largest < LEAST_CHANGE_PERCENT:
-            return "The clips hold no change of the cameras' exposure."
+            return "The cameras' exposure does not change between clips."
         clip = int(self.clips[np.nanargmax(self.exposure)])
         return (
             f"The cameras' exposure is up to {largest:.1f} % from the reference clip's (clip {clip}); it was removed."

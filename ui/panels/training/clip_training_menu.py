@@ -22,9 +22,9 @@ GOING = ("preparing", "training", "paused")
 def train_label(status: ClipStatus) -> str:
     """What training this clip would be."""
     if status.state in ("trained", "damaged"):
-        return "Train this clip again"
+        return "Retrain this clip"
     if status.state == "failed":
-        return "Try this clip again"
+        return "Retry this clip"
     return "Train this clip" if status.resume_step is None else "Resume this clip"
 
 
@@ -45,7 +45,7 @@ def draw_clip_training(
     has_reference = clip_index == reference or reference in coming or reference_state in ("trained", *GOING)
     can_train = is_writable and not is_going and session.training.state != "stopping"
     if clip_index in coming:
-        if _item(ui, "unqueue", f"{Icon.CLOSE}  Do not train it after all", is_by_key=is_by_key):
+        if _item(ui, "unqueue", f"{Icon.CLOSE}  Remove from the queue", is_by_key=is_by_key):
             dispatch(RemoveFromQueue(clip_index))
     else:
         label, is_enabled = f"{Icon.TRAIN}  {train_label(status)}", can_train and has_reference
@@ -57,13 +57,13 @@ def draw_clip_training(
     words = f"{Icon.LAYERS}  Train from here ({format_count(len(later))})"
     if _item(ui, "train from here", words, is_enabled=is_writable and bool(later)):
         dispatch(TrainClips(later))
-    words = f"{Icon.LAYERS}  Train all that is not trained ({format_count(len(everything))})"
+    words = f"{Icon.LAYERS}  Train all untrained ({format_count(len(everything))})"
     if _item(ui, "train all", words, is_enabled=is_writable and bool(everything)):
         dispatch(TrainAll())
     stale = session.queue.stale
     if stale is not None:
         cost = "" if stale.seconds is None else f", about {duration_text(stale.seconds)}"
-        words = f"{Icon.CLOCK_BACK}  Train all that is out of date ({format_count(stale.n_clips)}{cost})"
+        words = f"{Icon.CLOCK_BACK}  Retrain all out of date ({format_count(stale.n_clips)}{cost})"
         if _item(ui, "train stale", words, is_enabled=is_writable):
             dispatch(TrainStale())
     label = f"{Icon.GEAR}  Train with other settings ..."

@@ -53,16 +53,16 @@ def draw_versions_menu(session: SessionView, dispatch: Dispatch, ui: UiState, cl
             if imgui.menu_item(f"{Icon.COLUMNS}  Compare, side by side", "Shift+G", False, True)[0]:
                 dispatch(CompareVersion(clip_index, version.number))
             ui.mark(f"clip menu.compare{version.number}")
-            if imgui.menu_item(f"{Icon.UNDO}  Bring it back", "", False, not version.why_not)[0]:
+            if imgui.menu_item(f"{Icon.UNDO}  Restore", "", False, not version.why_not)[0]:
                 dispatch(RestoreVersion(clip_index, version.number))
             ui.mark(f"clip menu.restore{version.number}")
-            imgui.set_item_tooltip("The clip as it is now becomes an earlier version")
+            imgui.set_item_tooltip("The present clip becomes an earlier version")
             draw_copy_menu(
                 ui,
                 "clip menu.version",
                 lambda version=version: session.command_texts.version(clip_index, version.number),
             )
-            if imgui.menu_item(f"{Icon.TRASH}  Remove it for good", "", False, True)[0]:
+            if imgui.menu_item(f"{Icon.TRASH}  Delete for good", "", False, True)[0]:
                 dispatch(RemoveVersion(clip_index, version.number))
             ui.mark(f"clip menu.remove{version.number}")
             imgui.end_menu()

@@ -131,7 +131,7 @@ def _draw_choice(session: SessionView, shown: Sequence[int], ui: UiState) -> Non
     imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(1e4, MENU_HEIGHT))
     if not imgui.begin_popup("curve clips"):
         return
-    imgui.text_disabled(f"Up to {MAX_CHOSEN}; none: the one that trains or is looked at")
+    imgui.text_disabled(f"Up to {MAX_CHOSEN}; if none, the clip in training or at the playhead")
     if view.chosen and imgui.small_button("None"):
         view.chosen = []
     clipper = imgui.ListClipper()

@@ -20,7 +20,7 @@ def draw_plan(plan: PlanStatus, dispatch: Dispatch, ui: UiState) -> None:
     Args:
         plan: app.status.PlanStatus.
     """
-    text_wrapped_dim(f"Plan: {plan.summary}." if plan.summary else "Plan: looking at what there is to learn ...")
+    text_wrapped_dim(f"Plan: {plan.summary}." if plan.summary else "Plan: computing ...")
     ui.mark("plan.summary")
     is_open = imgui.collapsing_header("Plan and settings")
     ui.mark("plan.header")
@@ -34,12 +34,12 @@ def draw_plan(plan: PlanStatus, dispatch: Dispatch, ui: UiState) -> None:
         if imgui.button("Start over ..."):
             dispatch(AskStartOver())
         ui.mark("plan.start_over")
-        imgui.set_item_tooltip("Asks for a preset, and says what is discarded")
+        imgui.set_item_tooltip("Choose a preset; what would be discarded is shown first")
         imgui.same_line()
         if imgui.button("New project ..."):
             dispatch(NewProject())
         ui.mark("plan.new_project")
-        imgui.set_item_tooltip("Another project of this capture; this one stays as it is")
+        imgui.set_item_tooltip("Another project of this capture; this one does not change")
     elif plan.discards:
         text_wrapped_dim(f"A change discards {plan.discards}.")
     _draw_lines(plan)

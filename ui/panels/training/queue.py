@@ -22,9 +22,9 @@ ROW_HEIGHT = 26.0
 BUTTON_WIDTH = 24.0
 PAYLOAD = "queued clip"
 LIVE_WORDS = {
-    "off": ("Off", "Trains without showing anything in between"),
-    "low": ("Low", "Shows what was learned about every 10 s"),
-    "live": ("Live", "Shows what was learned about every 2 s"),
+    "off": ("Off", "Show no intermediate results"),
+    "low": ("Low", "Refresh every 10 s"),
+    "live": ("Live", "Refresh every 2 s"),
 }
 
 
@@ -53,7 +53,7 @@ def room_text(queue: QueueStatus) -> str:
     needed = None if queue.everything is None else queue.everything.disk_mb
     if needed is None or queue.free_mb is None or needed <= queue.free_mb:
         return ""
-    return f"The disk has room for {size_text(queue.free_mb)} only."
+    return f"Only {size_text(queue.free_mb)} are free on the disk."
 
 
 def usage_text(usage: UsageStatus) -> str:
@@ -119,7 +119,7 @@ def _draw_whole(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     if session.training.state not in ("idle", "failed") and queue.waiting:
         is_toggled, is_wanted = imgui.checkbox("Hold after this clip", queue.is_ending_after)
         ui.mark("queue.stop_after")
-        imgui.set_item_tooltip("The clip that trains is finished, the others wait until you go on (Ctrl+Shift+T)")
+        imgui.set_item_tooltip("Stops after this clip, until you resume (Ctrl+Shift+T)")
         if is_toggled:
             dispatch(StopAfterClip(is_wanted))
 
@@ -179,7 +179,7 @@ def _draw_row(queue: QueueStatus, place: int, dispatch: Dispatch, ui: UiState) -
         dispatch(MoveInQueue(index, place + 1))
     imgui.end_disabled()
     imgui.same_line()
-    if _small(Icon.CLOSE, f"queue.remove{index}", "Do not train it after all", ui):
+    if _small(Icon.CLOSE, f"queue.remove{index}", "Remove from the queue", ui):
         dispatch(RemoveFromQueue(index))
     imgui.pop_id()
 
@@ -219,7 +219,7 @@ def draw_live_view(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
         if is_on:
             imgui.pop_style_color(2)
         ui.mark(f"training.live.{mode}")
-        imgui.set_item_tooltip(f"{tooltip}. The training goes on meanwhile.")
+        imgui.set_item_tooltip(f"{tooltip}; training continues.")
 
 
 def draw_usage(usage: UsageStatus, ui: UiState) -> None:

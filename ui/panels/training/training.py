@@ -26,7 +26,7 @@ from ui.style.theme import Icon
 
 LEAST_TABLE = 120.0
 """Height of the table of clips at least, units."""
-ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
+ANCHORS_TOOLTIP = """All anchors of a clip, whatever frames they are alive in.
 Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
 
@@ -34,7 +34,7 @@ Later clips: inherited + residual anchors."""
 def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Buttons, progress, queue, curves, quality over the clips, then one row per clip."""
     if session.capture is None:
-        text_wrapped_dim("Training starts from here when a capture is open.")
+        text_wrapped_dim("Training starts here once a capture is open.")
         return
     status = session.training
     _draw_buttons(session, dispatch, ui)
@@ -64,7 +64,7 @@ def next_label(session: SessionView) -> str:
         is_all = all(state.state == "trained" for state in session.clip_states)
         return f"{Icon.CHECK}  Every clip is trained" if is_all else f"{Icon.WARNING}  No clip can be trained next"
     if session.queue.is_held:
-        return f"{Icon.PLAY}  Go on with clip {index}"
+        return f"{Icon.PLAY}  Resume with clip {index}"
     if step is not None:
         return f"{Icon.PLAY}  Resume clip {index} at step {format_count(step)}"
     return f"{Icon.TRAIN}  Train next clip"
@@ -116,7 +116,7 @@ def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
         dispatch(StopTraining())
     ui.mark("training.stop")
     imgui.end_disabled()
-    imgui.set_item_tooltip("Ends this clip now and keeps what it learned")
+    imgui.set_item_tooltip("Stops this clip now; its progress is kept")
 
 
 def _draw_progress(status: TrainingStatus, ui: UiState) -> None:

@@ -63,7 +63,7 @@ class RecentRows:
             dispatch(open_recent(entry))
         ui.mark(f"welcome.recent{index}")
         if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-            state = "It is not there any more." if is_gone else entry.trained_text
+            state = "The folder no longer exists." if is_gone else entry.trained_text
             imgui.set_tooltip(f"{one_line(str(entry.folder))}\n{state}")
         imgui.same_line(0, 6)
         imgui.set_cursor_screen_pos(ImVec2(start.x + width + 6, start.y + (ROW_HEIGHT - BUTTON) / 2))
@@ -73,7 +73,7 @@ class RecentRows:
         if is_forgotten:
             dispatch(ForgetRecent(entry.folder))
         ui.mark(f"welcome.forget{index}")
-        imgui.set_item_tooltip("Take it out of this list; its files stay")
+        imgui.set_item_tooltip("Remove it from this list; its files stay")
         imgui.set_cursor_screen_pos(ImVec2(start.x, start.y + ROW_HEIGHT + 4))
         imgui.dummy(ImVec2(0, 0))
         self._draw_inside(entry, recent, ui, Rect(start.x, start.y, start.x + width, start.y + ROW_HEIGHT))

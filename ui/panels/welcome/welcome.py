@@ -75,7 +75,7 @@ def draw_welcome(session: SessionView, dispatch: Dispatch, ui: UiState, area: Re
 def _draw_recent(session: SessionView, dispatch: Dispatch, ui: UiState, rows: RecentRows) -> None:
     """The list, as high as there is room for; it scrolls."""
     if session.recent.entries:
-        imgui.text_disabled("Opened lately")
+        imgui.text_disabled("Recent")
     height = max(imgui.get_content_region_avail().y - imgui.get_text_line_height_with_spacing() - 4, 40.0)
     if imgui.begin_child("recent", ImVec2(0, height), imgui.ChildFlags_.nav_flattened):
         rows.draw(session.recent, dispatch, ui)

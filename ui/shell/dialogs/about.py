@@ -28,7 +28,7 @@ class AboutDialog:
         """Open it where that was asked for, and draw it while it is open."""
         if ui.wishes.is_about:
             ui.wishes.is_about, self._asked = False, object()
-        keys = self._modal.begin(self._asked, "About the program###about", SIZE)
+        keys = self._modal.begin(self._asked, "About ClipGStream Studio###about", SIZE)
         if keys is None:
             return
         is_left = keys.is_left or keys.is_closed or keys.is_agreed

@@ -16,6 +16,7 @@ from app.session.commands import CalibrateVideos, CloseQuestion, Command, KeepCa
 from app.session.session_view import SessionView
 from app.status import JobStatus
 from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance, Lens, Up
+from engine.text import rate_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import (
     draw_job_bar,
@@ -40,8 +41,8 @@ FIELD_WIDTH = 330.0
 LENS_WORDS: dict[Lens, str] = {"simple": "Ordinary", "opencv": "Wide angle", "fisheye": "Fisheye"}
 UP_WORDS: dict[Up, str] = {"floor": "The floor", "cameras": "The cameras"}
 ABOUT = (
-    "Where the cameras stand and what their lenses do is found from the pictures alone. The cameras must not move, and "
-    "neighbours have to see much of the same."
+    "Finds camera poses and lenses from the pictures alone. The cameras must not move, and neighbouring views must "
+    "overlap."
 )
 
 
@@ -93,7 +94,7 @@ class CalibrationDialog:
             _draw_head(page, ui)
             text_wrapped_dim(ABOUT)
             if page.state == "looking":
-                text_wrapped_dim("Looking into the folder ...")
+                text_wrapped_dim("Reading the folder ...")
                 ui.redraw_within(0.1)
             if page.failure is not None:
                 _draw_failure(page, ui)
@@ -144,7 +145,7 @@ class CalibrationDialog:
             imgui.same_line()
         imgui.new_line()
         _label("")
-        self._is_shared = imgui.checkbox("All cameras are of one make at one zoom", self._is_shared)[1]
+        self._is_shared = imgui.checkbox("All cameras are the same model at the same zoom", self._is_shared)[1]
         ui.mark("calibration.shared")
         _label("Up is given by")
         for name, words in UP_WORDS.items():
@@ -155,7 +156,7 @@ class CalibrationDialog:
             imgui.same_line()
         imgui.new_line()
         _label("Known distance")
-        self._has_distance = imgui.checkbox("Two cameras were measured, from lens to lens", self._has_distance)[1]
+        self._has_distance = imgui.checkbox("The distance between two lenses was measured", self._has_distance)[1]
         ui.mark("calibration.distance")
         if self._has_distance:
             _label("")
@@ -168,14 +169,14 @@ class CalibrationDialog:
             imgui.set_next_item_width(80)
             self._metres = max(imgui.input_float("metres##known", self._metres, 0.0, 0.0, "%.4g")[1], 1e-3)
             ui.mark("calibration.metres")
-        _label("Written into")
+        _label("Output")
         imgui.set_next_item_width(FIELD_WIDTH + 90)
         self._out = imgui.input_text("##out", self._out)[1]
         ui.mark("calibration.out")
-        imgui.set_item_tooltip("A small file, capture.json. The videos stay where they are and as they are.")
+        imgui.set_item_tooltip("A small file, capture.json; the videos do not change.")
         if self._would_replace(page):
             _label("")
-            self._is_replacing = imgui.checkbox("Replace the capture.json that is there", self._is_replacing)[1]
+            self._is_replacing = imgui.checkbox("Replace the existing capture.json", self._is_replacing)[1]
             ui.mark("calibration.replace")
         if is_fixed:
             self._is_shared, self._is_replacing, self._has_distance = before
@@ -193,7 +194,7 @@ class CalibrationDialog:
             ui.mark("calibration.stage")
             draw_job_bar(progress, ui, -1.0, 12.0)
             ui.mark("calibration.progress")
-            text_wrapped_dim("Escape stops it; nothing is written then.")
+            text_wrapped_dim("Escape stops it; nothing is written.")
         imgui.end_child()
         imgui.separator()
         imgui.set_cursor_pos_x(imgui.get_window_width() - BUTTON.x - 14)
@@ -210,7 +211,7 @@ def _draw_result(page: CalibrationPage, result: CalibrationResult, ui: UiState, 
         imgui.text_colored(ImVec4(*color), icon)
         imgui.same_line()
         if result.failure:
-            text_wrapped(f"The calibration has failed; nothing was written. {result.failure}")
+            text_wrapped(f"Calibration failed; nothing was written. {result.failure}")
         for line in lines_below(result):
             text_wrapped_dim(line) if line.startswith("  ") else text_wrapped(line)
     imgui.end_child()
@@ -246,7 +247,7 @@ def _draw_failed_answers(ui: UiState, *, is_agreed: bool) -> Command | None:
     """Enter closes: what has failed is kept only where that is chosen."""
     is_kept = imgui.button("Keep anyway", BUTTON)
     ui.mark("calibration.keep")
-    imgui.set_item_tooltip("Write capture.json with all cameras in use, to look at them.")
+    imgui.set_item_tooltip("Writes capture.json with all cameras in use, for inspection.")
     imgui.same_line()
     is_closed = primary_button("Close", BUTTON, ui)
     ui.mark("calibration.close")
@@ -299,13 +300,13 @@ def _draw_cameras(cameras: tuple[VideoFacts, ...]) -> None:
             imgui.table_next_column()
             imgui.text_disabled(f"{camera.n_frames:,} frames")
             imgui.table_next_column()
-            imgui.text_disabled(f"{camera.fps:.6g} per second" if camera.fps else "")
+            imgui.text_disabled(f"{rate_text(camera.fps)} fps" if camera.fps else "")
         imgui.end_table()
     imgui.end_child()
     imgui.pop_style_color()
     counts = {camera.n_frames for camera in cameras}
     if len(counts) > 1:
-        text_wrapped_dim(f"They differ in length; the {min(counts):,} frames that all have are used.")
+        text_wrapped_dim(f"Their lengths differ; the {min(counts):,} frames they share are used.")
 
 
 def _camera_box(label: str, cameras: tuple[VideoFacts, ...], chosen: int) -> int:

@@ -58,7 +58,7 @@ def draw_clip_question(question: ClipQuestion, ui: UiState, is_agreed: bool) -> 
 
 
 def _bring_back(clip_index: int, version: int) -> tuple[str, str, Command]:
-    return "yes", f"{Icon.UNDO}  Bring back version {version}", RestoreVersion(clip_index, version)
+    return "yes", f"{Icon.UNDO}  Restore version {version}", RestoreVersion(clip_index, version)
 
 
 def _buttons(ui: UiState, yes: Sequence[tuple[str, str, Command]], no: str) -> Command | None:
@@ -91,7 +91,7 @@ def clip_question_texts(question: ClipQuestion) -> list[str]:
             them = "1 file of a clip" if question.n_clips == 1 else f"{question.n_clips} files of clips"
             return [
                 f"Delete {question.words}: {them}, {size_text(question.n_bytes / 1e6)}.",
-                "They will be gone for good: undo does not bring them back.",
+                "This cannot be undone.",
             ]
         case DamagedQuestion():
             return _damage_texts(question)
@@ -116,15 +116,15 @@ def _cut_texts(question: CutQuestion) -> list[str]:
 def _deletions_texts(question: DeletionsQuestion) -> list[str]:
     clips = "1 clip" if question.n_clips == 1 else f"{question.n_clips} clips"
     texts = [
-        f"{clips} will be written again without {question.n_anchors:,} anchors. The picture stays the same.",
-        "The clips as they are now are kept as versions, which bring back what was deleted.",
-        "Edits stay in the stack if they hide, delete in some frames only, or delete some Gaussians of an anchor only.",
+        f"{clips} will be rewritten without {question.n_anchors:,} anchors. The picture does not change.",
+        "The present clips are kept as versions; restoring one brings its anchors back.",
+        "Edits that hide, or delete only in some frames or only some Gaussians of an anchor, stay in the stack.",
     ]
     if question.n_untrained:
         n = question.n_untrained
         them = "1 clip is" if n == 1 else f"{n} clips are"
         texts.append(
-            f"{them} not trained: all edits that delete stay, and so do the anchors that such a clip would inherit."
+            f"{them} not trained: all deleting edits stay, and so do the anchors that such a clip would inherit."
         )
     return texts
 
@@ -132,11 +132,11 @@ def _deletions_texts(question: DeletionsQuestion) -> list[str]:
 def _damage_texts(question: DamagedQuestion) -> list[str]:
     texts = [f"Clip {question.clip_index} is finished, but cannot be read. {question.reason}"]
     if question.version is not None:
-        texts.append(f"An earlier version can come back: {question.version}, {question.version_text}.")
+        texts.append(f"An earlier version can be restored: {question.version}, {question.version_text}.")
     else:
-        texts.append(f"No earlier version can come back. {question.why_no_version}")
+        texts.append(f"No earlier version can be restored. {question.why_no_version}")
     cost = "" if question.seconds is None else f" Training it again takes about {duration_text(question.seconds)}."
-    texts.append(f'The damaged file is put aside in the project\'s folder "damaged", whatever takes its place.{cost}')
+    texts.append(f'The damaged file moves to the project\'s folder "damaged" either way.{cost}')
     if question.outdated:
         n = len(question.outdated)
         them = "1 clip was" if n == 1 else f"{n} clips were"

@@ -29,8 +29,8 @@ OPEN, CALIBRATE, READ_ONLY, RELOCATE = "open", "calibrate", "read only", "reloca
 _TITLES = {
     OPEN: "Open a capture or project folder",
     CALIBRATE: "Calibrate a folder of plain videos",
-    READ_ONLY: "Open a project for reading only",
-    RELOCATE: "Where the capture of the project is by now",
+    READ_ONLY: "Open a project read-only",
+    RELOCATE: "Choose the capture of this project",
 }
 _HINTS = {
     OPEN: "Folder with the cameras and their videos or pictures, or of a project",
@@ -174,7 +174,7 @@ class OpenFolderDialog:
             imgui.close_current_popup()
         imgui.same_line()
         imgui.begin_disabled(not is_folder)
-        is_clicked = imgui.button("Open" if self._purpose in (OPEN, READ_ONLY) else "Go on", ImVec2(120, 0))
+        is_clicked = imgui.button("Open" if self._purpose in (OPEN, READ_ONLY) else "Continue", ImVec2(120, 0))
         ui.mark("open.accept")
         imgui.end_disabled()
         if (is_clicked or is_entered) and folder is not None and is_folder:
@@ -226,7 +226,7 @@ def draw_help(ui: UiState) -> None:
             imgui.end_table()
         others = next(action for action in ACTIONS if action.id == "window.palette")
         key = ui.keys.label(others)
-        text_wrapped_dim(f"What has no key is in the menus; {key} finds everything by its name." if key else "")
+        text_wrapped_dim(f"Actions without a key are in the menus; {key} finds any action by name." if key else "")
     imgui.end()
     ui.is_help_open = bool(is_kept)
 

@@ -151,7 +151,7 @@ class ExportDialog:
 
     def _draw_frames(self, context: ExportContext, ui: UiState) -> None:
         words: dict[FramesChoice, str] = {
-            "all": "All that are trained",
+            "all": "All trained",
             "range": "From in to out",
             "clip": "This clip",
             "frame": "This frame",

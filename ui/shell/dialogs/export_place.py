@@ -86,7 +86,7 @@ class ExportPlace:
 def draw_plan(plan: ExportPlan | None, ui: UiState) -> None:
     """What will be written, or what is wrong with it; None while that is looked at."""
     if plan is None:
-        text_wrapped_dim("Looking at what would be written ...")
+        text_wrapped_dim("Estimating the size ...")
         return
     for problem in plan.problems:
         imgui.text_colored(ImVec4(*theme.ORANGE), Icon.WARNING)

@@ -132,7 +132,7 @@ class AnswersForm:
         imgui.spacing()
         n_out = len(self._holdout)
         imgui.text(f"Held out for measuring: {n_out} of {len(report.cameras)} cameras")
-        text_wrapped_dim("Training never sees them, so they tell how good it is. Click a camera to change it.")
+        text_wrapped_dim("Training never sees them, so they measure its quality. Click a camera to change it.")
         corner = imgui.get_cursor_screen_pos()
         box = Rect(corner.x, corner.y, corner.x + MAP_SIDE, corner.y + MAP_SIDE)
         clicked = draw_map(report, frozenset(self._holdout), box, ui, self._pointed)
@@ -140,7 +140,7 @@ class AnswersForm:
             self._holdout ^= {clicked}
         imgui.set_cursor_screen_pos(ImVec2(box.x1 + 10, box.y0))
         imgui.begin_group()
-        if imgui.small_button("As offered"):
+        if imgui.small_button("Default"):
             self._holdout = set(self._offered)
         ui.mark("opening.offered")
         imgui.same_line()

@@ -28,7 +28,7 @@ from ui.shell.dialogs.refused_folder import draw_refused
 from ui.style import theme
 from ui.style.theme import Icon
 
-OPEN, REFUSED = "Open a capture###opening", "This folder does not open###refused"
+OPEN, REFUSED = "Open a capture###opening", "This folder cannot be opened###refused"
 SIZE = (1080.0, 690.0)
 REFUSED_SIZE = (700.0, 420.0)
 FORM_WIDTH = 410.0
@@ -38,7 +38,7 @@ LEAST_PICTURE_WIDTH, PICTURE_SHAPE = 120.0, 0.62
 WORD_WIDTH = 92.0
 INDENT = 23.0
 """Of what belongs to words behind a sign."""
-MORE = 'Once it is open, "Examine the capture" looks at the pictures, too.'
+MORE = 'Once it is open, "Examine the capture" checks the pictures, too.'
 
 
 class OpeningDialog:
@@ -204,4 +204,4 @@ def _draw_findings(findings: Sequence[Finding] | None, ui: UiState) -> None:
         imgui.indent(INDENT)
         text_wrapped_dim(finding.advice)
         imgui.unindent(INDENT)
-    text_wrapped_dim(MORE if findings else f"Nothing odd in the numbers. {MORE}")
+    text_wrapped_dim(MORE if findings else f"No problems found so far. {MORE}")

@@ -298,12 +298,12 @@ def leaving_texts(question: LeaveQuestion) -> list[str]:
 
 def correction_texts(question: CorrectionQuestion) -> list[str]:
     """What the dialog says before a capture is corrected, paragraph by paragraph."""
-    kept = " with what it has learned" if question.has_progress else ""
+    kept = " with its progress" if question.has_progress else ""
     return [
         f"{question.words}: this is written to capture.json in {question.capture}. No other file of the capture "
-        "changes; deleting or editing that file takes it back.",
-        f"The open project was made from the capture as it is now and will not fit it any more. It stays "
-        f"in {question.project}{kept}. The corrected capture is opened as a new project.",
+        "changes; delete or edit that file to revert.",
+        f"The open project no longer matches the corrected capture. It stays in {question.project}{kept}. The "
+        "corrected capture is opened as a new project.",
     ]
 
 
@@ -313,22 +313,20 @@ def retrain_texts(question: RetrainQuestion) -> list[str]:
     if question.is_damaged:
         texts = [
             f"{clip} was finished, but cannot be read. {question.reason}",
-            'Training it again puts the damaged file aside in the project\'s folder "damaged".',
+            'Training it again moves the damaged file to the project\'s folder "damaged".',
         ]
     else:
         psnr = question.held_out_psnr
         figure = "" if psnr is None else f" ({psnr_words(psnr, is_whole=question.held_out_whole)})"
         texts = [
-            f"{clip} is finished{figure}. It stays as it is, with its figures and curves, until the new training is "
-            "finished, and is kept as an earlier version then."
+            f"{clip} is finished{figure}. It stays in use until the new training finishes, and is then kept as an "
+            "earlier version."
         ]
     if question.resume_step is not None:
-        texts.append(
-            f"The training goes on at step {format_count(question.resume_step)}, where an earlier one was stopped."
-        )
+        texts.append(f"Training resumes at step {format_count(question.resume_step)}, where it was stopped.")
     if question.seconds is not None:
-        basis = "clips of this project took on average" if question.is_average else "it took the last time"
-        texts.append(f"This takes about {duration_text(question.seconds)}, going by what {basis}.")
+        basis = "the average clip of this project" if question.is_average else "its last training"
+        texts.append(f"This takes about {duration_text(question.seconds)}, judging by {basis}.")
     return texts
 
 
@@ -341,6 +339,6 @@ def outdated_text(question: RetrainQuestion) -> str:
     if question.outdated_seconds is not None:
         cost = f", about {duration_text(question.outdated_seconds)}"
     if n == 1:
-        return f"Clip {listed} was trained on it. It will be out of date and has to be trained again, too{cost}."
+        return f"Clip {listed} was trained on it. It will be out of date and has to be retrained{cost}."
     every = f"{n} clips were trained on it: {listed}{more}."
-    return f"{every} They will be out of date and have to be trained again, too{cost}."
+    return f"{every} They will be out of date and have to be retrained{cost}."

@@ -39,8 +39,8 @@ def draw_refused(
             names = ", ".join(video.name for video in found.videos[:MAX_NAMED])
             more = ", ..." if len(found.videos) > MAX_NAMED else ""
             text_wrapped(
-                f"There are {len(found.videos)} videos in it ({names}{more}). If each is of one camera of the same "
-                "scene, where the cameras stood can be found from the pictures: calibrate them."
+                f"It holds {len(found.videos)} videos ({names}{more}). If each shows the same scene from another "
+                "camera, calibrate them to find the camera poses from the pictures."
             )
         for message, hint in found.problems:
             imgui.bullet()
@@ -72,7 +72,7 @@ def draw_refused(
     if found.needs_links:
         is_allowed = imgui.button(ALLOW, allow)
         ui.mark("refused.allow")
-        imgui.set_item_tooltip("Lets this capture read files outside of its folder; its project remembers that.")
+        imgui.set_item_tooltip("Lets this capture read files outside its folder; its project remembers this.")
         if is_allowed:
             return OpenCapture(found.path, follow_links=True, is_asking=True)
         return CloseQuestion() if is_closed or is_agreed else None

@@ -13,7 +13,7 @@ from ui.style.theme import Icon
 
 BUTTON_HEIGHT = 34.0
 PRESET_WIDTH = 150.0
-KEPT = "Camera paths, markers, regions and edits stay; an edit of single Gaussians finds none of them any more."
+KEPT = "Camera paths, markers, regions and edits stay; edits of single Gaussians lose their targets."
 
 
 class StartOverDialog:
@@ -29,13 +29,13 @@ class StartOverDialog:
             self._preset = question.preset
         self._asked = question
         if question.is_working:
-            text_wrapped("Deleting what was trained ...")
+            text_wrapped("Deleting trained clips ...")
             ui.redraw_within(0.1)
             return None
         if question.discards:
             imgui.text_colored(theme.ORANGE, Icon.WARNING)
             imgui.same_line()
-            text_wrapped(f"This discards {question.discards}. Undo does not bring it back.")
+            text_wrapped(f"This discards {question.discards}. This cannot be undone.")
         else:
             text_wrapped("Nothing is trained yet, so nothing is discarded.")
         ui.mark("question.discards")
@@ -66,7 +66,7 @@ class StartOverDialog:
         if imgui.button("New project", size):
             answer = NewProject()
         ui.mark("question.other")
-        imgui.set_item_tooltip("Another project of this capture; this one stays as it is")
+        imgui.set_item_tooltip("Another project of this capture; this one does not change")
         imgui.same_line(0, 8)
         if imgui.button("Cancel", size):
             answer = CloseQuestion()

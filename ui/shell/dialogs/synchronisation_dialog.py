@@ -24,8 +24,8 @@ SIZE = (760.0, 600.0)
 BUTTON = ImVec2(190, 34)
 LABEL_WIDTH = 110.0
 ABOUT = (
-    "Measured from what recordings have in common: timecodes, sound, and where and how much moves. An offset of +2 "
-    "means: what the others show in their frame 10 is in frame 12 of this camera."
+    "Measured from timecodes, sound and motion. An offset of +2 means that frame 12 of this camera shows what frame "
+    "10 of the others shows."
 )
 
 
@@ -67,7 +67,7 @@ class SynchronisationDialog:
         imgui.spacing()
         if page.state == "running":
             share, message = (0.0, "") if progress is None else (progress.done, progress.message)
-            imgui.text(message or "Looking at the recordings")
+            imgui.text(message or "Reading the recordings")
             imgui.progress_bar(share, ImVec2(-1, 20), f"{100 * share:.0f} %")
             ui.redraw_within(0.2)
             return
@@ -88,14 +88,13 @@ class SynchronisationDialog:
         if page.can_apply and page.state == "done":
             imgui.spacing()
             imgui.align_text_to_frame_padding()
-            imgui.text("Written into")
+            imgui.text("Output")
             imgui.same_line(LABEL_WIDTH)
             imgui.set_next_item_width(-1)
             self._target = imgui.input_text("##target", self._target)[1]
             ui.mark("synchronisation.target")
             text_wrapped_dim(
-                "A small file, capture.json; the videos stay as they are. Projects belong to a capture as it was when "
-                "they were made: a corrected one begins a new project."
+                "A small file, capture.json; the videos do not change. A corrected capture needs a new project."
             )
 
     def _draw_buttons(self, page: SynchronisationPage, ui: UiState, *, is_agreed: bool) -> Command | None:
@@ -131,14 +130,14 @@ def _draw_verdict(page: SynchronisationPage) -> None:
     if page.state == "written":
         icon, color, words = Icon.CHECK, theme.GREEN, f"The corrected capture is in {page.written}."
     elif page.is_in_step:
-        icon, color, words = Icon.CHECK, theme.GREEN, "The cameras are in step, as far as can be told."
+        icon, color, words = Icon.CHECK, theme.GREEN, "The cameras appear to be synchronised."
     elif page.can_apply:
-        icon, color, words = Icon.INFO, theme.SKY, "Some cameras are ahead of others or behind them."
+        icon, color, words = Icon.INFO, theme.SKY, "Some cameras are ahead or behind."
     else:
         icon, color = Icon.WARNING, theme.ORANGE
         words = (
-            "Some offsets are too uncertain to be applied. A clap that all cameras see or hear helps, or offset_frames "
-            "by hand in capture.json."
+            "Some offsets are too uncertain to apply. Record a clap that all cameras see or hear, or set "
+            "offset_frames in capture.json."
         )
     imgui.text_colored(ImVec4(*color), icon)
     imgui.same_line()
@@ -157,12 +156,12 @@ def _draw_table(rows: tuple[OffsetRow, ...], fps: float) -> None:
         imgui.table_next_column()
         imgui.text(row.name)
         if row.offset_frames is None:
-            cells = ("unknown", "", "", "nothing that was found")
+            cells = ("unknown", "", "", "not found")
         else:
             cells = (
                 f"{row.offset_frames:+.2f} (give or take {row.sigma_frames:.2f})",
                 f"{1000 * row.offset_frames / max(fps, 1e-6):+.1f}",
-                f"{100 * row.confidence:.0f} %{'' if row.is_sure else ', too little'}",
+                f"{100 * row.confidence:.0f} %{'' if row.is_sure else ', too low'}",
                 row.source,
             )
         for cell in cells:

@@ -11,8 +11,8 @@ from ui.panels.widgets import text_wrapped_dim
 
 FIELD_WIDTH = 190.0
 SHARED_TEXT = (
-    "These count for this clip alone. Sizes of features and decoder, cameras, colours and the gate are shared by all "
-    "clips and stay as they are."
+    "These settings apply to this clip only. All clips share the sizes of features and decoder, cameras, colours and "
+    "the gate."
 )
 
 Value = int | float | str | bool
@@ -48,7 +48,7 @@ class SettingsDialog:
             imgui.set_item_tooltip(setting.help_text)
         imgui.spacing()
         if question.has_progress and self.changed:
-            imgui.text_wrapped("What was learned before the clip was stopped is given up: it begins afresh.")
+            imgui.text_wrapped("Progress from before the clip was stopped is discarded.")
             imgui.spacing()
 
     def answer(self, question: SettingsQuestion) -> Command:

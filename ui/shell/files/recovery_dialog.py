@@ -43,15 +43,15 @@ def ways(recovery: Recovery) -> list[Way]:
         source = "the backup of the project file" if recovery.is_from_backup else "the project file"
         steps = f"{recovery.n_replayed} step{'' if recovery.n_replayed == 1 else 's'} of the journal{last}"
         follow = f" and {steps}" if recovery.n_replayed else ""
-        title = f"{Icon.UNDO}  Go on with all that can be read, up to step {recovery.step}"
-        detail = f"It comes from {source}{follow}. What is damaged is kept aside in the project folder."
+        title = f"{Icon.UNDO}  Continue with all that can be read, up to step {recovery.step}"
+        detail = f"Read from {source}{follow}. Damaged files are kept in the project folder."
         found.append(Way(title, detail, OpenProject(folder, ProjectChoices(is_repaired=True))))
     if recovery.plain_step is not None:
-        title = f"{Icon.EYE}  Only look at the project as it was at step {recovery.plain_step}"
-        detail = "The journal is left out. Nothing is changed, and nothing can be edited or trained."
+        title = f"{Icon.EYE}  Open read-only as of step {recovery.plain_step}"
+        detail = "The journal is ignored, and nothing can be edited or trained."
         found.append(Way(title, detail, OpenProject(folder, ProjectChoices(is_journal_used=False))))
-    title = f"{Icon.FOLDER}  Leave everything as it is, and show the folder"
-    detail = "For restoring the damaged file from a copy. Clips are files of their own and are not affected."
+    title = f"{Icon.FOLDER}  Change nothing, and show the folder"
+    detail = "To restore the damaged file from a backup. Clips are separate files and not affected."
     found.append(Way(title, detail, ShowProjectFolder(folder)))
     return found
 
@@ -84,7 +84,7 @@ class RecoveryDialog:
         imgui.separator()
         imgui.spacing()
         imgui.set_cursor_pos_x(imgui.get_window_width() - 2 * BUTTON.x - 20)
-        if primary_button("Go on", BUTTON, ui) or is_agreed:
+        if primary_button("Continue", BUTTON, ui) or is_agreed:
             answer = found[self._chosen].command
         ui.mark("question.yes")
         imgui.same_line()

@@ -19,8 +19,8 @@ def relocation_texts(question: RelocationQuestion) -> list[str]:
     texts = [f"The capture of this project is no longer at {question.capture}."]
     if question.refused is not None:
         texts.append(
-            f"{question.refused} holds another capture: its pictures or cameras are not those that this project was "
-            "made for. Choose another folder, or open that capture as a project of its own."
+            f"{question.refused} holds another capture: its pictures or cameras do not match this project. Choose "
+            "another folder, or open that capture as its own project."
         )
     return [*texts, "Choose the folder where it is now. Training and edits are kept."]
 

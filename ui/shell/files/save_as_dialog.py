@@ -49,7 +49,7 @@ class SaveAsDialog:
                 f"It takes {question.n_bytes / 1e6:.0f} MB at most: finished clips are shared where the disk allows it."
             )
             imgui.text_disabled(size)
-        imgui.text_disabled("The copy is opened then; the project that is open now stays as it is.")
+        imgui.text_disabled("The copy is opened; the present project does not change.")
         imgui.separator()
         imgui.spacing()
         imgui.set_cursor_pos_x(imgui.get_window_width() - 2 * BUTTON.x - 20)
@@ -76,11 +76,11 @@ def unfit_folder(text: str) -> str:
     try:
         folder = Path(text).expanduser()
         if not text.strip() or not folder.is_absolute():
-            return "Write the whole path of a folder."
+            return "Enter the full path of a folder."
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            return "There is something under this name already."
+            return "This name is already taken."
     except (OSError, RuntimeError, ValueError):
-        return "That cannot be the name of a folder."
+        return "This is not a valid folder name."
     return ""
 
 

@@ -113,7 +113,7 @@ class Palette:
     def _draw_rows(self, ui: UiState) -> int | None:
         clicked = None
         if not self._shown:
-            imgui.text_disabled("Nothing is called that.")
+            imgui.text_disabled("Nothing found.")
         clipper = imgui.ListClipper()
         clipper.begin(len(self._shown), ROW_HEIGHT + imgui.get_style().item_spacing.y)
         if self._shown:
@@ -170,4 +170,4 @@ class Palette:
             imgui.text_colored(ImVec4(*theme.ORANGE), f"{Icon.WARNING}  {entry.why_not}")
             ui.mark("palette.why_not")
         else:
-            imgui.text_disabled("Up and Down choose, Enter does it, Escape closes")
+            imgui.text_disabled("Up and Down choose, Enter runs, Escape closes")

@@ -109,7 +109,7 @@ def _projects(session: SessionView) -> list[Entry]:
             f"Open {one_line(recent.name)}",
             "Recent projects",
             opening(index),
-            why_not="It is not there any more." if recent.folder in session.recent.missing else "",
+            why_not="The folder no longer exists." if recent.folder in session.recent.missing else "",
         )
         for index, recent in enumerate(session.recent.entries)
     ]

@@ -39,8 +39,8 @@ TOOL_WORDS: dict[ToolKind, str] = {
 }
 TOOL_HINTS: dict[ToolKind, str] = {
     "rectangle": "Drag over the picture, or click on an anchor",
-    "lasso": "Drag around what is meant, or click on an anchor",
-    "brush": "Paint over what is meant; [ ] or Ctrl + wheel change its size",
+    "lasso": "Drag a loop, or click on an anchor",
+    "brush": "Paint over Gaussians; [ ] or Ctrl + wheel change its size",
     "box": "Drag on a surface; Ctrl + wheel changes its height",
     "sphere": "Press on a surface and drag",
     "flood": "Click on something; Ctrl + wheel changes the tolerance",

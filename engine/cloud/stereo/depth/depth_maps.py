@@ -68,7 +68,7 @@ def estimate_depth_maps(
     swept, depths = scene.completed(inverse)
     prior = 1.0 / depths
     maps = DepthMaps.of(scene, scene.better(scene.refined(np.stack([prior, inverse]), prior, keep), inverse))
-    report(f"Depth maps: neighbours agree on {100 * maps.is_agreed.mean():.0f} % of the pixels, the rest is filled in")
+    report(f"Depth maps: neighbours agree on {100 * maps.is_agreed.mean():.0f} % of the pixels; the rest is filled in")
     logger.info(
         "slanted patches: %.0f %% before; agreed is what %d or more neighbours have within %.0f %%; %.1f s",
         *(100 * swept.mean(), MIN_AGREE, 100 * AGREE_TOLERANCE, time.perf_counter() - started),

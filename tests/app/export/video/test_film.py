@@ -53,10 +53,10 @@ def test_a_missing_encoder_is_named_with_what_there_is_before_the_work(films: Fi
     monkeypatch.setattr("av.codec.Codec", without("libx264"))
     with pytest.raises(MissingCodecError, match="built without libx264") as error:
         films.render("a.mp4", "mp4")
-    assert error.value.hint == "What can be written is webm, png, exr."
+    assert error.value.hint == "Available: webm, png, exr."
     assert films.names == []
     monkeypatch.setattr("av.codec.Codec", without("libopus"))
     check_codecs("webm")
     with pytest.raises(MissingCodecError, match="built without libopus") as error:
         check_codecs("webm", needs_sound=True)
-    assert error.value.hint == "What can be written is mp4, png, exr."
+    assert error.value.hint == "Available: mp4, png, exr."

@@ -173,6 +173,6 @@ def test_a_video_takes_the_place_of_an_older_one_and_a_folder_does_not(films: Fi
     assert len(decoded(films.folder / "a.mp4")) == 2
     (films.folder / "full").mkdir()
     (films.folder / "full" / "mine").write_text("x")
-    with pytest.raises(ProjectError, match="something under this name"):
+    with pytest.raises(ProjectError, match="already taken"):
         films.render("full", "png")
     assert [path.name for path in (films.folder / "full").iterdir()] == ["mine"]

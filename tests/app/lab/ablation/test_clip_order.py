@@ -90,7 +90,7 @@ def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(con
     assert training.previous.header.clip_index == 0
     assert training.reference is not None
     assert training.reference.header.clip_index == 1
-    with pytest.raises(ProjectError, match="goes on where clip 2 ends, which is not trained"):
+    with pytest.raises(ProjectError, match="continues clip 2, which is not trained"):
         build.build_training(replace(job, clip_index=3), lambda _: None)
     alone = build.build_training(replace(job, clip_index=1), lambda _: None)
     assert isinstance(alone, ClipTraining)

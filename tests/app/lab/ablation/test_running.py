@@ -169,7 +169,7 @@ def test_other_settings_in_the_same_folder_are_refused(runner):
     [
         ({"field": "continue"}, ["independent"], "cannot continue each other's field"),
         ({"decoder": "new"}, ["independent"], "decoder=new would change nothing"),
-        ({"residual": "none"}, ["inherit-off"], "without anything that moves"),
+        ({"residual": "none"}, ["inherit-off"], "with nothing that moves"),
         ({"field": "joint"}, None, "field=joint leaves no clips"),
     ],
 )

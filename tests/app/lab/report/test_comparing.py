@@ -49,7 +49,7 @@ def test_bad_input_leaves_nothing_behind(arguments, expected, project, tmp_path,
     assert main(["report", *(part.format(tmp=tmp_path) for part in arguments), "--quiet"]) == 2
     message = capsys.readouterr().err
     assert expected in message
-    assert "fault of the program" not in message
+    assert "bug in the program" not in message
     logs = {path for path in tmp_path.rglob("*") if "xdg" in str(path)}
     assert sorted(set(tmp_path.rglob("*")) - logs) == [path for path in before if path not in logs]
 
@@ -91,7 +91,7 @@ def test_an_interrupted_report_says_what_is_kept_and_goes_on_from_there(project,
     monkeypatch.setattr(write, "write_report", partial(quick, measuring=interrupted))
     assert main(["report", str(project), "--quiet"]) == 130
     said = capsys.readouterr().err
-    assert "Interrupted. 16 of 24 pictures were measured and are kept; the same command goes on from there." in said
+    assert "Interrupted. 16 of 24 pictures were measured and are kept; the same command resumes from there." in said
     assert "The page was not written." in said
     assert not (project / "reports").exists()
     monkeypatch.setattr(write, "write_report", partial(quick, measuring=measure))

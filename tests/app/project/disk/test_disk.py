@@ -99,5 +99,5 @@ def test_what_cannot_be(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=", ".join(WHAT)):
         room_of(project, 2, "everything")
     project.close()
-    with pytest.raises(ProjectError, match="reading only"):
+    with pytest.raises(ProjectError, match="read-only"):
         make_room(project, room_of(project, 2, "versions"))

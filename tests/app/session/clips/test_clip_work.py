@@ -95,7 +95,7 @@ def test_a_merge_of_clips_that_are_not_trained_asks_nothing(make_session: Make) 
     assert session.question is None
     assert [clip.n_frames for clip in session.clips] == [6]
     session.dispatch(MergeClips(0))
-    assert titles(session) == ["That cannot be done with the clips"]
+    assert titles(session) == ["The clips cannot be changed"]
 
 
 def test_another_reference_makes_everything_stale_and_one_command_trains_it(session: Session) -> None:
@@ -122,7 +122,7 @@ def test_clips_are_not_cut_while_one_trains(make_session: Make) -> None:
     session.dispatch(c.TrainClip(0))
     session.dispatch(SplitClip(1, is_confirmed=True))
     assert [clip.start for clip in session.clips] == [0, 3]
-    assert titles(session)[-1] == "That cannot be done with the clips"
+    assert titles(session)[-1] == "The clips cannot be changed"
 
 
 def test_a_damaged_clip_is_offered_with_the_version_before_it(session: Session) -> None:
@@ -161,7 +161,7 @@ def test_room_is_asked_about_with_its_figure_and_then_made(session: Session) -> 
     poll_until(session, lambda: not version_path(project, 0, 1).exists())
     poll_until(session, lambda: any("free now" in title for title in titles(session)))
     session.dispatch(AskFreeSpace("versions"))
-    poll_until(session, lambda: "There is nothing to free" in titles(session))
+    poll_until(session, lambda: "Nothing to free" in titles(session))
 
 
 def test_a_version_is_put_beside_the_clip_at_the_same_frame(session: Session) -> None:
@@ -182,6 +182,6 @@ def test_exclusions_are_noted_at_trained_clips_and_taken_back(session: Session) 
     assert (bool(notes[0]), "other pictures" in notes[1], states(session)) == (False, True, ["trained"] * 3)
     assert session.residual_status.n_all == 6 * 4 - 1
     session.dispatch(ExcludeCameras((2, 3)))
-    assert titles(session)[-1] == "That cannot be excluded", "too few would be left"
+    assert titles(session)[-1] == "The exclusion cannot be changed", "too few would be left"
     session.dispatch(c.Undo())
     assert [status.reason for status in session.clip_states] == [""] * 3

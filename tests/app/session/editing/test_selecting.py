@@ -160,7 +160,7 @@ def test_there_has_to_be_something_to_select(selecting: Selecting, shown: MadeSh
     for nothing in (None, replace(gaussians, rows=None)):
         shown.gaussians = nothing
         assert not selecting.status().can_select
-        with pytest.raises(ProjectError, match="no Gaussians to select"):
+        with pytest.raises(ProjectError, match="No Gaussians to select"):
             selecting.apply(SelectAll())
         selecting.apply(ClearSelection())  # always possible
     shown.gaussians = gaussians

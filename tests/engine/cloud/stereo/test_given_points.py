@@ -115,7 +115,7 @@ def test_the_preparation_uses_them_and_says_so(
                 lambda progress: said.append(getattr(progress, "message", "")),
                 layout=layout,
             )
-    told = [line for line in said if "came along" in line]
+    told = [line for line in said if "The capture's point cloud" in line]
     assert len(told) == 3
     assert "is used" in told[0]
     assert "is not used" in told[1]

@@ -64,7 +64,7 @@ def test_a_child_that_stands_still_is_ended_and_tried_again(monkeypatch, scratch
     assert len(found.points) == 0
     assert len(started) == child_process.N_ATTEMPTS
     assert all(child.returncode == -9 for child in started)
-    assert "did nothing for" in lines[0]
+    assert "did not respond for" in lines[0]
     assert not list(scratch.iterdir())
 
 

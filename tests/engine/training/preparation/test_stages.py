@@ -59,7 +59,7 @@ def test_what_took_long_is_not_done_again(tmp_path, slow):
     assert kept["image"].dtype == np.uint8
     second.keep("c", slow.work("c", ord("c"), seconds=1))  # too little had gathered to be written
     assert slow.n_done == {"a": 1, "b": 1, "c": 2}
-    assert said == ["2 steps of the preparation were done in an earlier attempt and are taken over"]
+    assert said == ["2 steps of the preparation are reused from an earlier attempt"]
 
 
 def test_no_more_work_gathers_unwritten_than_is_said(tmp_path, slow):
@@ -76,7 +76,7 @@ def test_pieces_of_other_settings_are_removed_with_a_word(tmp_path, slow):
     said: list[str] = []
     other = _stages(tmp_path, slow, key={"capture": "b"}, said=said)
     assert other.keep("a", slow.work("a", 2, seconds=0))["value"][0] == 2
-    assert "do not fit any more" in said[0]
+    assert "are outdated" in said[0]
     assert stage_files(tmp_path, 0) == []
 
 

@@ -53,7 +53,7 @@ def test_questions_say_what_is_lost_and_what_it_costs() -> None:
     room = clip_question_texts(RoomQuestion("versions", None, "all earlier versions", 3, 12_000_000))
     assert room[0] == "Delete all earlier versions: 3 files of clips, 12 MB."
     damaged = clip_question_texts(DamagedQuestion(2, "Bad.", None, "", "There is nothing before it.", (), None))
-    assert "No earlier version can come back. There is nothing before it." in damaged
+    assert "No earlier version can be restored. There is nothing before it." in damaged
 
 
 def test_hatching_lies_on_what_is_painted() -> None:
