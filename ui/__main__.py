@@ -4,5 +4,5 @@ import sys
 
 from ui.main import main
 
-if __name__ == "__main__":  # a spawned worker imports this module again and must not start a second window
+if __name__ == "__main__":
     sys.exit(main())

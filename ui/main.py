@@ -1,6 +1,4 @@
-"""Composition root and argument routing. Nothing here imports torch, GL or a window before it is known to be needed:
-the training worker re-imports this module when it is started from the console script.
-"""
+"""Composition root and argument routing. Nothing here imports torch, GL or a window before it is known to be needed."""
 
 from __future__ import annotations
 

@@ -8,11 +8,12 @@ told, and says so on the terminal.
 from __future__ import annotations
 
 import atexit
-import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
+
+from engine.children.process import undisturbed
 
 STARTED_WITHIN_S = 10.0
 """So long the program waits at its end for a process that is being started."""
@@ -69,20 +70,3 @@ def start_child(process: BaseProcess) -> None:
     """
     with _starts.one(), undisturbed():
         process.start()
-
-
-@contextmanager
-def undisturbed() -> Iterator[None]:
-    """Start processes in this block. A child takes over which signals are held back, and this one never lets go of it.
-
-    Without it, Ctrl+C in the seconds in which a child imports its modules ends it with a traceback on the terminal. A
-    signal that comes during the block reaches this process after it.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows, where children are asked by other means
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -145,9 +145,8 @@ def _train_clip(
                 kind=ending.kind,
             )
         case WorkerDied():
-            message = f"The training process ended with code {ending.exit_code}."
             hint = f"Train again to resume. Its log is {service.project.log_path(clip_index)}."
-            return ClipOutcome(clip_index, "failed", step, seconds=seconds, message=message, hint=hint)
+            return ClipOutcome(clip_index, "failed", step, seconds=seconds, message=f"{ending.reason}.", hint=hint)
         case _:
             return ClipOutcome(clip_index, "stopped", step, seconds=seconds)
 

@@ -1,18 +1,14 @@
-"""Messages between the window's process and a worker: frozen dataclasses of plain values, sent as JSON bytes.
+"""Messages between the window's process and a worker: frozen structs of plain values.
 
 Commands go in and are imperative; events come out and are past tense. Bulk crosses as files, never as messages.
-JSON and an explicit table of classes, so that receiving a message can never run code.
 """
 
 from __future__ import annotations
 
-import json
-import typing
-from dataclasses import asdict, dataclass, field, fields
+from msgspec import Struct, field
 
 from engine.backends.table import chosen_name
 from engine.clip_files.clip_header import SettingValue
-from engine.storage.typed_json import to_type
 
 LIVE_VIEWS = ("off", "low", "live")
 """How often a worker writes snapshots: never, now and then, or as often as they are looked at."""
@@ -20,8 +16,7 @@ LIVE_VIEWS = ("off", "low", "live")
 # ---------------------------------------------------------------- the job
 
 
-@dataclass(frozen=True, slots=True)
-class TrainJob:
+class TrainJob(Struct, frozen=True):
     """Everything a worker needs to train one clip. A copy: later changes of the project do not reach it.
 
     Attributes:
@@ -55,18 +50,15 @@ class TrainJob:
 # ---------------------------------------------------------------- commands
 
 
-@dataclass(frozen=True, slots=True)
-class Pause:
+class Pause(Struct, frozen=True, tag=True):
     """Hold after the current step."""
 
 
-@dataclass(frozen=True, slots=True)
-class Resume:
+class Resume(Struct, frozen=True, tag=True):
     """Go on after Pause."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(Struct, frozen=True, tag=True):
     """End after the current step.
 
     Attributes:
@@ -76,20 +68,17 @@ class Stop:
     keep: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class SnapshotNow:
+class SnapshotNow(Struct, frozen=True, tag=True):
     """Write a snapshot at the next chance."""
 
 
-@dataclass(frozen=True, slots=True)
-class SnapshotConsumed:
+class SnapshotConsumed(Struct, frozen=True, tag=True):
     """The snapshot of this revision was read; the next one may be written."""
 
     revision: int
 
 
-@dataclass(frozen=True, slots=True)
-class SetSnapshots:
+class SetSnapshots(Struct, frozen=True, tag=True):
     """Write snapshots this often from now on: one of LIVE_VIEWS."""
 
     mode: str
@@ -98,16 +87,14 @@ class SetSnapshots:
 # ---------------------------------------------------------------- events
 
 
-@dataclass(frozen=True, slots=True)
-class WorkerReady:
+class WorkerReady(Struct, frozen=True, tag=True):
     """The worker runs and has read the job."""
 
     pid: int
     n_threads: int
 
 
-@dataclass(frozen=True, slots=True)
-class StageReported:
+class StageReported(Struct, frozen=True, tag=True):
     """How far a preparation stage is. done in 0..1"""
 
     stage: str
@@ -115,8 +102,7 @@ class StageReported:
     message: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class StepReported:
+class StepReported(Struct, frozen=True, tag=True):
     """Where the training is; sent a few times per second.
 
     Since the last report, loss is the mean and gradient_norm the largest.
@@ -132,16 +118,14 @@ class StepReported:
     gradient_norm: float
 
 
-@dataclass(frozen=True, slots=True)
-class HeldOutMeasured:
+class HeldOutMeasured(Struct, frozen=True, tag=True):
     """PSNR of a few held-out pictures, dB."""
 
     step: int
     psnr: float
 
 
-@dataclass(frozen=True, slots=True)
-class SnapshotWritten:
+class SnapshotWritten(Struct, frozen=True, tag=True):
     """A complete snapshot lies at `path`."""
 
     revision: int
@@ -149,8 +133,7 @@ class SnapshotWritten:
     path: str
 
 
-@dataclass(frozen=True, slots=True)
-class WarningRaised:
+class WarningRaised(Struct, frozen=True, tag=True):
     """Something the user should know; training goes on."""
 
     title: str
@@ -158,22 +141,19 @@ class WarningRaised:
     hint: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class TrainingPaused:
+class TrainingPaused(Struct, frozen=True, tag=True):
     """The worker waits."""
 
     step: int
 
 
-@dataclass(frozen=True, slots=True)
-class TrainingResumed:
+class TrainingResumed(Struct, frozen=True, tag=True):
     """The worker goes on."""
 
     step: int
 
 
-@dataclass(frozen=True, slots=True)
-class ClipTrained:
+class ClipTrained(Struct, frozen=True, tag=True):
     """The clip is finished, was read back and lies at `path`."""
 
     path: str
@@ -181,16 +161,14 @@ class ClipTrained:
     held_out_psnr: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class TrainingStopped:
+class TrainingStopped(Struct, frozen=True, tag=True):
     """The worker ended before the last step. `path` is the checkpoint, empty when there is none."""
 
     path: str
     step: int
 
 
-@dataclass(frozen=True, slots=True)
-class TrainingFailed:
+class TrainingFailed(Struct, frozen=True, tag=True):
     """The training cannot go on. `kind` names the error's class; `trace` is for the log."""
 
     kind: str
@@ -199,11 +177,14 @@ class TrainingFailed:
     trace: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class WorkerDied:
-    """The process ended without a word. Made by the service, never sent."""
+class WorkerDied(Struct, frozen=True, tag=True):
+    """The process ended without an ending of its own. Made on the window's side, never sent.
 
-    exit_code: int | None
+    Attributes:
+        reason: Without a full stop.
+    """
+
+    reason: str
     log_tail: str = ""
 
 
@@ -222,32 +203,5 @@ Event = (
     | TrainingFailed
     | WorkerDied
 )
-Message = TrainJob | Command | Event
-
-MESSAGE_TYPES: dict[str, type] = {
-    kind.__name__: kind for kind in (TrainJob, *typing.get_args(Command), *typing.get_args(Event))
-}
 ENDINGS = (ClipTrained, TrainingStopped, TrainingFailed, WorkerDied)
 """After one of these a worker says nothing more."""
-
-
-def encode(message: Message) -> bytes:
-    """One message as UTF-8 JSON. Non-finite numbers travel as NaN and Infinity, which Python's JSON reads back."""
-    return json.dumps([type(message).__name__, asdict(message)]).encode()
-
-
-def decode(data: bytes) -> Message:
-    """Inverse of `encode`.
-
-    Raises:
-        ValueError: The bytes are not a message of this version.
-    """
-    try:
-        name, values = json.loads(data)
-        kind = MESSAGE_TYPES[name]
-        unknown = values.keys() - {item.name for item in fields(kind)}
-        if unknown:
-            raise ValueError(f"unknown entries: {unknown}")
-        return to_type(values, kind)
-    except (KeyError, TypeError, AttributeError, ValueError, UnicodeDecodeError) as error:
-        raise ValueError(f"not a message: {data[:80]!r}") from error

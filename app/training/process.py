@@ -2,20 +2,43 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from contextlib import suppress
+from pathlib import Path
 from typing import Protocol
 
-from app.background.children import start_child
+from msgspec import Struct
+
 from app.background.logs import tail
 from app.project.project import Project
-from app.training.build import build_training
-from app.training.interface import MakeTraining
-from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob, WorkerDied, decode, encode
-from app.training.worker import main
+from app.training.messages import ENDINGS, Command, Event, TrainingFailed, TrainJob, WorkerDied
+from engine.children.kind import ChildFailed, ChildKind
+from engine.children.process import MAX_EVENTS_PER_POLL, ChildProcess
+from engine.errors import EngineError
 
-MAX_EVENTS_PER_POLL = 200
-"""A window that slept must not spend a whole frame on old reports."""
+BUILD = "app.training.build:build_training"
+
+
+class TrainTask(Struct, frozen=True):
+    """What a worker process is asked.
+
+    Attributes:
+        log: File for everything that the process prints.
+        make: "module:name" of what builds the training, a MakeTraining.
+    """
+
+    job: TrainJob
+    log: Path
+    make: str
+
+
+TRAINING: ChildKind[TrainTask, Event, None] = ChildKind(
+    place="app.training.process:TRAINING",
+    work="app.training.worker:main",
+    what="The training process",
+    job=TrainTask,
+    event=Event,
+    command=Command,
+    grace_s=5.0,
+)
 
 
 class Worker(Protocol):
@@ -40,75 +63,50 @@ class Worker(Protocol):
 
 
 class ProcessWorker:
-    """A spawned process. See `Worker`.
+    """A process of its own. See `Worker`.
 
     Args:
         job: What to train.
         project: For the log file.
-        make_training: Builds the training in the child; has to be importable there.
+        make: See `TrainTask`.
+
+    Attributes:
+        child: The process.
     """
 
-    def __init__(self, job: TrainJob, project: Project, make_training: MakeTraining = build_training) -> None:
+    def __init__(self, job: TrainJob, project: Project, make: str = BUILD) -> None:
         self.job = job
         self._log_path = project.log_path(job.clip_index)
         self._has_ended = False
-        context = multiprocessing.get_context("spawn")
-        child_commands, self._commands = context.Pipe(duplex=False)
-        self._events, child_events = context.Pipe(duplex=False)
-        self.process = context.Process(
-            target=main,
-            args=(encode(job), child_commands, child_events, str(self._log_path), make_training),
-            name=f"clip {job.clip_index}",
-            daemon=True,
-        )
-        start_child(self.process)
-        child_commands.close()  # the child has its own; ours would hide its end
-        child_events.close()
+        self.child = ChildProcess(TRAINING, TrainTask(job, self._log_path, make))
 
     def send(self, command: Command) -> None:
         """See `Worker`."""
-        with suppress(OSError):
-            self._commands.send_bytes(encode(command))
+        self.child.send(command)
 
     def poll(self) -> list[Event]:
         """See `Worker`."""
         if self._has_ended:
             return []
-        is_alive = self.process.is_alive()  # asked before the pipe is drained, so that last words are not missed
-        events: list[Event] = []
-        with suppress(EOFError, OSError):
-            while len(events) < MAX_EVENTS_PER_POLL and self._events.poll():
-                events.append(decode(self._events.recv_bytes()))  # type: ignore[arg-type]
-        if any(isinstance(event, ENDINGS) for event in events):
+        is_over = self.child.is_over
+        events = self.child.poll()
+        self._has_ended = any(isinstance(event, ENDINGS) for event in events)
+        if is_over and not self._has_ended and len(events) < MAX_EVENTS_PER_POLL:
             self._has_ended = True
-        elif not is_alive and len(events) < MAX_EVENTS_PER_POLL:
-            self._has_ended = True
-            self.process.join(1.0)
-            events.append(WorkerDied(self.process.exitcode, tail(self._log_path)))
+            events.append(self._death())
         return events
 
     def close(self, *, timeout_s: float) -> None:
-        """See `Worker`. Asks, waits, then terminates, then kills."""
-        if self.process.is_alive():
-            self.send(Stop(keep=True))
-            self._drain_until_end(timeout_s)
-        if self.process.is_alive():
-            self.process.terminate()
-            self.process.join(2.0)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join(2.0)
-        self._commands.close()
-        self._events.close()
+        """See `Worker`. Asks, waits, then kills."""
+        self.child.end(timeout_s)
         self._has_ended = True
 
-    def _drain_until_end(self, timeout_s: float) -> None:
-        """Wait for the process while reading what it says, so that a full pipe cannot hold it up."""
-        n_slices = max(int(timeout_s / 0.05), 1)
-        for _ in range(n_slices):
-            with suppress(EOFError, OSError):
-                while self._events.poll():
-                    self._events.recv_bytes()
-            self.process.join(0.05)
-            if not self.process.is_alive():
-                return
+    def _death(self) -> TrainingFailed | WorkerDied:
+        reason = f"{TRAINING.what} ended early"
+        try:
+            self.child.result()
+        except EngineError as error:
+            return TrainingFailed(type(error).__name__, *error.told_apart())
+        except ChildFailed as error:
+            reason = str(error)
+        return WorkerDied(reason, tail(self._log_path))

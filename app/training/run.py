@@ -48,6 +48,7 @@ from app.training.messages import (
 from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch
+from engine.children.kind import Unwanted
 from engine.clip_files.clip_header import ClipFigures
 from engine.clip_files.clip_state import read_clip_header
 from engine.clip_files.compact import CompactClip
@@ -75,7 +76,7 @@ METRICS_EVERY_S = 0.5
 
 
 Receive = Callable[[float], Command | None]
-"""The next command, waiting at most this many seconds. Raises EOFError when nobody is left to send one."""
+"""The next command, waiting at most this many seconds. Raises Unwanted once nobody is left to send one."""
 Send = Callable[[Event], None]
 
 
@@ -357,7 +358,7 @@ class TrainingRun:
         while True:
             try:
                 command = self._receive(wait_s)
-            except EOFError:  # the window is gone: keep what was learned and end
+            except Unwanted:  # the window is gone: keep what was learned and end
                 self._stop = Stop(keep=True)
                 raise StopRequested from None
             match command:

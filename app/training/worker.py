@@ -7,19 +7,18 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
 import sys
-from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from app.background.kernels import use_threads
 from app.background.logs import FORMAT, PrintableFormatter
-from app.training.interface import MakeTraining
-from app.training.messages import Command, Event, TrainJob, WarningRaised, decode, encode
+from app.training.messages import Event, WarningRaised
+from app.training.process import TrainTask
 from app.training.run import TrainingRun
 from engine.backends.table import choose_backend
+from engine.children.child import Parent
+from engine.children.kind import Unwanted, find
 from engine.children.priority import lower_process
 from engine.errors import DiskError
 from engine.kernels.cache import use_kernel_cache
@@ -34,20 +33,21 @@ def n_training_threads(cores: int, *, is_window_open: bool) -> int:
     return cores - 1 if is_window_open and cores > 2 else cores
 
 
-def main(job_bytes: bytes, commands: Connection, events: Connection, log_path: str, make: MakeTraining) -> None:
+def main(task: TrainTask, parent: Parent[Event]) -> None:
     """Runs in the child until the clip is finished, stopped or failed."""
-    refused = _redirect_output(Path(log_path))
+    job, refused = task.job, _redirect_output(task.log)
     use_kernel_cache()  # before the training imports kernels
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
-    job = decode(job_bytes)
-    assert isinstance(job, TrainJob)
     n_threads = _set_threads(is_window_open=job.is_window_open)
     choose_backend(job.backend)
     logger.info("worker %d trains clip %d with %d threads", os.getpid(), job.clip_index, n_threads)
-    send = _sender(events)
+
+    def send(event: Event) -> None:
+        with suppress(Unwanted):  # nobody listens any more; `receive` says so too and ends the run
+            parent.report(event)
+
     if refused is not None:
         send(WarningRaised("The log of the training could not be written", str(refused)))
-    run = TrainingRun(job, receive=_receiver(commands), send=send, make_training=make, n_threads=n_threads)
+    run = TrainingRun(job, receive=parent.receive, send=send, make_training=find(task.make), n_threads=n_threads)
     while run.advance():
         pass
     logger.info("worker %d ends", os.getpid())
@@ -94,23 +94,3 @@ def _set_threads(*, is_window_open: bool) -> int:
     if is_window_open:  # before any thread is started, since threads take over the priority
         lower_process()
     return use_threads(n_training_threads(n_cores(), is_window_open=is_window_open))
-
-
-def _receiver(commands: Connection) -> Callable[[float], Command | None]:
-    def receive(wait_s: float) -> Command | None:
-        try:
-            if not commands.poll(wait_s):
-                return None
-            return decode(commands.recv_bytes())  # type: ignore[return-value]
-        except OSError as error:
-            raise EOFError from error
-
-    return receive
-
-
-def _sender(events: Connection) -> Callable[[Event], None]:
-    def send(event: Event) -> None:
-        with suppress(OSError):  # nobody listens any more; the command pipe says so too and ends the run
-            events.send_bytes(encode(event))
-
-    return send

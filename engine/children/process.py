@@ -1,8 +1,9 @@
 """ChildProcess: the side of the process that starts a child: it sends, listens, notices the end, and ends it.
 
 Threads write and read the pipes, so that neither side ever waits for a full one: what a child says is kept until
-somebody asks. A child is started as a program of its own, in a group of its own, which Ctrl+C in a terminal does not
-reach, and ends when its input does: also when this process was killed.
+somebody asks. A child is started as a program of its own and ends when its input does: also when this process was
+killed. It belongs to this process's group, so that Ctrl+Z in a terminal halts both; Ctrl+C does not reach it, since
+this process decides what that means.
 """
 
 from __future__ import annotations
@@ -10,13 +11,14 @@ from __future__ import annotations
 import logging
 import os
 import queue
+import signal
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Generic, cast
 
@@ -34,8 +36,8 @@ MAX_EVENTS_PER_POLL = 200
 """A window that slept must not spend a whole frame on old reports."""
 END_TIMEOUT_S = 2.0
 """A killed process is gone in a few milliseconds."""
-_IS_POSIX = os.name == "posix"
-_NEW_GROUP = 0 if _IS_POSIX else getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+_CREATION_FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+"""On Windows, where Ctrl+C reaches a whole group and cannot be blocked."""
 
 
 class ChildProcess(Generic[Job, Event, Result]):
@@ -180,8 +182,8 @@ class ChildProcess(Generic[Job, Event, Result]):
             if code < 0:
                 memory = ", perhaps because memory ran out" if code == -9 else ""
                 return ChildFailed(f"{self.kind.what} was ended by signal {-code}{memory}", is_final=False)
-            reason = f"{self.kind.what} ended with code {code} ({lines[-1] if lines else 'no message'})"
-            return ChildFailed(reason, is_final=True)
+            said = f" ({lines[-1]})" if lines else ""
+            return ChildFailed(f"{self.kind.what} ended with code {code}{said}", is_final=True)
         return ChildFailed(f"{self.kind.what} ended with code {code}", is_final=code >= 0)
 
 
@@ -192,16 +194,32 @@ def _start(kind: ChildKind[Job, Event, Result], folder: Path | None, said: IO[by
     if kind.is_spreading:
         environment["OPENBLAS_NUM_THREADS"] = "1"
     command = [sys.executable, "-P", "-m", "engine.children", kind.place, *([str(folder)] if folder else [])]
-    return subprocess.Popen(
-        command,
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=said,
-        bufsize=0,
-        process_group=0 if _IS_POSIX else None,
-        creationflags=_NEW_GROUP,
-    )
+    with undisturbed():
+        return subprocess.Popen(
+            command,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            bufsize=0,
+            creationflags=_CREATION_FLAGS,
+        )
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Start processes in this block; Ctrl+C never reaches them. One that comes meanwhile reaches this process after it.
+
+    A process takes over which signals are blocked where it is started, and so do those that it starts.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def run_child(

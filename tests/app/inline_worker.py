@@ -7,8 +7,9 @@ from collections import deque
 
 from app.training.build import build_training
 from app.training.interface import MakeTraining
-from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob, decode, encode
+from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob
 from app.training.run import TrainingRun
+from engine.children.messages import decoded, encoded
 
 
 class InlineWorker:
@@ -31,14 +32,14 @@ class InlineWorker:
         )
 
     def _receive(self, wait_s: float) -> Command | None:
-        return decode(self._commands.popleft()) if self._commands else None  # type: ignore[return-value]
+        return decoded(self._commands.popleft(), Command) if self._commands else None
 
     def _send(self, event: Event) -> None:
-        self._events.append(encode(event))
+        self._events.append(encoded(event))
 
     def send(self, command: Command) -> None:
         """See `process.Worker`."""
-        self._commands.append(encode(command))
+        self._commands.append(encoded(command))
 
     def poll(self) -> list[Event]:
         """See `process.Worker`. Does one step or more."""
@@ -47,11 +48,11 @@ class InlineWorker:
             self._is_running = self._run.advance()
             if time.monotonic() >= until_s:
                 break
-        events = [decode(data) for data in self._events]
+        events = [decoded(data, Event) for data in self._events]
         self._events.clear()
         if any(isinstance(event, ENDINGS) for event in events):
             self._is_running = False
-        return events  # type: ignore[return-value]
+        return events
 
     def close(self, *, timeout_s: float) -> None:
         """See `process.Worker`."""

@@ -8,7 +8,7 @@ import torch
 from app.export.export_jobs import ExportTask
 from app.mending.request import MendJob, MendRequest
 from app.session.projects.preferences import Preferences
-from app.training.messages import TrainJob, decode, encode
+from app.training.messages import TrainJob
 from engine.backends import table
 from engine.backends.reference.backend import ReferenceBackend
 from engine.backends.table import AUTO, BACKENDS, Entry, backend_called, choose_backend, chosen_name, process_backend
@@ -67,8 +67,7 @@ def test_a_choice_holds_for_the_process_and_the_jobs_of_its_children():
     assert chosen_name() == AUTO
     choose_backend("reference:cpu")
     assert process_backend() is backend_called("reference:cpu")
-    job = decode(encode(TrainJob("p", "c", 1.0, 10, 0)))
-    assert isinstance(job, TrainJob)
+    job = TrainJob("p", "c", 1.0, 10, 0)
     tasks = [job, MendJob("p", MendRequest(after=0), "f"), ExportTask(None, "p", "c", 1.0, None, False)]  # type: ignore[arg-type]
     assert [task.backend for task in tasks] == 3 * ["reference:cpu"]
 

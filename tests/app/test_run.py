@@ -14,6 +14,7 @@ from app.training.rate import Rate
 from app.training.run import CHECKPOINT_EVERY_S, TrainingRun
 from app.training.snapshots import Cadence, keep_clip
 from engine.capture.capture import open_capture
+from engine.children.kind import Unwanted
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.compact import compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
@@ -55,7 +56,7 @@ class Bench:
 
     def _receive(self, wait_s):
         if self.is_alone:
-            raise EOFError
+            raise Unwanted
         return self.commands.pop(0) if self.commands else None
 
     def steps(self, n, *, each_s=1.0) -> bool:

@@ -24,12 +24,8 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def process(job, project, make_training):
-    return ProcessWorker(job, project, make_training)
-
-
 def launch(make_training):
-    return partial(process, make_training=make_training)
+    return partial(ProcessWorker, make=f"tests.app.fakes:{make_training.__name__}")
 
 
 def test_a_process_trains_a_clip(make_session):
@@ -76,7 +72,7 @@ def test_a_killed_worker_is_told_and_training_goes_on_from_what_was_kept(make_se
     kept = session.project.checkpoint_path(0)
     poll_until(session, kept.is_file, what="the checkpoint")
     step = read_clip_state(kept).header.step
-    session.live_training.service.worker.process.kill()
+    session.live_training.service.worker.child.kill()
     poll_until(session, lambda: session.training.state == "failed")
     assert "signal 9" in session.notices[-1].detail
     assert session.clip_states[0].state == "failed"
@@ -101,11 +97,10 @@ def test_closing_ends_the_process_and_keeps_what_it_learned(make_session, monkey
     session = make_session(launch=launch(make_slow))
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: session.training.step >= 1)
-    child = session.live_training.service.worker.process
+    child = session.live_training.service.worker.child
     project = session.project
     session.close()
-    assert not child.is_alive()
-    assert child.exitcode == 0
+    child.result()  # it was not killed
     assert read_clip_state(project.checkpoint_path(0)).header.step >= 1
 
 
@@ -116,17 +111,16 @@ from app.project.project_access import create_project, default_settings
 from app.training.messages import StepReported, TrainJob
 from app.training.process import ProcessWorker
 from engine.capture.capture import open_capture
-from tests.app.fakes import make_slow
 
 if __name__ == "__main__":
     capture, folder = Path(sys.argv[1]), Path(sys.argv[2])
     settings = default_settings(open_capture(capture))
     project = create_project(folder, settings)
     job = TrainJob(str(folder), str(capture), 1.0, settings.clip_length, 0)
-    worker = ProcessWorker(job, project, make_slow)
+    worker = ProcessWorker(job, project, "tests.app.fakes:make_slow")
     while not any(isinstance(event, StepReported) and event.step > 0 for event in worker.poll()):
         pass
-    print(worker.process.pid, flush=True)
+    print(worker.child.pid, flush=True)
     os._exit(9)  # no goodbye, as when the window is killed
 """
 

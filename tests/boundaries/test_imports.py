@@ -98,7 +98,6 @@ def test_the_capture_doctor_loads_no_torch() -> None:
 
 
 def test_importing_ui_main_loads_no_torch_and_no_window_library() -> None:
-    # A spawned child imports the parent's main module again: what ui.main loads, every worker would load.
     assert not loaded_modules("import ui.main") & (WINDOW_LIBRARIES | {"torch"})
 
 

@@ -44,8 +44,6 @@ BYTES_ONLY = (
     "app/background/children.py",
     "app/export/export_process.py",
     "app/export/export_worker.py",
-    "app/training/process.py",
-    "app/training/worker.py",
 )
 """Modules whose processes are of multiprocessing still; they send bytes that they encode themselves."""
 

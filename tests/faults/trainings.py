@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -133,7 +134,7 @@ class Command:
     def worker(self) -> int | None:
         """Process id of the training worker, if there is one now."""
         for pid, name in _processes_of(self._scratch):
-            if pid != self.process.pid and "spawn_main" in name:
+            if pid != self.process.pid and "app.training.process" in name:
                 return pid
         return None
 
@@ -177,4 +178,4 @@ def run_command() -> None:
     """The process of a `Command`."""
     # whatever started the tests in the background made its children ignore Ctrl+C; a terminal does not
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(main(sys.argv[1:], launch=lambda job, project: ProcessWorker(job, project, make_training)))
+    sys.exit(main(sys.argv[1:], launch=partial(ProcessWorker, make="tests.faults.trainings:make_training")))

@@ -122,7 +122,7 @@ def watch(state_path: Path) -> None:
     window_module.StudioWindow = ObservedWindow
 
 
-if __name__ == "__main__":  # the training worker imports this module again
+if __name__ == "__main__":
     import pyglet
 
     pyglet.options.shadow_window = False

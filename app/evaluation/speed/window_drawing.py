@@ -11,8 +11,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.background.children import undisturbed
 from app.evaluation.speed.laps import Lap
+from engine.children.process import undisturbed
 
 logger = logging.getLogger(__name__)
 

@@ -20,19 +20,13 @@ def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
             notices.add("warn", title, detail, hint)
         case TrainingFailed(message=message, hint=hint):
             notices.add("error", "Training failed", message, hint)
-        case WorkerDied(exit_code=exit_code, log_tail=log_tail):
+        case WorkerDied(reason=reason, log_tail=log_tail):
             last = log_tail.splitlines()[-1] if log_tail else "Its log is empty."
             notices.add(
                 "error",
                 "The training process ended unexpectedly",
-                f"{_exit_words(exit_code)} {last}",
+                f"{reason}. {last}",
                 "Train the clip again; it resumes from its saved progress.",
             )
         case _:
             pass
-
-
-def _exit_words(exit_code: int | None) -> str:
-    if exit_code is not None and exit_code < 0:
-        return f"It was ended by signal {-exit_code}{' (often: not enough memory)' if exit_code == -9 else ''}."
-    return f"Its exit code was {exit_code}." if exit_code is not None else ""

@@ -13,7 +13,7 @@ import pytest
 from app.cli.cli import main
 from app.project.project_access import open_project, read_settings
 from engine.clip_files.clip_state import read_clip_state
-from tests.app.fakes import N_STEPS, make_crashing, make_fake, write_capture
+from tests.app.fakes import N_STEPS, make_fake, write_capture
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -156,7 +156,6 @@ import os, signal, sys
 from functools import partial
 from app.cli.cli import main
 from app.training.process import ProcessWorker
-from tests.app.fakes import make_slow
 
 class Interrupting(ProcessWorker):
     def poll(self):
@@ -168,7 +167,7 @@ class Interrupting(ProcessWorker):
 if __name__ == "__main__":
     # whatever started the tests in the background made its children ignore Ctrl+C; a terminal does not
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    launch = lambda job, project: Interrupting(job, project, make_slow)
+    launch = lambda job, project: Interrupting(job, project, "tests.app.fakes:make_slow")
     sys.exit(main(["train", sys.argv[1], "--project", sys.argv[2], "--quiet"], launch=launch))
 """
 
@@ -201,9 +200,9 @@ def test_a_dead_worker_ends_with_1(capture_folder, tmp_path, capsys):
 
     code = main(
         ["train", str(capture_folder), "--project", str(tmp_path / "p"), "--quiet"],
-        launch=lambda job, project: ProcessWorker(job, project, make_crashing),
+        launch=lambda job, project: ProcessWorker(job, project, "tests.app.fakes:make_crashing"),
     )
     err = capsys.readouterr().err
     assert code == 1
-    assert "ended with code -9" in err
+    assert "ended by signal 9" in err
     assert "clip-0000.log" in err

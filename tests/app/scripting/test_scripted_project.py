@@ -24,7 +24,7 @@ from engine.editing.edit import Picked, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
 from engine.errors import CaptureError, ProjectError, TrainingError
 from tests.app.conftest import inline
-from tests.app.fakes import N_ANCHORS, N_STEPS, make_crashing, make_fake
+from tests.app.fakes import N_ANCHORS, N_STEPS, make_fake
 from tests.app.residuals.conftest import make_project
 
 BALL = Sphere((0.0, 0.0, 0.0), 1.0)
@@ -261,7 +261,7 @@ def clipgstream_changed(project: ScriptedProject, settings):
 
 def test_a_training_whose_process_dies(untrained):
     with open_scripted(untrained, launch=_crashing) as project:
-        with pytest.raises(TrainingError, match="ended with code -9"):
+        with pytest.raises(TrainingError, match="ended by signal 9"):
             project.train_clip(0)
         assert project.trained_clips == []
 
@@ -269,7 +269,7 @@ def test_a_training_whose_process_dies(untrained):
 def _crashing(job, project):
     from app.training.process import ProcessWorker
 
-    return ProcessWorker(job, project, make_crashing)
+    return ProcessWorker(job, project, "tests.app.fakes:make_crashing")
 
 
 def test_gaussians_are_picked_by_place_and_attribute(trained):
