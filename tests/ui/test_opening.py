@@ -32,8 +32,8 @@ from engine.doctor.finding import Finding
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, Pilot
 from ui.shell.dialogs.calibration_dialog import lines_below
-from ui.shell.dialogs.opening_answers_form import forecast_lines
-from ui.shell.dialogs.opening_map import placed, seen_from_above
+from ui.shell.dialogs.opening.opening_answers_form import forecast_lines
+from ui.shell.dialogs.opening.opening_map import placed, seen_from_above
 
 pytestmark = pytest.mark.gl
 NAMES = ("cam00", "50%s of 100%", "a##b", "cam03", "cam04", "cam05", "cam06", "cam07")

@@ -26,12 +26,12 @@ from app.session.paths.path_commands import (
 from app.session.session_view import SessionView
 from engine.camera.camera_path import CameraPath
 from engine.text import one_line
-from ui.panels.history_buttons import draw_history
-from ui.panels.key_words import frame_words
 from ui.panels.picture.key_grip import choose_key
-from ui.panels.slider import slider
+from ui.panels.pieces.history_buttons import draw_history
+from ui.panels.pieces.key_words import frame_words
+from ui.panels.pieces.slider import slider
+from ui.panels.pieces.widgets import elided, primary_button, segment, text_right, text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import elided, primary_button, segment, text_right, text_warning, text_wrapped_dim
 from ui.style.theme import Icon
 
 MOST_PATH_ROWS, LEAST_KEY_ROWS = 5, 4

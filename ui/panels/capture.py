@@ -14,10 +14,10 @@ from engine.text import one_line
 from ui.gl.image import ImageTexture
 from ui.panels.editing.labels import draw_label_field, with_label
 from ui.panels.excluding.menu import draw_exclusion_menu
+from ui.panels.pieces.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.timeline.stage import hatch
+from ui.panels.timeline.rows.stage import hatch
 from ui.panels.welcome.thumbnails import Thumbnails
-from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon

@@ -17,8 +17,8 @@ from app.session.commands import (
 )
 from app.session.session_view import SessionView
 from engine.text import duration_text, one_line, size_text
+from ui.panels.pieces.widgets import elided, elided_path, primary_button, text_wrapped, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import elided, elided_path, primary_button, text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.colors import Color
 from ui.style.numbers import format_count

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from imgui_bundle import imgui, implot
 
 from app.session.notices import Notice, Notices
-from ui.panels.widgets import text_warning
+from ui.panels.pieces.widgets import text_warning
 
 logger = logging.getLogger(__name__)
 

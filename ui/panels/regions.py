@@ -10,9 +10,9 @@ from app.session.commands import RemoveRegion
 from app.session.session_view import SessionView
 from app.status import RegionsStatus
 from engine.gate.regions import GateRegion
-from ui.panels.history_buttons import draw_history
+from ui.panels.pieces.history_buttons import draw_history
+from ui.panels.pieces.widgets import chip, primary_button, text_right, text_warning, text_wrapped_dim
 from ui.panels.state import REGIONS, Dispatch, Rect, UiState
-from ui.panels.widgets import chip, primary_button, text_right, text_warning, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.palette import Palette

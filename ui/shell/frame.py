@@ -26,7 +26,7 @@ from ui.panels.doctor.panel import DoctorPanel
 from ui.panels.editing.edits_panel import draw_edits
 from ui.panels.editing.history_panel import HistoryPanel
 from ui.panels.editing.mend_panel import draw_mending
-from ui.panels.editing.select_panel import draw_selection
+from ui.panels.editing.selecting.select_panel import draw_selection
 from ui.panels.exports import draw_exports
 from ui.panels.guard import Guard, draw_failed
 from ui.panels.log import LogPanel
@@ -63,17 +63,17 @@ from ui.shell.dialogs.about import AboutDialog
 from ui.shell.dialogs.calibration_dialog import CalibrationDialog
 from ui.shell.dialogs.dialogs import OpenFolderDialog, draw_help
 from ui.shell.dialogs.export_dialog import ExportDialog
-from ui.shell.dialogs.opening_dialog import OpeningDialog
+from ui.shell.dialogs.opening.opening_dialog import OpeningDialog
 from ui.shell.dialogs.questions import QuestionDialogs
 from ui.shell.dialogs.synchronisation_dialog import SynchronisationDialog
 from ui.shell.finding.palette import Palette
 from ui.shell.imgui_backend import ImGuiBackend
-from ui.shell.layout import hold_sizes, is_laid_out, lay_out
-from ui.shell.layouts import Layouts
+from ui.shell.layout.layout import hold_sizes, is_laid_out, lay_out
+from ui.shell.layout.layouts import Layouts
+from ui.shell.layout.remembering import Remembering
 from ui.shell.menu_bar import draw_menu_bar
 from ui.shell.preferences import PreferencesDialog
 from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
-from ui.shell.remembering import Remembering
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
 from ui.shell.status_bar import draw_status_bar
 from ui.style import theme

@@ -14,11 +14,11 @@ from engine.text import one_line
 from ui.panels.actions.action import Action
 from ui.panels.actions.menus import Menu, menus
 from ui.panels.actions.window import choose_scale
+from ui.panels.pieces.widgets import elided_path
 from ui.panels.state import Dispatch, UiState
 from ui.panels.training.training import next_label
 from ui.panels.welcome.recent_rows import open_recent
 from ui.panels.welcome.welcome import SAMPLE_PATH
-from ui.panels.widgets import elided_path
 from ui.style.theme import Icon
 from ui.style.ui_scale import CHOICES, scale_text
 

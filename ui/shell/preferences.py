@@ -13,8 +13,8 @@ from app.session.projects.preferences import CACHE_MB
 from engine.backends.table import AUTO, BACKENDS
 from ui.panels.actions.window import choose_scale
 from ui.panels.picture.gestures import PRESETS, mouse_help
+from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import UiState
-from ui.panels.widgets import text_wrapped_dim
 from ui.shell.preferences_keys import KeysPage
 from ui.style import theme
 from ui.style.palette import THEMES

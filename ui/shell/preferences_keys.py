@@ -9,8 +9,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from ui.panels.actions.action import Action
 from ui.panels.actions.key import pressed_label
 from ui.panels.actions.table import ACTIONS
+from ui.panels.pieces.widgets import primary_button, text_wrapped_dim
 from ui.panels.state import UiState
-from ui.panels.widgets import primary_button, text_wrapped_dim
 from ui.shell.finding.fuzzy import match
 from ui.style import theme
 from ui.style.theme import Icon

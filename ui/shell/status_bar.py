@@ -9,9 +9,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.session.commands import CancelJob
 from app.session.session_view import SessionView
 from engine.text import duration_text
+from ui.panels.pieces.widgets import draw_job_bar, elided
 from ui.panels.state import Dispatch, UiState
 from ui.panels.training.queue import clips_text, usage_text
-from ui.panels.widgets import draw_job_bar, elided
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.progress_words import job_words, stage_words

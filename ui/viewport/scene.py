@@ -32,15 +32,15 @@ from ui.gl import (
     Target,
     is_software,
 )
-from ui.viewport.anchor_heat_layer import AnchorHeatLayer
-from ui.viewport.anchor_marks import nearest_under
 from ui.viewport.editing.selection_layer import SelectionLayer
-from ui.viewport.explaining_layer import ExplainingLayer
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
-from ui.viewport.mark_layer import AnchorCounts, MarkLayer
-from ui.viewport.path_layer import PathLayer
+from ui.viewport.layers.anchor_heat_layer import AnchorHeatLayer
+from ui.viewport.layers.anchor_marks import nearest_under
+from ui.viewport.layers.explaining_layer import ExplainingLayer
+from ui.viewport.layers.mark_layer import AnchorCounts, MarkLayer
+from ui.viewport.layers.path_layer import PathLayer
+from ui.viewport.layers.region_layer import RegionLayer, ShownRegions
 from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
-from ui.viewport.region_layer import RegionLayer, ShownRegions
 
 CLOUD_OVERLAP = 1.5
 """Diameter of a cloud's points, in distances between neighbours."""

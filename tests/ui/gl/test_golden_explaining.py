@@ -15,7 +15,7 @@ from tests.ui.gl.pixels import read_resolved
 from tests.ui.gl.scenes import make_camera
 from ui.gl.context import is_software
 from ui.gl.targets import Target
-from ui.viewport.explaining_layer import ExplainingLayer
+from ui.viewport.layers.explaining_layer import ExplainingLayer
 from ui.viewport.scene import SceneView
 
 pytestmark = pytest.mark.gl

@@ -14,7 +14,7 @@ from tests.ui.gl.pixels import read_color
 from tests.ui.gl.scenes import Camera, centered_camera
 from ui.gl.targets import Target
 from ui.style.colors import CHOSEN, REGION_COLORS
-from ui.viewport.region_layer import RegionLayer, ShownRegions
+from ui.viewport.layers.region_layer import RegionLayer, ShownRegions
 
 pytestmark = pytest.mark.gl
 

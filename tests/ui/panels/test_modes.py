@@ -19,9 +19,9 @@ from tests.ui.pilot import SHIFT, Pilot
 from ui.panels.actions.table import ACTIONS
 from ui.panels.picture.color_bar import bar_number
 from ui.panels.picture.comparison import covered_share, kind_words, missing_words, other_label
-from ui.panels.picture.row_fit import RowFit, fit_row
+from ui.panels.picture.toolbar.row_fit import RowFit, fit_row
+from ui.panels.pieces.widgets import box_words
 from ui.panels.state import UiState
-from ui.panels.widgets import box_words
 
 DIGITS = (key._1, key._2, key._3, key._4, key._5, key._6, key._7, key._8, key._9)
 
@@ -94,7 +94,7 @@ def test_words_of_the_toolbar_are_whole_or_in_the_menu(
         return shown
 
     for module in ("toolbar", "mode_box", "compare_box", "heat_box"):
-        monkeypatch.setattr(f"ui.panels.picture.{module}.box_words", watched)
+        monkeypatch.setattr(f"ui.panels.picture.toolbar.{module}.box_words", watched)
     pilot = open_pilot(FakeSession(), size=size)
     pilot.studio.frame.ui.scale.chosen = scale
     pilot.session.dispatch(LookThrough(2))

@@ -21,9 +21,9 @@ from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, w
 from ui.panels.residuals.matrix import NAME_HEIGHT, cell_colors, matrix_picture, named_rows
 from ui.panels.residuals.panel import listed_seams, progress_text
 from ui.panels.state import RESIDUALS
-from ui.panels.timeline.columns import provisional_text
-from ui.viewport.anchor_heat_layer import heat_points
+from ui.panels.timeline.rows.columns import provisional_text
 from ui.viewport.heat_image import value_at
+from ui.viewport.layers.anchor_heat_layer import heat_points
 
 
 def test_the_worst_of_frames_that_share_a_column_is_kept() -> None:

@@ -79,7 +79,7 @@ def test_a_floating_panel_floats_again(open_pilot: Callable[..., Pilot], tmp_pat
 def test_a_layout_that_is_none_gives_the_one_to_begin_with(
     open_pilot: Callable[..., Pilot], tmp_path: Path, layout: str
 ) -> None:
-    from ui.shell.remembering import LAYOUT_VERSION
+    from ui.shell.layout.remembering import LAYOUT_VERSION
 
     usual = open_again(open_pilot, tmp_path / "none.json")
     expected = dict(usual.rects)

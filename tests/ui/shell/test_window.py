@@ -38,7 +38,7 @@ from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.gl import frusta_lines
 from ui.shell.screenshot import read_window, write_png
-from ui.viewport.frusta import frustum_size
+from ui.viewport.layers.frusta import frustum_size
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 

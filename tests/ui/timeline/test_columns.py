@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from app.status import SEAM_RATIO_FLAGGED, ClipStatus, ResidualStatus, SeamStatus
 from ui.panels.timeline.clip_words import STATE_WORDS
-from ui.panels.timeline.columns import (
+from ui.panels.timeline.rows.columns import (
     STATES,
     clip_columns,
     frame_psnr,
@@ -19,7 +19,7 @@ from ui.panels.timeline.columns import (
     runs_of,
     seam_ratios,
 )
-from ui.panels.timeline.seam_lane import HIGHEST, LOWEST, ratio_text, seam_color
+from ui.panels.timeline.rows.seam_lane import HIGHEST, LOWEST, ratio_text, seam_color
 from ui.panels.timeline.view_state import TimelineView
 
 

@@ -5,7 +5,7 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui.panels.timeline.rows import (
+from ui.panels.timeline.rows.rows import (
     CACHE,
     CAMERA,
     CLIPS,

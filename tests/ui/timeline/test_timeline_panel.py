@@ -385,7 +385,7 @@ def test_a_thousand_clips_are_drawn_with_few_pieces_at_every_zoom(
 def test_names_of_markers_are_shown_as_they_are(
     open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import ui.panels.timeline.small_lanes as lanes
+    import ui.panels.timeline.rows.small_lanes as lanes
 
     written = []
     draw = lanes.small_text

@@ -7,7 +7,7 @@ from engine.clip_files.roles import ROLES
 from engine.gate.reasons import NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
 from engine.gate.regions import sphere_region
 from ui.style.colors import ROLE_COLORS, SKY
-from ui.viewport.anchor_marks import REACH_PX, anchor_marks
+from ui.viewport.layers.anchor_marks import REACH_PX, anchor_marks
 
 POSITIONS = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 0.0, -1.0]], np.float32)
 CODES = np.array([ROLES.index(role) for role in ("static", "promoted", "moving", "static")], np.uint8)

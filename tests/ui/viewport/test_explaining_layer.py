@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ui.viewport.explaining_layer import MAX_SPHERES, N_SEGMENTS, sphere_outlines
+from ui.viewport.layers.explaining_layer import MAX_SPHERES, N_SEGMENTS, sphere_outlines
 
 
 def test_an_outline_is_where_lines_of_sight_touch_the_sphere() -> None:

@@ -8,7 +8,7 @@ import pytest
 from app.playback.views.orbit_view import OrbitView
 from tests.ui.fake_session import make_rig
 from ui.gl.lines import frusta_lines
-from ui.viewport.frusta import camera_under, cameras_around, frustum_size
+from ui.viewport.layers.frusta import camera_under, cameras_around, frustum_size
 
 WIDTH, HEIGHT = 640, 480
 

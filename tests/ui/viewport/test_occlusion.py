@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.playback.modes.arrays import GaussianArrays
-from ui.viewport.occlusion import OcclusionMap
+from ui.viewport.layers.occlusion import OcclusionMap
 
 WIDTH, HEIGHT = 640, 480
 K = np.array([[500.0, 0, 320], [0, 500.0, 240], [0, 0, 1]])

@@ -11,7 +11,7 @@ from app.session.paths.path_commands import PlaceCameraKey
 from engine.camera.camera_path import CameraPath
 from engine.camera.path_presets import turntable
 from engine.camera.projection import to_camera, to_pixels
-from ui.viewport.path_lines import LEAST_PER_PIECE, MOST_PER_PIECE, SAMPLES, key_pyramids, key_under, path_line
+from ui.viewport.layers.path_lines import LEAST_PER_PIECE, MOST_PER_PIECE, SAMPLES, key_pyramids, key_under, path_line
 from ui.viewport.path_tool import PathTool, moved_in_view, nudged
 
 LOOP = turntable(np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 0.0, (0, 32))

@@ -7,7 +7,7 @@ import pytest
 
 from engine.gate.regions import GateRegion, sphere_region
 from ui.style.colors import REGION_COLORS
-from ui.viewport.region_lines import BACK_ALPHA, region_lines
+from ui.viewport.layers.region_lines import BACK_ALPHA, region_lines
 
 EYE = np.array([0.0, 0.0, -5.0])
 CENTER = (1.0, 2.0, 3.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ui.viewport.anchor_marks import thinned
+from ui.viewport.layers.anchor_marks import thinned
 
 
 def test_few_anchors_are_all_marked() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from app.command_text.command_text import CommandText
 from app.session.session_view import SessionView
 from ui.panels.actions.action import EDIT, TRAIN, Action, Run
-from ui.panels.copying import copy_command, copy_python
+from ui.panels.pieces.copying import copy_command, copy_python
 from ui.panels.state import Dispatch, UiState
 
 MENU = "Edit/Copy as command"

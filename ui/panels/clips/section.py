@@ -14,10 +14,10 @@ from app.status import DependencyStatus, QueueStatus, VersionStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text, size_text
 from ui.panels.clips.comparing import compared_version
+from ui.panels.pieces.widgets import text_wrapped, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title
 from ui.panels.training.clip_versions import difference_lines, version_text
-from ui.panels.widgets import text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import Icon
 

@@ -11,8 +11,8 @@ from imgui_bundle import ImVec2, imgui
 
 from engine.camera.rig import CameraRig
 from ui.panels.doctor.words import SEVERITY_WORDS, severity_color
+from ui.panels.pieces.widgets import elided
 from ui.panels.state import Rect, UiState
-from ui.panels.widgets import elided
 from ui.style import theme
 
 MARGIN = 16.0

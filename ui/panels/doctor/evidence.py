@@ -11,9 +11,9 @@ from app.session.session_view import SessionView
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding, PairEvidence, Point
 from ui.gl import ImageTexture
+from ui.panels.pieces.widgets import elided, text_wrapped_dim
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.welcome.thumbnails import Thumbnails
-from ui.panels.widgets import elided, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
 

@@ -11,8 +11,8 @@ from app.session.commands import CorrectCapture, LookAtVideos, LookThrough, SetH
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding
 from ui.panels.doctor.words import SEVERITY_ICONS, SEVERITY_WORDS, certainty_text, fix_words, severity_color
+from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import Icon
 

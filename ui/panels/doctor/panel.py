@@ -17,8 +17,8 @@ from ui.panels.doctor.camera_map import CameraPlan, camera_plan, draw_bars, draw
 from ui.panels.doctor.evidence import Evidence
 from ui.panels.doctor.findings import draw_findings
 from ui.panels.doctor.words import summary_text
+from ui.panels.pieces.widgets import draw_job_bar, primary_button, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import draw_job_bar, primary_button, text_wrapped_dim
 from ui.style.progress_words import job_words
 from ui.style.theme import Icon
 

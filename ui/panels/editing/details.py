@@ -19,8 +19,8 @@ from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Scope, Sphere, T
 from engine.setting import Setting, settings_of
 from engine.text import one_line
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
+from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import segment, text_warning, text_wrapped_dim
 
 FAR = 1e6
 """Largest coordinate that fields take, scene units."""

@@ -12,13 +12,13 @@ from app.session.session_view import SessionView
 from engine.editing.actions import Delete
 from engine.editing.edit import Edit
 from engine.text import one_line
-from ui.panels.copying import draw_copy_entries
 from ui.panels.editing.details import draw_details
 from ui.panels.editing.making import draw_making
 from ui.panels.editing.world_section import draw_world
-from ui.panels.history_buttons import draw_history
+from ui.panels.pieces.copying import draw_copy_entries
+from ui.panels.pieces.history_buttons import draw_history
+from ui.panels.pieces.widgets import elided, text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import elided, text_warning, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import Icon
 

@@ -12,10 +12,10 @@ from imgui_bundle import ImVec2, imgui
 from engine.editing.edit import Box, Sphere
 from ui.panels.editing.edit_grip import lens_of
 from ui.panels.editing.edit_subject import Subject
-from ui.panels.editing.select_drawing import draw_volume
+from ui.panels.editing.selecting.select_drawing import draw_volume
 from ui.panels.picture.gizmo import COLORS, LETTERS
+from ui.panels.pieces.widgets import chip
 from ui.panels.state import Rect, UiState
-from ui.panels.widgets import chip
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
 from ui.viewport.editing.edit_tool import N_ASKED, EditTool

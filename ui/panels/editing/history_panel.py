@@ -7,10 +7,10 @@ from imgui_bundle import ImVec4, imgui
 from app.session.editing.edit_commands import GoToStep
 from app.session.session_view import SessionView
 from engine.text import one_line
-from ui.panels.copying import draw_copy_entries
-from ui.panels.history_buttons import draw_history
+from ui.panels.pieces.copying import draw_copy_entries
+from ui.panels.pieces.history_buttons import draw_history
+from ui.panels.pieces.widgets import elided, text_wrapped_dim
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.widgets import elided, text_wrapped_dim
 from ui.style import theme
 
 

@@ -18,8 +18,8 @@ from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, 
 from engine.editing.edit import Box, Everything, Scope, Sphere, Target
 from engine.editing.reach import Reach, reach_of
 from ui.panels.editing.edit_subject import bounds_of, invert_selection, meant, pivot_of
+from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
 from ui.panels.state import EDITS, Dispatch, UiState
-from ui.panels.widgets import segment, text_warning, text_wrapped_dim
 
 FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """What new edits begin with."""

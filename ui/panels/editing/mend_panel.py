@@ -19,9 +19,9 @@ from app.session.session_view import SessionView
 from app.status import JobStatus
 from engine.mending.figures import METHODS, StretchFigures
 from engine.text import duration_text
-from ui.panels.copying import draw_copy_entries
+from ui.panels.pieces.copying import draw_copy_entries
+from ui.panels.pieces.widgets import draw_job_bar, primary_button, text_warning, text_wrapped, text_wrapped_dim
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.widgets import draw_job_bar, primary_button, text_warning, text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.progress_words import job_words
 from ui.style.theme import Icon

@@ -12,8 +12,8 @@ from app.session.editing.edit_commands import SetScale, SetUp
 from app.session.session_view import SessionView
 from engine.editing.actions import Vector
 from ui.panels.editing.fields import label_before
+from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import text_wrapped_dim
 
 SCALES = (1e-9, 1e9)
 

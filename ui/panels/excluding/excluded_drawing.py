@@ -9,8 +9,8 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.session_view import SessionView
 from engine.capture.exclusions import Stroke
+from ui.panels.pieces.widgets import chip
 from ui.panels.state import Rect, UiState
-from ui.panels.widgets import chip
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
 from ui.viewport.excluding.hatched_mask import hatch_lines

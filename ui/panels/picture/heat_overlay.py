@@ -15,11 +15,11 @@ from app.residuals.heat_map import HEAT_KINDS, HeatKind, HeatMap
 from app.session.session_view import SessionView
 from ui.panels.picture.color_bar import COLOR_BAR_SIZE, bar_number, draw_color_bar
 from ui.panels.picture.hud import BELOW_NAME, wrapped
+from ui.panels.pieces.widgets import chip
 from ui.panels.state import Rect, UiState
-from ui.panels.widgets import chip
 from ui.style import theme
-from ui.viewport.anchor_heat_layer import ANCHOR_RANGES, anchor_column
 from ui.viewport.heat_image import HeatImage, value_at
+from ui.viewport.layers.anchor_heat_layer import ANCHOR_RANGES, anchor_column
 
 COLOR_MAP_OF = {"sequential": "inferno", "signed": SIGNED}
 """Black reads as fine on a dark window, white as no difference."""

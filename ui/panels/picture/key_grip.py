@@ -10,7 +10,7 @@ from app.session.paths.path_commands import ChooseCameraKey
 from app.session.session_view import SessionView
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.viewport.path_layer import PathLayer
+from ui.viewport.layers.path_layer import PathLayer
 from ui.viewport.path_tool import moved_in_view
 from ui.viewport.scene import SceneView
 

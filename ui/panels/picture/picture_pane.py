@@ -14,12 +14,11 @@ from app.status import version_number
 from ui.panels.editing.edit_grip import EditGrip
 from ui.panels.editing.edit_subject import subject_of
 from ui.panels.editing.handle_drawing import draw_edit_hint, draw_handles, draw_points
-from ui.panels.editing.select_drawing import draw_hint, draw_tool
-from ui.panels.editing.select_grip import DRAG as SELECT
-from ui.panels.editing.select_grip import SelectGrip
+from ui.panels.editing.selecting.select_drawing import draw_hint, draw_tool
+from ui.panels.editing.selecting.select_grip import DRAG as SELECT
+from ui.panels.editing.selecting.select_grip import SelectGrip
 from ui.panels.excluding.excluded_drawing import ExcludedDrawing
 from ui.panels.excluding.mask_grip import follow_brush
-from ui.panels.key_words import key_words
 from ui.panels.picture.comparison import covered_share, is_held, kind_words, missing_words, other_label, shown_compare
 from ui.panels.picture.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.picture.heat_overlay import HeatOverlay
@@ -27,13 +26,14 @@ from ui.panels.picture.hud import BELOW_NAME, Hud
 from ui.panels.picture.key_grip import KeyGrip
 from ui.panels.picture.panes import Panes, arrange
 from ui.panels.picture.pointer import MOVING_S, Pointer
+from ui.panels.pieces.key_words import key_words
+from ui.panels.pieces.widgets import chip, elided
 from ui.panels.regions import draw_chosen_sphere
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.widgets import chip, elided
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
 from ui.viewport.hud_text import RENDERED, captured_words, pane_text
-from ui.viewport.region_layer import ShownRegions
+from ui.viewport.layers.region_layer import ShownRegions
 from ui.viewport.scene import Scene, SceneView
 
 TOOLTIP_AWAY = 22.0

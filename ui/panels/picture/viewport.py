@@ -10,10 +10,10 @@ from app.session.commands import ActivateView
 from app.session.session_view import SessionView
 from ui.panels.guard import Guard, draw_failed
 from ui.panels.picture.hud import Hud
-from ui.panels.picture.navigation import ViewPopup
 from ui.panels.picture.panes import view_areas
 from ui.panels.picture.picture_pane import PicturePane
-from ui.panels.picture.toolbar import TOOLBAR_HEIGHT, draw_toolbar
+from ui.panels.picture.toolbar.navigation import ViewPopup
+from ui.panels.picture.toolbar.toolbar import TOOLBAR_HEIGHT, draw_toolbar
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.welcome.recent_rows import RecentRows
 from ui.panels.welcome.welcome import draw_welcome

@@ -12,10 +12,10 @@ from app.status import CELL_RANGES, LOW_IS_BAD, ResidualStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
 from ui.gl import ImageTexture
+from ui.panels.pieces.widgets import elided
 from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, worst_of
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline.stage import SMALL_TEXT, small_text
-from ui.panels.widgets import elided
+from ui.panels.timeline.rows.stage import SMALL_TEXT, small_text
 from ui.style import theme
 
 NAME_WIDTH = 74.0

@@ -18,14 +18,14 @@ from ui.gl import ImageTexture
 from ui.panels.excluding.excluded_drawing import exclusion_of
 from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.picture.color_bar import COLOR_BAR_SIZE, draw_color_bar
+from ui.panels.pieces.widgets import elided, segment, text_wrapped_dim
 from ui.panels.residuals.matrix import Matrix
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.timeline.columns import provisional_text, shown_ratio
-from ui.panels.timeline.gutter import NOTES
-from ui.panels.timeline.rows import SEAMS
-from ui.panels.timeline.seam_lane import ratio_text, seam_color
+from ui.panels.timeline.rows.columns import provisional_text, shown_ratio
+from ui.panels.timeline.rows.gutter import NOTES
+from ui.panels.timeline.rows.rows import SEAMS
+from ui.panels.timeline.rows.seam_lane import ratio_text, seam_color
 from ui.panels.welcome.thumbnails import Thumbnails
-from ui.panels.widgets import elided, segment, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon

@@ -12,8 +12,8 @@ from ui.panels.clips.menu import draw_cutting
 from ui.panels.editing.labels import draw_label_field
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title, state_words
-from ui.panels.timeline.seam_lane import seam_at
-from ui.panels.timeline.stage import Stage
+from ui.panels.timeline.rows.seam_lane import seam_at
+from ui.panels.timeline.rows.stage import Stage
 from ui.panels.training.clip_training_menu import draw_clip_training
 from ui.style.theme import Icon
 

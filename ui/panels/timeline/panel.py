@@ -6,17 +6,17 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.session_view import SessionView
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.timeline.clip_lane import draw_clip_lane
-from ui.panels.timeline.gutter import WIDTH as GUTTER_WIDTH
-from ui.panels.timeline.gutter import draw_gutter
 from ui.panels.timeline.jump_box import draw_jump_box
 from ui.panels.timeline.marker_box import draw_marker_box
 from ui.panels.timeline.menu import draw_clip_menu
-from ui.panels.timeline.overview import draw_overview
-from ui.panels.timeline.path_lane import draw_path_lane
 from ui.panels.timeline.pointer import handle_track
-from ui.panels.timeline.quality_lane import draw_quality_lane
-from ui.panels.timeline.rows import (
+from ui.panels.timeline.rows.clip_lane import draw_clip_lane
+from ui.panels.timeline.rows.gutter import WIDTH as GUTTER_WIDTH
+from ui.panels.timeline.rows.gutter import draw_gutter
+from ui.panels.timeline.rows.overview import draw_overview
+from ui.panels.timeline.rows.path_lane import draw_path_lane
+from ui.panels.timeline.rows.quality_lane import draw_quality_lane
+from ui.panels.timeline.rows.rows import (
     CACHE,
     CAMERA,
     MARKERS,
@@ -27,10 +27,10 @@ from ui.panels.timeline.rows import (
     SEAMS,
     arrange_rows,
 )
-from ui.panels.timeline.ruler import draw_hover, draw_played, draw_playhead, draw_ruler
-from ui.panels.timeline.seam_lane import draw_seam_lane
-from ui.panels.timeline.small_lanes import draw_cache_lane, draw_marker_lane
-from ui.panels.timeline.stage import Stage
+from ui.panels.timeline.rows.ruler import draw_hover, draw_played, draw_playhead, draw_ruler
+from ui.panels.timeline.rows.seam_lane import draw_seam_lane
+from ui.panels.timeline.rows.small_lanes import draw_cache_lane, draw_marker_lane
+from ui.panels.timeline.rows.stage import Stage
 from ui.panels.timeline.time_range import TimeScale
 from ui.panels.timeline.transport import draw_transport
 from ui.style import theme

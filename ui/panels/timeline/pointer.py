@@ -11,10 +11,10 @@ from app.session.editing.edit_commands import MoveMarker
 from app.session.session_view import SessionView
 from ui.panels.state import Dispatch
 from ui.panels.timeline.marker_box import edit_marker
-from ui.panels.timeline.path_lane import DRAG_FROM, handle_keys_of_path
-from ui.panels.timeline.seam_lane import seam_at
-from ui.panels.timeline.small_lanes import marker_at
-from ui.panels.timeline.stage import Stage
+from ui.panels.timeline.rows.path_lane import DRAG_FROM, handle_keys_of_path
+from ui.panels.timeline.rows.seam_lane import seam_at
+from ui.panels.timeline.rows.small_lanes import marker_at
+from ui.panels.timeline.rows.stage import Stage
 
 LEFT, MIDDLE = 0, 2
 EDGE_PAN_SHARE = 0.02

@@ -11,10 +11,10 @@ from app.session.commands import FollowTraining, TogglePlay
 from app.session.session_view import SessionView
 from engine.text import rate_text
 from ui.panels.actions.time import go_to_frame
+from ui.panels.pieces.widgets import text_right
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title
 from ui.panels.timeline.units import FRAMES, SECONDS, format_time
-from ui.panels.widgets import text_right
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon

@@ -10,8 +10,8 @@ import numpy as np
 from app.playback.timeline import Timeline
 from app.status import ClipStatus, ResidualStatus, SeamStatus
 from engine.capture.clip import Clip
-from ui.panels.timeline.columns import ClipColumns, clip_columns, frame_psnr, seam_ratios
-from ui.panels.timeline.rows import LANES
+from ui.panels.timeline.rows.columns import ClipColumns, clip_columns, frame_psnr, seam_ratios
+from ui.panels.timeline.rows.rows import LANES
 from ui.panels.timeline.time_range import TimeRange, range_around, whole_range
 from ui.panels.timeline.units import FRAMES, UNITS
 

@@ -10,8 +10,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from app.psnr_words import psnr_label, psnr_note
 from app.status import ClipStatus
+from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import UiState
-from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
 from ui.style.axis import ticks_that_fit, whole_ticks
 

@@ -9,7 +9,7 @@ from app.session.commands import AskTrainSettings, RemoveFromQueue, TrainAll, Tr
 from app.session.session_view import SessionView
 from app.status import ClipStatus
 from engine.text import duration_text
-from ui.panels.copying import draw_copy_menu
+from ui.panels.pieces.copying import draw_copy_menu
 from ui.panels.state import Dispatch, UiState
 from ui.panels.training.clip_versions import draw_versions_menu
 from ui.style.numbers import format_count

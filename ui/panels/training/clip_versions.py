@@ -10,7 +10,7 @@ from app.session.commands import RemoveVersion, RestoreVersion
 from app.session.session_view import SessionView
 from app.status import VersionStatus
 from engine.text import size_text
-from ui.panels.copying import draw_copy_menu
+from ui.panels.pieces.copying import draw_copy_menu
 from ui.panels.state import Dispatch, UiState
 from ui.style.numbers import format_count
 from ui.style.theme import Icon

@@ -12,10 +12,10 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from app.session.session_view import SessionView
+from ui.panels.pieces.widgets import text_right
 from ui.panels.state import UiState
 from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.panels.training.curve_view import MAX_CHOSEN, CurveView, value_at, value_range
-from ui.panels.widgets import text_right
 from ui.style import theme
 from ui.style.axis import log_ticks, round_ticks, tick_text
 from ui.style.colors import GREEN, ORANGE, PURPLE, SKY, VERMILLION, YELLOW

@@ -6,8 +6,8 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import AskStartOver, NewProject, SetPreset, SetTrainSetting
 from app.status import PlanStatus
+from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import text_wrapped_dim
 from ui.style.numbers import format_count, parsed_count
 
 LINES_HEIGHT = 170.0

@@ -1,6 +1,6 @@
 """The queue in the training panel: what waits and how long all of it takes, what failed, and how training is shown.
 
-A row is moved by its arrows, by dragging, or by keys once it is chosen; see ui.panels.actions.training.
+A row is moved by its arrows, by dragging, or by keys once it is chosen; see ui.panels.actions.clips.training.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from app.session.commands import MoveInQueue, RemoveFromQueue, SetLiveView, Stop
 from app.session.session_view import SessionView
 from app.status import QueueStatus, SequenceForecast, UsageStatus
 from engine.text import duration_text, size_text
+from ui.panels.pieces.widgets import elided, text_right, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import elided, text_right, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon

@@ -11,6 +11,7 @@ from app.status import ClipStatus, TrainingStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text
 from ui.panels.clips.section import draw_clip_section, draw_stale
+from ui.panels.pieces.widgets import primary_button, text_right, text_wrapped, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import STATE_WORDS, state_note
 from ui.panels.training.clip_quality import draw_clip_quality
@@ -18,7 +19,6 @@ from ui.panels.training.clip_training_menu import draw_clip_training
 from ui.panels.training.curves import draw_curves
 from ui.panels.training.plan import draw_plan
 from ui.panels.training.queue import draw_live_view, draw_queue, draw_train_all, draw_usage
-from ui.panels.widgets import primary_button, text_right, text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.progress_words import stage_words

@@ -16,8 +16,8 @@ from app.session.commands import ForgetRecent, OpenCapture, OpenProject
 from app.session.session_view import RecentView
 from engine.text import one_line
 from ui.gl import ImageTexture
+from ui.panels.pieces.widgets import elided, elided_path
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.widgets import elided, elided_path
 from ui.style import theme
 from ui.style.ago import ago_text
 from ui.style.theme import Icon

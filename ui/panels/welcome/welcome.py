@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import OpenCapture
 from app.session.session_view import SessionView
+from engine.assets import asset_path
+from ui.panels.pieces.widgets import draw_job_bar, pop_bold, primary_button, push_bold, text_right, text_wrapped_dim
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.welcome.recent_rows import RecentRows
-from ui.panels.widgets import draw_job_bar, pop_bold, primary_button, push_bold, text_right, text_wrapped_dim
 from ui.style import theme
 from ui.style.progress_words import job_words
 from ui.style.theme import Icon
 
-SAMPLE_PATH = Path(__file__).resolve().parents[2] / "assets" / "sample"
+SAMPLE_PATH = asset_path("sample")
 CARD_SIZE = (680.0, 580.0)
 HINTS_WIDTH = 560.0
 """In a card at least this wide both hints stand in one line."""

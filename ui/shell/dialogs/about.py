@@ -8,8 +8,8 @@ from imgui_bundle import ImVec2, imgui
 
 from app.background.logs import log_path
 from ui.panels.actions.window import DOCUMENTS
+from ui.panels.pieces.widgets import elided_path, text_wrapped_dim
 from ui.panels.state import UiState
-from ui.panels.widgets import elided_path, text_wrapped_dim
 from ui.shell.dialogs.modal import Modal
 from ui.style.theme import Icon
 

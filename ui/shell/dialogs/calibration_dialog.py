@@ -17,8 +17,7 @@ from app.session.session_view import SessionView
 from app.status import JobStatus
 from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance, Lens, Up
 from engine.text import rate_text
-from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import (
+from ui.panels.pieces.widgets import (
     draw_job_bar,
     elided,
     elided_path,
@@ -28,6 +27,7 @@ from ui.panels.widgets import (
     text_wrapped,
     text_wrapped_dim,
 )
+from ui.panels.state import Dispatch, UiState
 from ui.shell.dialogs.modal import Modal
 from ui.style import theme
 from ui.style.progress_words import job_words

@@ -14,8 +14,8 @@ from app.session.clips.clip_commands import ApplyDeletions, FreeSpace
 from app.session.clips.clip_questions import ClipQuestion, CutQuestion, DamagedQuestion, DeletionsQuestion, RoomQuestion
 from app.session.commands import CloseQuestion, Command, RestoreVersion, TrainClip
 from engine.text import duration_text, size_text
+from ui.panels.pieces.widgets import primary_button, text_wrapped
 from ui.panels.state import UiState
-from ui.panels.widgets import primary_button, text_wrapped
 from ui.style.theme import Icon
 
 BUTTON_HEIGHT = 34.0

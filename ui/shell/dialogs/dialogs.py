@@ -19,8 +19,8 @@ from app.session.commands import LookAtVideos, OpenCapture, OpenProject
 from ui.panels.actions.action import BOOKMARKS, PLAY, TIME, WINDOW
 from ui.panels.actions.table import ACTIONS
 from ui.panels.picture.gestures import mouse_help
+from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")

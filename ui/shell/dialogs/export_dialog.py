@@ -17,9 +17,9 @@ from app.session.commands import CloseQuestion, Command, StartExport
 from app.session.exporting import ExportPage
 from app.session.session_view import SessionView
 from engine.text import one_line
-from ui.panels.copying import COMMAND, draw_copy_entries
+from ui.panels.pieces.copying import COMMAND, draw_copy_entries
+from ui.panels.pieces.widgets import elided, primary_button, segment, text_wrapped_dim
 from ui.panels.state import EXPORTS, Dispatch, UiState
-from ui.panels.widgets import elided, primary_button, segment, text_wrapped_dim
 from ui.shell.dialogs.export_place import LABEL_WIDTH, REFRESH_S, ExportPlace, draw_plan, label
 from ui.shell.dialogs.modal import Modal
 from ui.style import theme

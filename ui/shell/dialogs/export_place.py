@@ -11,8 +11,8 @@ from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
 from app.session.session_view import ExportingView
 from ui.panels.exports import bytes_text, files_text
+from ui.panels.pieces.widgets import text_wrapped, text_wrapped_dim
 from ui.panels.state import UiState
-from ui.panels.widgets import text_wrapped, text_wrapped_dim
 from ui.shell.dialogs.dialogs import has_native_dialog
 from ui.style import theme
 from ui.style.theme import Icon

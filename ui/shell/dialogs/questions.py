@@ -35,8 +35,8 @@ from app.session.questions import (
 )
 from app.session.session_view import SessionView
 from engine.text import duration_text
+from ui.panels.pieces.widgets import elided, primary_button, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import elided, primary_button, text_wrapped_dim
 from ui.shell.dialogs.clip_questions import clip_question_title, draw_clip_question
 from ui.shell.dialogs.start_over_dialog import StartOverDialog
 from ui.shell.dialogs.train_settings import SettingsDialog

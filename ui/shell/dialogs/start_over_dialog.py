@@ -6,8 +6,8 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import CloseQuestion, Command, NewProject, StartOver
 from app.session.questions import StartOverQuestion
+from ui.panels.pieces.widgets import primary_button, text_wrapped, text_wrapped_dim
 from ui.panels.state import UiState
-from ui.panels.widgets import primary_button, text_wrapped, text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import Icon
 

@@ -13,8 +13,8 @@ from app.session.captures.synchronisation_page import OffsetRow, Synchronisation
 from app.session.commands import ApplyOffsets, CloseQuestion, Command, OpenCapture
 from app.session.session_view import SessionView
 from app.status import JobStatus
+from ui.panels.pieces.widgets import primary_button, text_wrapped, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import primary_button, text_wrapped, text_wrapped_dim
 from ui.shell.dialogs.modal import Modal
 from ui.style import theme
 from ui.style.theme import Icon

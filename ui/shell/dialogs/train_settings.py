@@ -6,8 +6,8 @@ from imgui_bundle import imgui
 
 from app.session.commands import Command, TrainClip
 from app.session.questions import OwnSetting, SettingsQuestion
+from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import UiState
-from ui.panels.widgets import text_wrapped_dim
 
 FIELD_WIDTH = 190.0
 SHARED_TEXT = (

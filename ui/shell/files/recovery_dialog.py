@@ -11,8 +11,8 @@ from app.project.project_choices import ProjectChoices
 from app.session.commands import CloseQuestion, Command, OpenProject
 from app.session.files.file_commands import ShowProjectFolder
 from app.session.files.file_questions import RecoveryQuestion
+from ui.panels.pieces.widgets import primary_button
 from ui.panels.state import UiState
-from ui.panels.widgets import primary_button
 from ui.style import theme
 from ui.style.theme import Icon
 

@@ -6,8 +6,8 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import CloseQuestion, Command, OpenCapture
 from app.session.files.file_questions import RelocationQuestion
+from ui.panels.pieces.widgets import primary_button
 from ui.panels.state import UiState
-from ui.panels.widgets import primary_button
 from ui.style import theme
 from ui.style.theme import Icon
 

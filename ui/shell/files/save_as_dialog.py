@@ -11,8 +11,8 @@ from app.session.commands import CloseQuestion, Command
 from app.session.files.file_commands import CancelSaveAs, SaveProjectAs
 from app.session.files.file_questions import SAVING, SaveAsQuestion, SavingQuestion
 from app.status import JobStatus
+from ui.panels.pieces.widgets import primary_button
 from ui.panels.state import UiState
-from ui.panels.widgets import primary_button
 from ui.style import theme
 from ui.style.theme import Icon
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.session_view import SessionView
+from ui.panels.pieces.widgets import elided
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import elided
 from ui.shell.finding.palette_entries import Entry, Found, entries, found
 from ui.style import theme
 from ui.style.theme import Icon

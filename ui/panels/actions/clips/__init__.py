@@ -1,0 +1,1 @@
+"""What clips are made of: training, versions and cuts, mending."""

@@ -1,0 +1,1 @@
+"""How Gaussians and anchors are selected, in a panel and with the pointer."""

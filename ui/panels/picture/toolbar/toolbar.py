@@ -1,0 +1,220 @@
+"""The row over the picture: which camera, what it is compared with, what is shown over it, and marking."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, imgui
+
+from app.playback.views.views import COUNTS
+from app.session.commands import LookThrough, ShowViews, ToggleOverlay
+from app.session.session_view import SessionView
+from ui.panels.actions.viewing.compare import cloud_overlay
+from ui.panels.picture.toolbar.compare_box import compare_words, draw_compare_box
+from ui.panels.picture.toolbar.heat_box import draw_heat_box, heat_words
+from ui.panels.picture.toolbar.mode_box import draw_mode_box, mode_words
+from ui.panels.picture.toolbar.navigation import ViewPopup
+from ui.panels.picture.toolbar.row_fit import fit_row
+from ui.panels.pieces.slider import slider
+from ui.panels.pieces.widgets import MOST_BOX, box_flags, box_width, box_words, segment
+from ui.panels.regions import begin_choosing
+from ui.panels.state import Dispatch, UiState
+from ui.style.theme import Icon
+
+TOOLBAR_HEIGHT = 38.0
+GAP = 8.0
+MARK_SLIDER = imgui.SliderFlags_.always_clamp
+
+
+STYLES = ((True, True), (False, True), (False, False))
+"""Whether buttons have words, and whether boxes have arrows however short their word is; the roomiest first."""
+HIDDEN_FIRST = ("views", "heat", "compare", "mark")
+"""What goes into the menu at the end of the row where there is no room for it."""
+HIDDEN_WORDS = {"compare": "Compare", "heat": "Heat map", "views": "Views"}
+HIDDEN_X = 90.0
+BOX = 150.0
+"""Boxes become so wide where there is room."""
+
+
+def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: ViewPopup) -> None:
+    """The row of choices over the picture; what has no room is in a menu at its end."""
+    imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + GAP, imgui.get_cursor_pos_y() + 6))
+    room = imgui.get_content_region_avail().x - GAP
+    words = {
+        "camera": _camera_words(session),
+        "mode": mode_words(session),
+        "compare": compare_words(session),
+        "heat": heat_words(session),
+    }
+    styles = [_widths(words, *style) for style in STYLES]
+    fit = fit_row(styles, room, gap=GAP, menu=_button_width(Icon.MORE), can_hide=HIDDEN_FIRST)
+    is_wordy, has_arrows = STYLES[fit.style]
+    free = room - sum(fit.widths.values()) - GAP * (len(fit.widths) - 1) - 1
+    free -= GAP + _button_width(Icon.MORE) if fit.hidden else 0.0
+    boxes = [name for name in words if name in fit.widths]
+
+    def box(name: str) -> float:
+        """Width of a box: what it needs, and its part of what is left; less than it needs in a very narrow row."""
+        more = free / len(boxes) if has_arrows or free < 0.0 else 0.0  # a wider one would get an arrow
+        return min(fit.widths[name] + more, max(fit.widths[name], BOX))
+
+    for name in fit.widths:
+        match name:
+            case "camera":
+                _draw_camera_box(session, dispatch, ui, box(name))
+            case "mode":
+                draw_mode_box(session, dispatch, ui, box(name))
+            case "compare":
+                draw_compare_box(session, dispatch, ui, box(name))
+            case "heat":
+                draw_heat_box(session, dispatch, ui, box(name))
+            case "show":
+                _draw_show(session, dispatch, ui, is_wordy=is_wordy)
+            case "look":
+                popup.draw_button(session, dispatch, ui)
+            case "mark":
+                _draw_mark(session, ui, is_wordy=is_wordy)
+            case _:
+                free = imgui.get_content_region_avail().x - fit.widths[name] - GAP
+                imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(free, 0.0))
+                _draw_layouts(session, dispatch, ui)
+        imgui.same_line(0, GAP)
+    if fit.hidden:
+        _draw_more(session, dispatch, ui, fit.hidden)
+    imgui.new_line()
+
+
+def _widths(words: dict[str, str], is_wordy: bool, has_arrows: bool) -> dict[str, float]:
+    """What each part of the row needs in a style, in its order."""
+    widths = {name: box_width(text, has_arrow=has_arrows) for name, text in words.items()}
+    widths["show"] = _button_width(f"{Icon.EYE}  Show" if is_wordy else Icon.EYE)
+    widths["look"] = _button_width(Icon.COMPASS)
+    widths["mark"] = _button_width(f"{Icon.REGION}  Mark" if is_wordy else Icon.REGION)
+    widths["views"] = len(COUNTS) * (imgui.get_frame_height() + 2)
+    return widths
+
+
+def _button_width(label: str) -> float:
+    return imgui.calc_text_size(label).x + 2 * imgui.get_style().frame_padding.x
+
+
+def _draw_more(session: SessionView, dispatch: Dispatch, ui: UiState, hidden: tuple[str, ...]) -> None:
+    """The button at the end of the row, and what it shows."""
+    if imgui.button(f"{Icon.MORE}##more"):
+        imgui.open_popup("more")
+    ui.mark("viewport.more")
+    imgui.set_item_tooltip("More tools")
+    _put_popup_below()
+    if not imgui.begin_popup("more"):
+        return
+    for name in hidden:
+        if name == "mark":
+            _draw_mark(session, ui, is_wordy=True)
+            continue
+        imgui.align_text_to_frame_padding()
+        imgui.text_disabled(HIDDEN_WORDS[name])
+        imgui.same_line(HIDDEN_X)
+        if name == "compare":
+            draw_compare_box(session, dispatch, ui, MOST_BOX)
+        elif name == "heat":
+            draw_heat_box(session, dispatch, ui, MOST_BOX)
+        else:
+            _draw_layouts(session, dispatch, ui)
+            imgui.new_line()
+    imgui.end_popup()
+
+
+def _put_popup_below() -> None:
+    """The popup that may open next covers neither the newest item nor the pointer."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    imgui.set_next_window_pos(ImVec2(low.x, high.y + 6), imgui.Cond_.appearing)
+
+
+def _camera_words(session: SessionView) -> str:
+    shown = session.view.look_through
+    return "Free" if shown is None else session.rig.names[shown]
+
+
+def _draw_camera_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: float) -> None:
+    shown, names = session.view.look_through, session.rig.names
+    imgui.align_text_to_frame_padding()
+    imgui.set_next_item_width(width)
+    if imgui.begin_combo("##camera", box_words(_camera_words(session), width), box_flags(width)):
+        if imgui.selectable("Free", shown is None)[0]:
+            dispatch(LookThrough(None))
+        for index, name in enumerate(names):
+            imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would tell apart
+            is_chosen = imgui.selectable("##camera", shown == index)[0]
+            ui.mark(f"viewport.camera{index}")
+            imgui.same_line(0, 0)
+            imgui.text(name)
+            imgui.pop_id()
+            if is_chosen:
+                dispatch(LookThrough(index))
+        imgui.end_combo()
+    ui.mark("viewport.camera")
+    imgui.set_item_tooltip("Look through a capture camera ([ and ])")
+
+
+def _draw_show(session: SessionView, dispatch: Dispatch, ui: UiState, *, is_wordy: bool) -> None:
+    if imgui.button(f"{Icon.EYE}  Show" if is_wordy else f"{Icon.EYE}##show"):
+        imgui.open_popup("overlays")
+    ui.mark("viewport.overlays")
+    _put_popup_below()
+    _draw_overlay_menu(session, dispatch, ui)
+
+
+def _draw_mark(session: SessionView, ui: UiState, *, is_wordy: bool) -> None:
+    imgui.begin_disabled(not session.regions.can_mark)
+    if segment(f"{Icon.REGION}  Mark" if is_wordy else Icon.REGION, ui.regions.is_active):
+        if ui.regions.is_active:
+            ui.regions.leave()
+        else:
+            begin_choosing(session, ui)
+    ui.mark("viewport.mark")
+    imgui.end_disabled()
+    words = session.regions.why_not or "Mark part of the scene as static or moving (M)"
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(words)
+
+
+def _draw_layouts(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    """How many views."""
+    width, shown = imgui.get_frame_height(), session.views.n_shown
+    for n in COUNTS:
+        if segment(f"{n}##views", shown == n, width):
+            dispatch(ShowViews(n))
+        ui.mark(f"viewport.views{n}")
+        imgui.set_item_tooltip(f"{n} view{'s' if n > 1 else ''} (V)")
+        imgui.same_line(0, 2)
+
+
+def _draw_overlay_menu(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    if not imgui.begin_popup("overlays"):
+        return
+    rows = (
+        ("show_frusta", "Cameras", "1"),
+        ("show_inherited", "Inherited anchors (circles)", "2"),
+        ("show_residual", "Residual anchors (diamonds)", "3"),
+        (cloud_overlay(session), "Point cloud", "4"),
+        ("show_regions", "Marked regions", "5"),
+        ("show_coverage", "Space of inherited anchors", "9"),
+        ("show_trails", "Motion trails", "0"),
+        ("show_paths", "Camera path", "Shift+P"),
+    )
+    for name, label, key_label in rows:
+        if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:
+            dispatch(ToggleOverlay(name))
+        ui.mark(f"show.{name}")
+    imgui.separator()
+    overlays = session.overlays
+    imgui.text_disabled("Anchor marks")
+    imgui.set_next_item_width(150)
+    size = slider("Size", overlays.mark_size * 100.0, 50.0, 300.0, "%.0f %%", MARK_SLIDER)
+    overlays.mark_size = size[1] / 100.0
+    ui.mark("show.mark_size")
+    imgui.set_next_item_width(150)
+    opacity = slider("Opacity", overlays.mark_opacity * 100.0, 10.0, 100.0, "%.0f %%", MARK_SLIDER)
+    overlays.mark_opacity = opacity[1] / 100.0
+    ui.mark("show.mark_opacity")
+    imgui.separator()
+    imgui.text_disabled("Tab hides or shows cameras and anchors")
+    imgui.end_popup()

@@ -1,0 +1,1 @@
+"""What is asked and said when a folder is opened."""

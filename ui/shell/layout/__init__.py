@@ -1,0 +1,1 @@
+"""Where panels are, and what the window remembers of that."""
