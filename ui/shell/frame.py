@@ -61,11 +61,12 @@ from ui.panels.training.training import draw_training
 from ui.panels.welcome.recent_rows import RecentRows
 from ui.shell.dialogs.about import AboutDialog
 from ui.shell.dialogs.calibration_dialog import CalibrationDialog
-from ui.shell.dialogs.dialogs import OpenFolderDialog, draw_help
+from ui.shell.dialogs.dialogs import OpenFolderDialog
 from ui.shell.dialogs.export_dialog import ExportDialog
 from ui.shell.dialogs.opening.opening_dialog import OpeningDialog
 from ui.shell.dialogs.questions import QuestionDialogs
 from ui.shell.dialogs.synchronisation_dialog import SynchronisationDialog
+from ui.shell.finding.help_sheet import HelpSheet
 from ui.shell.finding.palette import Palette
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout.layout import hold_sizes, is_laid_out, lay_out
@@ -152,6 +153,7 @@ class Frame:
         self.export = ExportDialog()
         self.opening = OpeningDialog(lambda: ImageTexture(ctx))
         self.palette = Palette()
+        self.help_sheet = HelpSheet()
         self.preferences = PreferencesDialog()
         self.layouts = Layouts()
         self.about = AboutDialog()
@@ -313,7 +315,7 @@ class Frame:
         hold_sizes(self._dock_ids)
         self.dialog.open_wished(ui)
         self.guard.draw("the dialog for folders", lambda: self.dialog.draw(dispatch, ui))
-        self.guard.draw("the help sheet", lambda: draw_help(ui))
+        self.guard.draw("the help sheet", lambda: self.help_sheet.draw(ui))
         self.guard.draw("the dialog about the program", lambda: self.about.draw(ui))
         self.guard.draw("the layouts", lambda: self.layouts.draw(ui))
         self.guard.draw("the preferences", lambda: self.preferences.draw(ui))

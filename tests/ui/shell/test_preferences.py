@@ -204,7 +204,7 @@ def test_every_page_fits(open_pilot: Callable[..., Pilot], tmp_path: Path, size:
 
 def test_the_help_sheet_lists_every_key_and_nothing_without_one(pilot: Pilot) -> None:
     from ui.panels.actions.action import WINDOW
-    from ui.shell.dialogs.dialogs import _rows
+    from ui.shell.finding.help_sheet import _rows
 
     ui = pilot.studio.frame.ui
     groups = dict.fromkeys(action.group for action in ACTIONS)
@@ -213,6 +213,20 @@ def test_the_help_sheet_lists_every_key_and_nothing_without_one(pilot: Pilot) ->
     assert all(label for label, _ in rows)
     ui.keys.clear(next(action for action in ACTIONS if action.id == "window.help"))
     assert "Keys and mouse" not in [text for _, text in _rows(WINDOW, ui)]
+
+
+def test_the_help_sheet_is_searched_by_key_and_by_words(pilot: Pilot) -> None:
+    pilot.key(key.F1)
+    pilot.draw(3)  # the cursor stands in the search
+    pilot.type("bookmark NEXT")
+    pilot.draw(2)
+    sheet = pilot.studio.frame.help_sheet
+    rows = [("B", "Next bookmark"), ("Shift+B", "Bookmark this view"), ("N", "Next clip")]
+    assert sheet._found(rows) == rows[:1]
+    pilot.key(key.F1)
+    pilot.draw(3)
+    assert not pilot.studio.frame.ui.is_help_open
+    assert sheet._found(rows) == rows
 
 
 def test_the_folder_of_projects_is_named_again_only_where_the_box_does_not_show_it(

@@ -41,7 +41,7 @@ ACTIONS: tuple[Action, ...] = (
 def handle_keys(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Run the actions of keys pressed since the last frame, or say why not. Text fields keep their keys."""
     io = imgui.get_io()
-    if ui.is_help_open and imgui.is_key_pressed(imgui.Key.escape, False):
+    if ui.is_help_open and any(imgui.is_key_pressed(key, False) for key in (imgui.Key.escape, imgui.Key.f1)):
         ui.is_help_open = False
         return
     if io.want_text_input or ui.is_popup_open:  # the key that closes a menu does nothing else

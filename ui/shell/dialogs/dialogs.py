@@ -1,4 +1,4 @@
-"""Asking for a folder without stopping the frame loop, and the help sheet.
+"""Asking for a folder without stopping the frame loop.
 
 The desktop's own dialog is used where its helper program is installed; elsewhere a small path box with a folder list.
 """
@@ -16,10 +16,6 @@ from imgui_bundle import portable_file_dialogs as native
 
 from app.project.project_choices import ProjectChoices
 from app.session.commands import LookAtVideos, OpenCapture, OpenProject
-from ui.panels.actions.action import BOOKMARKS, PLAY, TIME, WINDOW
-from ui.panels.actions.table import ACTIONS
-from ui.panels.picture.gestures import mouse_help
-from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 
@@ -192,66 +188,3 @@ class OpenFolderDialog:
         for name in self._listed[1]:
             if imgui.selectable(f"{theme.Icon.FOLDER}  {name}", False)[0]:
                 self._text = str(folder / name)
-
-
-def draw_help(ui: UiState) -> None:
-    """The F1 sheet: every key, and what the mouse does."""
-    if not ui.is_help_open:
-        return
-    center = imgui.get_main_viewport().get_center()
-    imgui.set_next_window_pos(center, imgui.Cond_.always, ImVec2(0.5, 0.5))
-    highest = imgui.get_main_viewport().work_size.y - 24
-    imgui.set_next_window_size(ImVec2(880, 0), imgui.Cond_.always)
-    imgui.set_next_window_size_constraints(ImVec2(880, 100), ImVec2(880, highest))  # in a low window it scrolls
-    flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_resize
-    flags |= imgui.WindowFlags_.no_collapse
-    imgui.push_style_var(imgui.StyleVar_.window_border_size, 1.0)
-    imgui.push_style_color(imgui.Col_.window_bg, imgui.ImVec4(*theme.POPUP))
-    is_shown, is_kept = imgui.begin("Keys and mouse", True, flags)
-    imgui.pop_style_color()
-    imgui.pop_style_var()
-    if imgui.is_window_appearing():
-        ui.redraw_within(0.0)  # only then does what lies below know that it is covered
-    if is_shown:
-        groups = dict.fromkeys(action.group for action in ACTIONS)
-        left = (TIME, PLAY, BOOKMARKS, WINDOW)
-        if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
-            imgui.table_next_column()
-            for group in left:
-                _draw_group(group, _rows(group, ui))
-            _draw_group("Mouse", list(mouse_help(ui.navigation.preset)))
-            imgui.table_next_column()
-            for group in (group for group in groups if group not in left):
-                _draw_group(group, _rows(group, ui))
-            imgui.end_table()
-        others = next(action for action in ACTIONS if action.id == "window.palette")
-        key = ui.keys.label(others)
-        text_wrapped_dim(f"Actions without a key are in the menus; {key} finds any action by name." if key else "")
-    imgui.end()
-    ui.is_help_open = bool(is_kept)
-
-
-def _rows(group: str, ui: UiState) -> list[tuple[str, str]]:
-    """Keys and words of the actions of a group that have a key."""
-    rows = ((", ".join(ui.keys.labels(action)), action) for action in ACTIONS if action.group == group)
-    return [(label, action.text) for label, action in rows if label and action.is_in_help]
-
-
-def _draw_group(title: str, rows: list[tuple[str, str]]) -> None:
-    if not rows:
-        return
-    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.SKY))
-    imgui.separator_text(title)
-    imgui.pop_style_color()
-    key_width = max(imgui.calc_text_size(label).x for label, _ in rows) + 14
-    if not imgui.begin_table(title, 2):
-        return
-    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, key_width)
-    imgui.table_setup_column("text")
-    for label, text in rows:
-        imgui.table_next_row()
-        imgui.table_next_column()
-        imgui.text(label)
-        imgui.table_next_column()
-        text_wrapped_dim(text)
-    imgui.end_table()
