@@ -11,26 +11,37 @@ from tests.documents.keys import key_tables
 from tests.documents.settings import presets_table, settings_tables
 from tests.documents.table import table
 
-LINK = re.compile(r"\]\(([^)#\s]+)\)")
+LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
+HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 DOCUMENTS = [path.relative_to(ROOT).as_posix() for path in documents()]
 
 
-def dead_links(text: str, folder: Path) -> list[str]:
-    """Targets of relative Markdown links in `text` that do not exist below `folder`."""
-    targets = [target for target in LINK.findall(text) if "://" not in target]
-    return [target for target in targets if not (folder / target).exists()]
+def anchors(text: str) -> set[str]:
+    """What links to the headings of `text` are called, as GitHub does it."""
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in HEADING.findall(text)}
+
+
+def dead_links(path: Path) -> list[str]:
+    """Relative Markdown links of a document to files or headings that do not exist."""
+    dead = []
+    for name, anchor in LINK.findall(path.read_text("utf-8")):
+        target = path.parent / name if name else path
+        if "://" in name or (target.exists() and (not anchor or anchor in anchors(target.read_text("utf-8")))):
+            continue
+        dead.append(f"{name}#{anchor}".rstrip("#"))
+    return dead
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_links_lead_somewhere(name: str) -> None:
-    path = ROOT / name
-    assert dead_links(path.read_text("utf-8"), path.parent) == []
+    assert dead_links(ROOT / name) == []
 
 
 def test_dead_link_is_seen(tmp_path: Path) -> None:
-    text = "[a](there.md) [b](gone.md) [c](https://host/x)"
-    (tmp_path / "there.md").touch()
-    assert dead_links(text, tmp_path) == ["gone.md"]
+    (tmp_path / "there.md").write_text("## One `a`, two\n", "utf-8")
+    here = tmp_path / "here.md"
+    here.write_text("[a](there.md#one-a-two) [b](gone.md) [c](https://host/x) [d](there.md#three) [e](#here)", "utf-8")
+    assert dead_links(here) == ["gone.md", "there.md#three", "#here"]
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)
