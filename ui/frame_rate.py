@@ -19,7 +19,7 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed.laps import Lap, camera_of, enough, frames_of
 from app.evaluation.speed.window_drawing import Drawn, said_by
 from app.playback.frame_decoder import ClipFiles, FrameRequest, decode_frame
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.errors import EngineError
 from engine.kernels.cache import use_kernel_cache
 from ui.gl.context import ContextError, is_software, make_headless_context, renderer_name

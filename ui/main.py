@@ -162,7 +162,7 @@ def _serve_window(options: argparse.Namespace) -> int:
     pyglet.options.shadow_window = False  # no hidden second context
     # Sizes are pixels of the screen, of which ui.style.ui_scale makes units; on macOS they are the system's points.
     pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
-    from app.project.project_choices import ProjectChoices
+    from app.project.opening.project_choices import ProjectChoices
     from app.session.commands import OpenCapture
     from app.session.projects.preferences import PreferencesFile
     from app.session.projects.window_memory import read_window_memory

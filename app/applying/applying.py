@@ -16,8 +16,8 @@ from msgspec.structs import replace as with_entries
 
 from app.applying.deletions import Deletions, Report, Rows, find_deletions, loaded, reference_of
 from app.document.project_document import ProjectDocument
-from app.project.clip_exchange import begin_exchange, exchange, give_up_exchange
-from app.project.clip_versions import forget_oldest, read_finished, set_aside
+from app.project.clips.clip_exchange import begin_exchange, exchange, give_up_exchange
+from app.project.clips.clip_versions import forget_oldest, read_finished, set_aside
 from app.project.project import Project
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
@@ -109,7 +109,7 @@ def exchange_staged(project: Project, staged: StagedClips) -> None:
     """Put new clips that lie ready in the places of the old ones, which become versions.
 
     Raises:
-        DiskError: The disk refused; see app.project.clip_exchange.
+        DiskError: The disk refused; see app.project.clips.clip_exchange.
     """
     for clip_index in staged.clip_indices:
         set_aside(project, clip_index)

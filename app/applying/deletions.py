@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.project.clip_versions import read_finished
+from app.project.clips.clip_versions import read_finished
 from app.project.project import Project
 from engine.backends.table import process_backend
 from engine.capture.clip import Clip

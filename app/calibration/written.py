@@ -7,8 +7,8 @@ from pathlib import Path
 
 from engine.calibration.calibrated import Calibration
 from engine.calibration.videos import common_length, common_rate, find_videos
-from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.formats.capture_json import FILE
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.errors import CaptureError
 

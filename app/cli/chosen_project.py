@@ -17,8 +17,14 @@ from app.document.storing.document_file import PROJECT_FILE
 from app.document.storing.document_store import DocumentStore
 from app.project.allowed_changes import SettingsFixed, check_change, discard_unfitting, is_shared_change
 from app.project.disk.discarding import discard, progress_of, training_of
+from app.project.opening.project_access import (
+    check_settings,
+    create_project,
+    default_settings,
+    open_project,
+    read_settings,
+)
 from app.project.project import Project
-from app.project.project_access import check_settings, create_project, default_settings, open_project, read_settings
 from engine.capture.capture import Capture, open_capture
 from engine.errors import ProjectError
 from engine.training.presets import closest_preset

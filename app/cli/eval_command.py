@@ -14,7 +14,7 @@ from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.speed.frame_rates import DEFINITION, frame_rates
 from app.export.staging import check_target
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.training.service import Launch
 from engine.storage.json_files import json_text
 

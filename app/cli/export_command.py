@@ -15,7 +15,7 @@ from app.export.export_progress import ExportProgress, ExportResult
 from app.export.jobs.job import Job
 from app.export.jobs.table import KINDS, formats_of, named_job
 from app.export.picked_frames import frames_text
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.training.service import Launch
 from engine.errors import ProjectError
 from engine.setting import settings_of

@@ -11,7 +11,7 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.export.edits_line import edits_line
 from app.export.jobs.video import VideoJob
 from app.export.video.formats import FORMATS, format_of
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.training.service import Launch
 from engine.errors import ProjectError
 from engine.text import rate_text, size_text

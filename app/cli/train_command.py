@@ -22,7 +22,7 @@ from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.speed import step_time
-from app.project.clip_catalog import ClipCatalog
+from app.project.clips.clip_catalog import ClipCatalog
 from app.residuals.kept_reading import note_kept
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from app.project.clip_versions import read_finished, recovery_hint
-from app.project.opening import open_capture_of
+from app.project.clips.clip_versions import read_finished, recovery_hint
+from app.project.opening.opening import open_capture_of
 from app.project.project import Project
 from app.status import TrainingStatus
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied

@@ -11,8 +11,8 @@ from app.export.export_progress import ExportEstimate, ExportProgress, ExportRes
 from app.export.jobs.cameras import CamerasJob
 from app.export.staging import check_target
 from engine.camera.corrections import corrected_camera
-from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import ImageFrames
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.writers.conversion import convert
 
 ROW_BYTES = {"colmap": 240, "transforms": 720}

@@ -39,7 +39,7 @@ def run_task(task: ExportTask, report: Report) -> ExportResult:
         EngineError: It cannot be opened or written.
     """
     from app.evaluation.headless import open_trained
-    from app.project.project_access import open_project
+    from app.project.opening.project_access import open_project
     from engine.capture.capture import open_capture
 
     project = open_project(Path(task.project), is_writable=False)

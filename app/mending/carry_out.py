@@ -8,10 +8,10 @@ from pathlib import Path
 from app.background.kernels import use_threads, warm_up_reporting
 from app.evaluation.headless import open_trained
 from app.mending.request import MendJob, MendResult
-from app.project.clip_versions import read_finished
+from app.project.clips.clip_versions import read_finished
 from app.project.mends.record import MendedClip, MendRecord, now_text
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.training.build import clip_training
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state

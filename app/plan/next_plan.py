@@ -9,7 +9,7 @@ from pathlib import Path
 from app.background.latest import LatestWorker
 from app.plan.planning import plan_clip, plan_status
 from app.plan.speed import step_time
-from app.project.clip_catalog import ClipCatalog
+from app.project.clips.clip_catalog import ClipCatalog
 from app.project.disk.discarding import progress_of
 from app.project.project import Project
 from app.status import PlanStatus

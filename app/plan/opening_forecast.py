@@ -6,7 +6,7 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from app.project.opening_answers import OpeningAnswers, working_size
+from app.project.opening.opening_answers import OpeningAnswers, working_size
 from app.status import OpeningForecast
 from engine.capture.capture import Capture
 from engine.capture.clip import split_clips

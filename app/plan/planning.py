@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.background.kernels import COMPILING
-from app.project.clip_catalog import ClipCatalog
+from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.status import PlanStatus, SettingStatus
 from engine.capture.capture import Capture

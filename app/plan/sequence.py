@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from app.background.latest import LatestWorker
 from app.plan.planning import clip_history
 from app.plan.speed import known_step_time, step_time
-from app.project.clip_catalog import ClipCatalog, ClipRecord
+from app.project.clips.clip_catalog import ClipCatalog, ClipRecord
 from app.project.project import Project
 from app.status import QueuedClip, QueueStatus, SequenceForecast
 from app.training.own_settings import is_source

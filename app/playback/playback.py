@@ -24,7 +24,7 @@ from app.playback.prefetch_order import Course
 from app.playback.render import Look, Renderer
 from app.playback.timeline import Timeline
 from app.playback.views.orbit_view import OrbitView
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
 from engine.camera.rig import CameraRig

@@ -9,8 +9,8 @@ from dataclasses import replace
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.project.disk.discarding import Discarded, discard, progress_of, training_of
+from app.project.opening.project_access import check_settings
 from app.project.project import Project
-from app.project.project_access import check_settings
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
 

@@ -5,7 +5,7 @@ journal/00000000.jsonl       what has happened to the document since that step
 history.json                 the way back from the document of project.json
 project.backup.json          project.json before it was written last
 clips/0000.safetensors       finished clips
-clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge; see app.project.clip_names
+clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge; see app.project.clips.clip_names
 mends/0001.json              what was mended, with figures before and after
 versions/0000/               what was trained before it was trained again
 damaged/0000-1.safetensors   damaged files that were put aside
@@ -31,9 +31,9 @@ from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import BACKUP_FILE, PROJECT_FILE
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.history_file import HISTORY_FILE
-from app.project.clip_names import clip_name, finished_files
+from app.project.clips.clip_names import clip_name, finished_files
+from app.project.clips.header_cache import HeaderCache
 from app.project.folders import FOLDERS
-from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
@@ -101,7 +101,7 @@ class Project:
         return self.prep_dir / "first_cloud.safetensors"
 
     def clip_name(self, clip_index: int) -> str:
-        """The name of a clip's files, see app.project.clip_names."""
+        """The name of a clip's files, see app.project.clips.clip_names."""
         return clip_name(clip_index, self.settings.clip_bounds, self.settings.clip_length)
 
     def frames_of(self, clip_index: int) -> tuple[int, int | None]:

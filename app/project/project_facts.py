@@ -10,9 +10,9 @@ from pathlib import Path
 from app.background.kernels import COMPILING
 from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import PROJECT_FILE
-from app.project.clip_bytes import storage_of
+from app.project.clips.clip_bytes import storage_of
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from engine.clip_files.clip_header import ClipHeader, Coverage
 from engine.clip_files.clip_state import DamagedClip, look_at_clip
 from engine.errors import ProjectError
@@ -30,7 +30,7 @@ class ClipFacts:
         role: "reference" or "source".
         n_steps: Optimiser steps.
         fingerprint: Of its arrays.
-        storage: Bytes per component, see app.project.clip_bytes.
+        storage: Bytes per component, see app.project.clips.clip_bytes.
         stages_s: Wall seconds per stage, see app.training.stage_watch; empty when not recorded.
         preparation_s, training_s: Together all of it; None when not recorded.
         coverage: Of a clip that inherits: what moves and how much of it has an anchor near it, see

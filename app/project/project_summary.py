@@ -8,8 +8,8 @@ from typing import Any
 
 from msgspec.structs import asdict
 
-from app.project.clip_bytes import COMPONENT_NAMES
-from app.project.opening import open_capture_of
+from app.project.clips.clip_bytes import COMPONENT_NAMES
+from app.project.opening.opening import open_capture_of
 from app.project.project_facts import ClipFacts, read_facts
 from engine.errors import CaptureError, ProjectError
 from engine.text import rate_text

@@ -18,7 +18,7 @@ from app.background.latest import LatestWorker
 from app.playback.frame_decoder import FrameRequest
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.residuals.clip_pictures import ClipPictures, captured
 from app.residuals.heat import sentence
 from app.residuals.heat_map import LEVELS

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Sequence
 
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.residuals.figures import ClipFigures
 from engine.children.priority import lower_thread
 from engine.errors import EngineError

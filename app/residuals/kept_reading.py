@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.evaluation.evaluation import Scope, kept_figures
 from app.evaluation.headless import TrainedProject, open_trained
-from app.project.clip_catalog import ClipCatalog
+from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.residuals.figures import ClipFigures, Figures, PairFigures, RowFigures, pair_figures, row_figures
 from engine.capture.capture import Capture

@@ -11,8 +11,8 @@ import numpy as np
 
 from app.evaluation.kept_figures import EVALUATIONS
 from app.playback.timeline import Timeline
-from app.project.clip_catalog import ClipCatalog
-from app.project.opened_project import OpenedProject
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opened_project import OpenedProject
 from app.residuals.figures import ClipFigures, Figures
 from app.residuals.kept_reader import KeptReader
 from app.residuals.measuring_messages import LookAt, Measured, MeasureJob, MeasuringEnded, SetShare, Trouble

@@ -19,7 +19,7 @@ from app.background.logs import start_logging
 from app.evaluation.evaluation import Scope, kept_figures
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.kept_figures import KeptFigures
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.residuals.figures import pair_figures, row_figures
 from app.residuals.kept_reading import WINDOW_METRICS
 from app.residuals.measuring_messages import (

@@ -11,8 +11,8 @@ from typing import Any
 from app.background.latest import LatestWorker
 from app.playback.playback import Failure, Playback
 from app.playback.timeline import Timeline
-from app.project.clip_catalog import ClipCatalog
-from app.project.opened_project import OpenedProject
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opened_project import OpenedProject
 from app.residuals.anchor_heat import AnchorHeat, AnchorHeats
 from app.residuals.clip_pictures import ClipPictures
 from app.residuals.heat import Heat, HeatRequest

@@ -18,12 +18,12 @@ from app.document.storing.stored_document import document_of, plain_document
 from app.export.export_progress import ExportProgress, ExportResult
 from app.export.jobs.table import formats_of, named_job
 from app.project.allowed_changes import check_change, discard_unfitting
-from app.project.clip_anchors import clip_anchors
-from app.project.clip_catalog import ClipCatalog
-from app.project.clip_versions import restore_version
-from app.project.opening import open_capture_of
+from app.project.clips.clip_anchors import clip_anchors
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.clips.clip_versions import restore_version
+from app.project.opening.opening import open_capture_of
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.scripting.actions import action_called
 from app.session.editing.edit_commands import (
     AddEdit,

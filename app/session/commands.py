@@ -10,8 +10,8 @@ from pathlib import Path
 
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
-from app.project.opening_answers import OpeningAnswers
-from app.project.project_choices import AS_USUAL, ProjectChoices
+from app.project.opening.opening_answers import OpeningAnswers
+from app.project.opening.project_choices import AS_USUAL, ProjectChoices
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand

@@ -19,7 +19,7 @@ from app.export.jobs.answers import Answers
 from app.export.jobs.table import KINDS
 from app.export.show_in_folder import show_in_folder
 from app.playback.timeline import Timeline
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.project.projects_folder import project_name
 from app.session import commands
 from app.session.notices import Notices

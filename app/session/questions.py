@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.project.capture_report import CaptureReport
-from app.project.clip_catalog import ClipCatalog
-from app.project.opening_answers import OpeningAnswers
-from app.project.project_choices import AS_USUAL, ProjectChoices
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.capture_report import CaptureReport
+from app.project.opening.opening_answers import OpeningAnswers
+from app.project.opening.project_choices import AS_USUAL, ProjectChoices
 from app.project.recents import RecentProject
 from app.session.clips.clip_questions import ClipQuestion
 from app.session.files.file_questions import FileQuestion

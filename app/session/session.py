@@ -23,12 +23,12 @@ from app.playback.timeline import Timeline
 from app.playback.views.bookmarks import Bookmarks
 from app.playback.views.views import Views
 from app.project.allowed_changes import check_change, discard_unfitting, is_other_cut
-from app.project.opened_project import OpenedProject, opened_project
-from app.project.opening import Opened, open_for_window
-from app.project.opening_answers import answers_to_keep
+from app.project.opening.opened_project import OpenedProject, opened_project
+from app.project.opening.opening import Opened, open_for_window
+from app.project.opening.opening_answers import answers_to_keep
+from app.project.opening.project_access import check_settings
+from app.project.opening.project_choices import AS_USUAL
 from app.project.project import Project
-from app.project.project_access import check_settings
-from app.project.project_choices import AS_USUAL
 from app.project.projects_folder import project_name, projects_dir
 from app.residuals.residuals import Residuals
 from app.session import commands

@@ -17,7 +17,7 @@ from app.playback.timeline import Timeline
 from app.playback.views.orbit_view import OrbitView
 from app.playback.views.views import Views
 from app.project.disk.use import DiskUse
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HeatMap

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.background.kernels import warm_up_reporting
-from app.project.clip_versions import read_finished
+from app.project.clips.clip_versions import read_finished
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.training.interface import Training
 from app.training.messages import TrainJob
 from engine.backends.table import process_backend

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.background.latest import LatestWorker
-from app.project.metrics_file import read_metrics
+from app.project.clips.metrics_file import read_metrics
 
 Points = list[tuple[int, float]]
 """(step, value)."""

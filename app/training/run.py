@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from app.background.memory import peak_mb
-from app.project.clip_versions import forget_oldest, set_aside
-from app.project.metrics_file import read_metrics
+from app.project.clips.clip_versions import forget_oldest, set_aside
+from app.project.clips.metrics_file import read_metrics
+from app.project.clips.stage_seconds import memory_of, stages_of
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
-from app.project.stage_seconds import memory_of, stages_of
 from app.training.interface import MakeTraining, Training
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (

@@ -1,7 +1,7 @@
 """TrainingService: which clip trains, which wait, and what the worker said last. Status is derived, never stored.
 
 Owned by one thread. It knows no window and raises no notices: `poll` returns the events for whoever tells the user.
-What lies on disk is app.project.clip_catalog's business; the training at hand stands beside it and never hides it.
+What lies on disk is app.project.clips.clip_catalog's business; the training at hand never hides it.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.project.clip_catalog import ClipCatalog
-from app.project.clip_versions import recovery_hint
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.clips.clip_versions import recovery_hint
 from app.project.project import Project
 from app.status import ClipStatus, TrainingStatus
 from app.training.curves import CurveReader, Curves, append_thinned, read_curves

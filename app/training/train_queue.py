@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from app.project.clip_catalog import ClipCatalog
+from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from engine.clip_files.clip_header import SettingValue
 from engine.training.config import TrainConfig

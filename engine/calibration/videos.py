@@ -9,8 +9,8 @@ from engine.capture.files.folder_contents import folder_contents
 from engine.capture.files.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, listed
 from engine.capture.files.media import read_image_header, read_video_header
 from engine.capture.files.places import place_in
-from engine.capture.format_checks import raise_problems
 from engine.capture.frames import FrameSource, ImageFrames, VideoFrames
+from engine.capture.layout.format_checks import raise_problems
 from engine.errors import CaptureError
 
 MIN_CAMERAS = 3

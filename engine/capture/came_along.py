@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 from typing import Any
 
-from engine.capture.format_result import Layout
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
+from engine.capture.layout.format_result import Layout
 
 N_LOOKED_AT = 3
 """Masks of a camera whose bytes are looked at: the first, the middle and the last."""

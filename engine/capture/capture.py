@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -19,53 +17,16 @@ from engine.camera.rig import CameraRig
 from engine.capture.cameras.camera_optics import CameraOptics
 from engine.capture.cameras.rig_checks import check_rig, rig_extent, rig_warnings
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
-from engine.capture.files.folder_contents import MAX_LOOKED_AT, folder_contents
-from engine.capture.files.foreign_calibrations import foreign_calibrations
-from engine.capture.format_checks import raise_problems
-from engine.capture.format_result import Layout, Probe
-from engine.capture.formats import (
-    capture_json,
-    colmap,
-    colmap_frames,
-    easyvolcap,
-    immersive,
-    multipleview,
-    n3dv,
-    panoptic,
-    panoptic_studio,
-    qualisys,
-    sample,
-    technicolor,
-    toml_cameras,
-    transforms_json,
-    vicon,
-)
+from engine.capture.formats.table import read_layout
 from engine.capture.frames import FrameStore, IndexedFrames
+from engine.capture.layout.format_checks import raise_problems
+from engine.capture.layout.format_result import Layout
 from engine.capture.pixels.excluded_pixels import ExcludedPixels
 from engine.capture.pixels.undistortion import Undistortion
-from engine.capture.pixels.user_masks import with_masks
 from engine.errors import CaptureError
 
 logger = logging.getLogger(__name__)
 
-FORMATS = (
-    capture_json,
-    sample,
-    panoptic,
-    panoptic_studio,
-    easyvolcap,
-    toml_cameras,
-    immersive,
-    technicolor,
-    transforms_json,
-    multipleview,
-    n3dv,
-    colmap_frames,
-    colmap,
-    qualisys,
-    vicon,
-)
-"""Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 DEFAULT_CACHE_BYTES = 512 << 20
 """Decoded frames kept in memory."""
 ONE_PASS_CACHE_BYTES = 32 << 20
@@ -329,7 +290,7 @@ def open_capture(
     folder = Path(path)
     _check_scale(scale, folder)
     try:
-        layout = _read_layout(folder, follow_links=follow_links)
+        layout = read_layout(folder, follow_links=follow_links)
         if not is_shape_asked:
             raise_problems(check_shapes(layout), folder)
     except OSError as error:  # rights, a drive that went away, a path too long
@@ -445,21 +406,6 @@ def fingerprint(layout: Layout) -> str:
     return digest.hexdigest()[:16]
 
 
-def _read_layout(folder: Path, *, follow_links: bool) -> Layout:
-    if not folder.exists():
-        raise CaptureError("There is no such folder.", hint="Check the path.", path=folder)
-    if not folder.is_dir():
-        raise CaptureError(
-            "This is a file; a capture is a folder.", hint=f"Open {folder.absolute().parent} instead.", path=folder
-        )
-    probes = [(reader, reader.probe(folder)) for reader in FORMATS]
-    for reader, probe in probes:
-        if probe.is_match:
-            layout = reader.read(folder, follow_links=follow_links)
-            return with_masks(layout, folder, follow_links=follow_links)
-    raise _not_a_capture(folder, [probe for _, probe in probes])
-
-
 def check_shapes(layout: Layout) -> list[CaptureError]:
     """Cameras whose frames are of quite another shape than their calibration, where nothing says why."""
     problems = []
@@ -475,35 +421,3 @@ def check_shapes(layout: Layout) -> list[CaptureError]:
             )
         )
     return problems
-
-
-def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
-    """What was seen in the folder, what can be read, and what to do."""
-    with os.scandir(folder) as entries:
-        inside = sorted(entry.name for entry in islice(entries, MAX_LOOKED_AT) if _is_capture(entry))
-    close = [probe for probe in probes if probe.seen]
-    calibrations = [] if inside else foreign_calibrations(folder)
-    if close or calibrations:
-        seen = [f"there is {probe.seen}, but {probe.lacks}" for probe in close]
-        found = "; ".join(seen + [text for text, _ in calibrations])
-        hints = [probe.hint for probe in close] + [f"{what[0].upper()}{what[1:]}." for _, what in calibrations]
-        hint = " Or: ".join(dict.fromkeys(hint for hint in hints if hint))
-    else:
-        found, hint = "no known layout was recognised", ""
-    if inside:
-        hint = f"Open {inside[0]} inside it, which is a capture."
-    elif not hint:
-        hint = (
-            "docs/capture_formats.md lists the layouts that are read. Videos of cameras without calibration: "
-            "clipgstream calibrate FOLDER. Anything else: write capture.json."
-        )
-    return CaptureError(
-        f"This folder is not a capture ({found}). In it: {folder_contents(folder)}.", hint=hint, path=folder
-    )
-
-
-def _is_capture(entry: os.DirEntry[str]) -> bool:
-    try:
-        return entry.is_dir() and any(reader.probe(Path(entry.path)).is_match for reader in FORMATS)
-    except OSError:  # a link to itself, a folder that may not be looked into
-        return False

@@ -30,7 +30,7 @@ from engine.capture.files.media import (
     set_pixel_limit,
     shown_pts,
 )
-from engine.capture.limits import MAX_PIXELS
+from engine.capture.layout.limits import MAX_PIXELS
 from engine.capture.pixels.video_colors import rgb_picture
 from engine.errors import CaptureError
 from engine.storage.files import open_regular

@@ -16,8 +16,8 @@ import numpy as np
 
 from engine.capture.colmap.model_files import BinaryReader, damaged, lines_of, unreadable
 from engine.capture.files.places import place_in
-from engine.capture.format_result import Layout
-from engine.capture.limits import MAX_POSITION
+from engine.capture.layout.format_result import Layout
+from engine.capture.layout.limits import MAX_POSITION
 from engine.capture.ply import as_bytes, check_n_points, read_ply
 from engine.errors import CaptureError
 from engine.storage.files import open_regular

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.capture import FORMATS, Capture
+from engine.capture.capture import Capture
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed
 from engine.capture.files.media import read_frame_times, read_video_header
 from engine.capture.files.places import place_in
+from engine.capture.formats.table import FORMATS
 from engine.capture.frames import FrameSource, IndexedFrames, VideoFrames
-from engine.capture.limits import FPS_RANGE
+from engine.capture.layout.limits import FPS_RANGE
 from engine.errors import CaptureError
 
 

@@ -11,9 +11,9 @@ import pytest
 
 from app.cli.cli import main
 from app.plan import speed
-from app.project.opened_project import OpenedProject, opened_project
+from app.project.opening.opened_project import OpenedProject, opened_project
+from app.project.opening.project_access import create_project, default_settings
 from app.project.project import Project
-from app.project.project_access import create_project, default_settings
 from app.session.commands import OpenCapture
 from app.session.projects.settings import Settings
 from app.session.session import Session

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from app.project.opened_project import OpenedProject
-from app.project.project_access import open_project
+from app.project.opening.opened_project import OpenedProject
+from app.project.opening.project_access import open_project
 from app.training.messages import TrainJob
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip

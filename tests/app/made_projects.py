@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from app.document.project_settings import ProjectSettings
+from app.project.opening.project_access import create_project
 from app.project.project import Project
-from app.project.project_access import create_project
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from tests.app.fakes import anchor_arrays

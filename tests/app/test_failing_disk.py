@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from app.project.clip_versions import list_versions
+from app.project.clips.clip_versions import list_versions
 from app.training import keeping
 from app.training import messages as m
 from app.training.messages import Pause, SnapshotConsumed, Stop

@@ -13,7 +13,7 @@ import pytest
 from app.cli.arguments import suggestion
 from app.cli.terminal.printable_stream import PrintableStream
 from app.csv_text import csv_text
-from app.project.project_access import create_project, default_settings
+from app.project.opening.project_access import create_project, default_settings
 from engine.capture.capture import open_capture
 from ui import main as ui_main
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.plan.opening_forecast import forecast_opening, free_mb
-from app.project.opening_answers import OpeningAnswers
+from app.project.opening.opening_answers import OpeningAnswers
 from engine.capture.capture import open_capture
 from engine.errors import PreparationError
 

@@ -11,7 +11,7 @@ from app.applying.deletions import loaded
 from app.cli.cli import main
 from app.evaluation.evaluation import boundary_maps
 from app.evaluation.headless import open_trained
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.session import commands as c
 from app.session.projects.settings import Settings
 from app.session.session import Session

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.project.metrics_file import read_metrics
-from app.project.project_access import create_project, default_settings
+from app.project.clips.metrics_file import read_metrics
+from app.project.opening.project_access import create_project, default_settings
 from app.training import messages as m
 from app.training.rate import Rate
 from app.training.run import CHECKPOINT_EVERY_S, TrainingRun

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from app.background.jobs import Jobs
-from app.project.opening import Opened, open_for_window
-from app.project.opening_answers import default_answers
+from app.project.opening.opening import Opened, open_for_window
+from app.project.opening.opening_answers import default_answers
 from app.session import commands as c
 from app.session.projects.settings import Settings
 from app.session.questions import ProjectQuestion, RetrainQuestion, StartOverQuestion

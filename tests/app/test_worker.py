@@ -107,7 +107,7 @@ def test_closing_ends_the_process_and_keeps_what_it_learned(make_session, monkey
 PARENT = """
 import os, sys
 from pathlib import Path
-from app.project.project_access import create_project, default_settings
+from app.project.opening.project_access import create_project, default_settings
 from app.training.messages import StepReported, TrainJob
 from app.training.process import ProcessWorker
 from engine.capture.capture import open_capture

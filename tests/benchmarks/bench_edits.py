@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from app.evaluation.headless import open_trained
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.editing.actions import Delete, Expose, Hold, Recolor, Smooth, Transform
 from engine.editing.clip_rows import named_sets
 from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Sphere

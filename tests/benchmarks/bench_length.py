@@ -32,7 +32,7 @@ from app.lab.ablation.running import Callbacks, project_folder, run_ablation
 from app.lab.ablation.variants import FULL, Variant, chosen_variants
 from app.lab.flicker import flicker_figures
 from app.lab.report.charts import Curve, CurvePanel, draw_over_time
-from app.project.project_access import default_settings, open_project
+from app.project.opening.project_access import default_settings, open_project
 from app.project.project_facts import read_facts
 from app.training.process import ProcessWorker
 from engine.capture.capture import Capture, open_capture

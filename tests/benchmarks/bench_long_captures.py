@@ -36,7 +36,7 @@ from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
 from app.export.video.views import camera_view
 from app.lab.flicker import flicker_figures
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.images.psnr import psnr
 from engine.metrics.clips.summary import mean_of
 from engine.metrics.pictures.colors import to_levels

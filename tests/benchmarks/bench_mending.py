@@ -33,7 +33,7 @@ import numpy as np
 from app.background.kernels import use_threads
 from app.cli.cli import main as clipgstream
 from app.evaluation.headless import open_trained
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.training.build import clip_training
 from engine.capture.capture import open_capture
 from engine.clip_files.compact import write_compact_clip

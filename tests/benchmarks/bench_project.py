@@ -36,7 +36,7 @@ CALL_TARGET_MS = 100.0
 def make(folder: Path, n_clips: int, n_rows: int) -> Path:
     """A capture of one frame per clip, and a project of it in which every clip is trained. Returns the project."""
     from app.document.storing.document_file import PROJECT_FILE
-    from app.project.project_access import default_settings
+    from app.project.opening.project_access import default_settings
     from engine.capture.capture import open_capture
     from tests.app.fakes import write_capture
     from tests.app.made_projects import make_chain

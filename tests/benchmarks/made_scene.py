@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from app.document.project_settings import ProjectSettings
-from app.project.project_access import create_project
+from app.project.opening.project_access import create_project
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from tests.app.fakes import decoder_arrays

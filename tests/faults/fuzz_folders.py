@@ -121,7 +121,13 @@ def edit(project: Any) -> None:
 
 def versions(project: Any) -> None:
     """Set a clip aside, bring it back, forget the oldest."""
-    from app.project.clip_versions import forget_oldest, list_versions, put_damaged_aside, restore_version, set_aside
+    from app.project.clips.clip_versions import (
+        forget_oldest,
+        list_versions,
+        put_damaged_aside,
+        restore_version,
+        set_aside,
+    )
 
     set_aside(project, 0)
     put_damaged_aside(project, 1)
@@ -132,7 +138,7 @@ def versions(project: Any) -> None:
 
 def exchanged(project: Any) -> None:
     """Exchange a clip for a copy of it."""
-    from app.project.clip_exchange import begin_exchange, exchange
+    from app.project.clips.clip_exchange import begin_exchange, exchange
 
     place = begin_exchange(project.folder)
     if project.clip_path(0).is_file():
@@ -171,7 +177,7 @@ def measured(folder: Path) -> None:
 def write_everything(folder: Path) -> None:
     """All that writes into a project. Raises EngineError where it may not be written to."""
     from app.background.logs import tail
-    from app.project.project_access import open_project
+    from app.project.opening.project_access import open_project
     from engine.errors import EngineError
 
     command("gate", str(folder), "--forget")

@@ -49,7 +49,7 @@ def make_project(folder: Path) -> None:
     """Two trained clips, checkpoint, live snapshot, curves, regions, paths, caches; beside them files of the user."""
     from app.document.project_settings import ProjectSettings
     from app.evaluation.kept_figures import KeptFigures
-    from app.project.project_access import create_project
+    from app.project.opening.project_access import create_project
     from app.project.recents import RecentProject
     from app.session.projects.settings import Settings
     from engine.camera.path_presets import turntable
@@ -230,8 +230,8 @@ def read_project(project: Path) -> None:
         RuntimeError: A command ended with what it calls a bug in the program.
     """
     from app.cli.cli import main
-    from app.project.clip_catalog import ClipCatalog
-    from app.project.project_access import open_project
+    from app.project.clips.clip_catalog import ClipCatalog
+    from app.project.opening.project_access import open_project
     from engine.errors import EngineError
 
     for command in ("inspect", "gate"):

@@ -59,7 +59,7 @@ class Tally:
 def edit(folder: Path, seed: int) -> None:
     """Edit until killed. Prints "step N" when a step begins and "kept N" once it is on disk."""
     from app.document.storing import document_store
-    from app.project.project_access import open_project
+    from app.project.opening.project_access import open_project
     from app.session.editing.kept_document import KeptDocument
     from tests.app.document.documents import random_events
 
@@ -97,7 +97,7 @@ class KillTest:
 
     def _make(self) -> None:
         from app.document.project_settings import ProjectSettings
-        from app.project.project_access import create_project
+        from app.project.opening.project_access import create_project
 
         create_project(self.folder, ProjectSettings(capture="none", fingerprint="none")).close()
 
@@ -107,7 +107,7 @@ class KillTest:
             self._round(self._rng.randrange(2**32), f"round {number}")
 
     def _round(self, seed: int, where: str) -> None:
-        from app.project.project_access import open_project
+        from app.project.opening.project_access import open_project
         from engine.errors import EngineError
         from tests.app.document.documents import random_events
 
@@ -187,7 +187,7 @@ def _same(one: object, other: object) -> bool:
 
 def kill_windows(work: Path, n_kills: int, rng: random.Random, tally: Tally) -> None:
     """Kill the real window while keys set keys of a camera path, frame after frame. Needs Xvfb and xdotool."""
-    from app.project.project_access import open_project
+    from app.project.opening.project_access import open_project
     from tests.app.fakes import write_capture
     from tests.ui.desk import Desk
 

@@ -25,7 +25,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.project.metrics_file import read_metrics
+from app.project.clips.metrics_file import read_metrics
 from tests.faults.trainings import FAST, SETTINGS, Command, Kept, kept_clips, leftovers, problems_of
 
 KINDS = ("group", "group", "main", "restart at once", "worker", "worker", "Ctrl+C", "SIGTERM")

@@ -10,7 +10,7 @@ import pytest
 
 from app.document.project_document import Marker
 from app.document.project_settings import ProjectSettings
-from app.project.project_access import create_project, open_project
+from app.project.opening.project_access import create_project, open_project
 from engine.errors import DiskError, ProjectError
 from tests.faults.full_disk import can_mount, full_disk
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from app.cli.cli import main
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.training import keeping, run
 from app.training.build import build_training
 from app.training.interface import Training

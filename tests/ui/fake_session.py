@@ -27,9 +27,9 @@ from app.playback.timeline import Timeline
 from app.playback.views.bookmarks import Bookmarks
 from app.playback.views.orbit_view import OrbitView
 from app.playback.views.views import Views
-from app.project.capture_report import RefusedFolder
 from app.project.disk.use import DiskUse
-from app.project.opening_answers import OpeningAnswers
+from app.project.opening.capture_report import RefusedFolder
+from app.project.opening.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap

@@ -12,8 +12,8 @@ from pyglet.window import key
 
 from app.calibration.job import CalibrationRequest
 from app.playback.modes.arrays import Picture
-from app.project.capture_report import CaptureReport, RefusedFolder, ReportedCamera
-from app.project.opening_answers import OpeningAnswers
+from app.project.opening.capture_report import CaptureReport, RefusedFolder, ReportedCamera
+from app.project.opening.opening_answers import OpeningAnswers
 from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
 from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
 from app.session.commands import (

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from app.cli.arguments import path_argument
 from engine.capture.capture import Capture
-from engine.capture.limits import MAX_NAME_LENGTH
+from engine.capture.layout.limits import MAX_NAME_LENGTH
 from engine.capture.pixels.frame_fit import FITS, FrameFit
 from engine.capture.writers.capture_json import Corrections, write_corrections
 from engine.doctor.finding import Finding

@@ -34,7 +34,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream inspect: describe a capture or a project, or correct a capture. Returns the exit code."""
-    from app.project.project_access import is_project
+    from app.project.opening.project_access import is_project
     from app.project.project_summary import describe_project, project_lines
 
     if not is_project(options.path):
@@ -62,7 +62,7 @@ def _inspect_capture(options: argparse.Namespace) -> int:
 
 
 def _describe(options: argparse.Namespace, capture: Capture) -> int:
-    from app.project.capture_report import report_of
+    from app.project.opening.capture_report import report_of
     from engine.capture.capture_summary import describe
 
     if not options.json:

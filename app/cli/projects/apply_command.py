@@ -6,8 +6,8 @@ import argparse
 
 from app.cli.arguments import EXIT_OK, path_argument
 from app.cli.terminal.progress import ProgressLine
-from app.project.opening import open_capture_of
-from app.project.project_access import open_project
+from app.project.opening.opening import open_capture_of
+from app.project.opening.project_access import open_project
 from app.training.service import Launch
 from engine.storage.json_files import json_text
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from app.cli.arguments import EXIT_OK, path_argument
 from app.document.changes.clip_changes import with_merge, with_reference, with_split
-from app.project.clip_catalog import ClipCatalog
-from app.project.opening import open_capture_of
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opening import open_capture_of
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.psnr_words import psnr_words
 from app.residuals.kept_reading import note_kept
 from app.training.service import Launch

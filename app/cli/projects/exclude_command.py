@@ -13,8 +13,8 @@ from app.document.changes.exclusion_changes import (
     without_masks,
 )
 from app.document.project_document import ProjectDocument
-from app.project.opening import open_capture_of
-from app.project.project_access import open_project
+from app.project.opening.opening import open_capture_of
+from app.project.opening.project_access import open_project
 from app.training.service import Launch
 from engine.capture.capture import Capture
 from engine.storage.json_files import json_text

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from app.cli.arguments import EXIT_OK, path_argument
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.session.marking import after_marking, effect_text, region_text
 from app.training.service import Launch
 from engine.clip_files.anchor_record import AnchorRecord

@@ -11,12 +11,12 @@ from app.cli.arguments import EXIT_FAILED, EXIT_OK, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine
 from app.mending.mend_project import MendOutcome, mend_project
 from app.mending.request import MendRequest
-from app.project.clip_versions import list_versions
+from app.project.clips.clip_versions import list_versions
 from app.project.mends.in_place import as_cut_now, take_back
 from app.project.mends.record import kept_record, record_numbers
-from app.project.opening import open_capture_of
+from app.project.opening.opening import open_capture_of
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.training.service import Launch
 from engine.errors import ProjectError
 from engine.mending.figures import METHODS, StretchFigures

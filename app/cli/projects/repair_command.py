@@ -9,7 +9,7 @@ from typing import Any
 from app.cli.arguments import EXIT_BAD_INPUT, EXIT_OK, path_argument
 from app.document.storing.recovery import Recovery, look_for_recovery
 from app.document.storing.replay import replayed
-from app.project.project_access import repair_project
+from app.project.opening.project_access import repair_project
 from app.training.service import Launch
 from engine.storage.json_files import json_text
 

@@ -7,12 +7,12 @@ from datetime import datetime
 from typing import Any
 
 from app.cli.arguments import EXIT_OK, path_argument
-from app.project.clip_versions import ClipVersion, list_versions, restore_version, why_not
+from app.project.clips.clip_versions import ClipVersion, list_versions, restore_version, why_not
 from app.project.disk.room import WHAT, make_room, room_of
 from app.project.disk.use import DiskUse, disk_use
-from app.project.opening import open_capture_of
+from app.project.opening.opening import open_capture_of
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.psnr_words import psnr_words
 from app.training.service import Launch
 from engine.errors import ProjectError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.cli.terminal.progress import ProgressLine
 from app.evaluation.headless import ClipOutcome
 from app.plan.planning import begin_text, compared_text, plan_clip
-from app.project.clip_catalog import ClipCatalog
+from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.psnr_words import psnr_words
 from app.status import TrainingStatus

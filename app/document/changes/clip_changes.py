@@ -1,7 +1,7 @@
 """Other clips: where they are cut, and which of them the others inherit from. Documents in, documents out.
 
-Files of clips are named by their frames (app.project.clip_names), so that nothing on disk has to follow: a clip that
-keeps its frames keeps its files, and those of one that is gone are there again when the change is taken back.
+Files of clips are named by their frames (app.project.clips.clip_names), so that nothing on disk has to follow: a clip
+that keeps its frames keeps its files, and those of one that is gone are there again when the change is taken back.
 """
 
 from __future__ import annotations

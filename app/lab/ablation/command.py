@@ -17,7 +17,7 @@ from app.cli.terminal.progress import ProgressLine, row_progress, stage_progress
 from app.cli.terminal.training_lines import show_outcome, show_status
 from app.cli.training_settings import add_training_settings, overrides_of
 from app.export.staging import check_target
-from app.project.project_access import check_settings, default_settings
+from app.project.opening.project_access import check_settings, default_settings
 from app.training.service import Launch
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError

@@ -16,8 +16,8 @@ from app.evaluation.speed.frame_rates import FrameRates, RatesOf, kept_rates
 from app.lab.added.figures import missing, with_added_figures
 from app.lab.flicker import flicker_figures
 from app.lab.pictures import ProjectPictures
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.project.project_facts import read_facts
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import CaptureError, ProjectError

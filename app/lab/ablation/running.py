@@ -22,8 +22,8 @@ from app.lab.ablation.curves import curves_of
 from app.lab.ablation.measuring import Measured, Scope, kept_figures, measure
 from app.lab.ablation.table import DEFINITION, VariantResult, as_csv, summarize
 from app.lab.ablation.variants import Variant, rank, settings_of, variant_called
+from app.project.opening.project_access import check_settings, create_project, open_project
 from app.project.project import Project
-from app.project.project_access import check_settings, create_project, open_project
 from app.status import TrainingStatus
 from app.training.messages import Event
 from app.training.service import Launch, TrainingService

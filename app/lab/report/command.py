@@ -8,7 +8,7 @@ from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
 from app.cli.frame_rate_arguments import add_no_fps, wanted_rates
 from app.cli.terminal.progress import ProgressLine, stage_progress
 from app.export.staging import check_target
-from app.project.project_access import read_settings
+from app.project.opening.project_access import read_settings
 from app.training.service import Launch
 
 

@@ -8,7 +8,7 @@ from app.lab.report.measured import MAX_CLIP_COLUMNS
 from app.lab.report.page.parts import Figure, Section
 from app.lab.report.page.spans import spans_text
 from app.lab.report.page.tables import Table, TableColumn
-from app.project.clip_bytes import COMPONENT_NAMES
+from app.project.clips.clip_bytes import COMPONENT_NAMES
 from app.project.project_facts import ProjectFacts
 from app.training.stage_watch import KEEPING, TRAINING
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.project.clip_names import PROGRAM_NAME
+from app.project.clips.clip_names import PROGRAM_NAME
 from app.project.disk.room import Room, make_room
 from app.project.disk.use import files_of
 from app.project.project import Project

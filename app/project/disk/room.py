@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.project.clip_versions import list_versions, version_path
+from app.project.clips.clip_versions import list_versions, version_path
 from app.project.disk.use import unused_files
 from app.project.project import Project
 from engine.errors import ProjectError

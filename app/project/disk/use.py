@@ -8,8 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.project.clip_names import PROGRAM_NAME
-from app.project.clip_versions import DAMAGED
+from app.project.clips.clip_names import PROGRAM_NAME
+from app.project.clips.clip_versions import DAMAGED
 from app.project.project import Project
 
 

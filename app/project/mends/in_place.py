@@ -1,7 +1,7 @@
 """Mended clips take the place of what they were, all of them or none; and the way back.
 
-What they were are versions like any other (app.project.clip_versions). Files are replaced one after the other; while
-that happens, mends/unfinished.json says so, and whoever opens the project next after a crash takes it back.
+What they were are versions like any other (app.project.clips.clip_versions). Files are replaced one after the other;
+while that happens, mends/unfinished.json says so, and whoever opens the project next after a crash takes it back.
 """
 
 from __future__ import annotations
@@ -13,7 +13,14 @@ from pathlib import Path
 
 from msgspec.structs import replace as with_entries
 
-from app.project.clip_versions import forget_oldest, list_versions, remove_version, restore_version, set_aside, why_not
+from app.project.clips.clip_versions import (
+    forget_oldest,
+    list_versions,
+    remove_version,
+    restore_version,
+    set_aside,
+    why_not,
+)
 from app.project.mends.record import (
     UNFINISHED,
     MendedClip,

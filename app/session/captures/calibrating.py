@@ -9,7 +9,7 @@ from typing import Any
 
 from app.background.jobs import Job, JobContext, Jobs
 from app.calibration.job import CalibrationOutcome, CalibrationRequest, calibration_work, written
-from app.project.capture_report import refusal_of
+from app.project.opening.capture_report import refusal_of
 from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
 from app.status import JobStatus
 from engine.calibration.calibrated import Calibration

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from app.project.capture_report import RefusedFolder
+from app.project.opening.capture_report import RefusedFolder
 
 State = Literal["looking", "asking", "running", "done"]
 

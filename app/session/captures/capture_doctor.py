@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from app.background.jobs import Job, JobContext, Jobs
 from app.background.latest import LatestWorker
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.session.captures.doctor_status import DoctorStatus
 from app.session.commands import OpenCapture
 from app.session.examining_process import examine_apart

@@ -12,8 +12,8 @@ from app.plan.opening_forecast import forecast_opening
 from app.plan.speed import known_step_time, step_time
 from app.playback.capture_pictures import downsized
 from app.playback.modes.arrays import Picture
-from app.project.capture_report import RefusedFolder, refusal_of, report_of
-from app.project.opening_answers import LastAnswers, OpeningAnswers, default_answers
+from app.project.opening.capture_report import RefusedFolder, refusal_of, report_of
+from app.project.opening.opening_answers import LastAnswers, OpeningAnswers, default_answers
 from app.session.questions import OpeningPage
 from app.status import OpeningForecast
 from engine.capture.capture import Capture

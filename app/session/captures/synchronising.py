@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from app.background.jobs import Job, JobContext, Jobs
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
 from app.status import JobStatus
 from engine.capture.capture import Capture

@@ -8,11 +8,11 @@ from datetime import datetime
 from app.background.jobs import JobContext, Jobs
 from app.document.changes.clip_changes import with_merge, with_reference, with_split
 from app.document.project_document import ProjectDocument
-from app.project.clip_catalog import ClipCatalog
-from app.project.clip_versions import best_version, list_versions, why_not
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.clips.clip_versions import best_version, list_versions, why_not
 from app.project.disk.room import WHAT, make_room, room_of
 from app.project.disk.use import DiskUse
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.psnr_words import psnr_words
 from app.session.clips.clip_commands import (

@@ -8,8 +8,8 @@ from dataclasses import replace
 from app.applying.applying import NAME, StagedClips, edits_after, exchange_staged, stage
 from app.applying.deletions import Deletions, find_deletions
 from app.background.jobs import JobContext, Jobs
-from app.project.clip_exchange import give_up_exchange
-from app.project.opened_project import OpenedProject
+from app.project.clips.clip_exchange import give_up_exchange
+from app.project.opening.opened_project import OpenedProject
 from app.session.clips.clip_commands import ApplyDeletions
 from app.session.clips.clip_questions import DeletionsQuestion
 from app.session.editing.kept_document import KeptDocument

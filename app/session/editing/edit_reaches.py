@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from app.project.clip_anchors import clip_anchors
+from app.project.clips.clip_anchors import clip_anchors
 from app.training.service import TrainingService
 from engine.editing.edit import Edit
 from engine.editing.reach import ClipAnchors, Reach, reach_of_edit

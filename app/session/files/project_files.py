@@ -9,7 +9,7 @@ from typing import TypeVar
 from app.background.jobs import Job, JobContext, Jobs
 from app.document.storing.recovery import DamagedProject
 from app.export.show_in_folder import show_in_folder
-from app.project.opening import LostCapture, OtherCapture
+from app.project.opening.opening import LostCapture, OtherCapture
 from app.project.project import Project
 from app.project.project_copy import copy_bytes, copy_project
 from app.session.commands import OpenCapture, OpenProject

@@ -11,7 +11,7 @@ from app.mending.mend_project import MendOutcome, mend_work
 from app.mending.request import MendRequest
 from app.playback.timeline import Timeline
 from app.project.mends.in_place import as_cut_now, take_back, version_before
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.session.clips.clip_commands import CompareVersion
 from app.session.clips.comparing import show_version
 from app.session.mending.mend_commands import (

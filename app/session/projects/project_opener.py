@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.background.jobs import JobContext, Jobs
-from app.project.opening import Opened, open_for_window
+from app.project.opening.opening import Opened, open_for_window
 from app.project.projects_folder import projects_dir
 from app.project.recents import RecentProject
 from app.session.commands import OpenCapture, OpenProject
@@ -57,7 +57,7 @@ class ProjectOpener:
         recent: Sequence[RecentProject],
         known: Capture | None = None,
     ) -> None:
-        """Open something; see app.project.opening for what that means.
+        """Open something; see app.project.opening.opening for what that means.
 
         Args:
             current: Folder of the project that is open now.

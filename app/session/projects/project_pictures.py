@@ -14,7 +14,7 @@ from app.playback.modes.arrays import Picture
 from app.playback.modes.view_modes import PLAIN
 from app.playback.render import Look, RenderRequest, render
 from app.playback.views.orbit_view import OrbitView
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.project.project_picture import SIZE, picture_path, read_picture, write_picture
 from engine.backends.table import process_backend
 from engine.kernels.cache import is_cache_warm

@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from app.background.jobs import Jobs
-from app.project.clip_catalog import ClipCatalog
-from app.project.opened_project import OpenedProject
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opened_project import OpenedProject
 from app.project.projects_folder import project_name
 from app.project.recents import RecentProject, missing_folders
 from app.session.projects.project_pictures import ProjectPictures

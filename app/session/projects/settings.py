@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from app.export.export_choices import ExportChoices
-from app.project.opening_answers import LastAnswers
+from app.project.opening.opening_answers import LastAnswers
 from app.project.recents import RecentProject, read_recents, recents_document, with_entry
 from app.training.messages import LIVE_VIEWS
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json

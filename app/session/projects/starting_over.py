@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from app.background.jobs import JobContext, Jobs
 from app.project.disk.discarding import discard, training_of
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.session.editing.kept_document import KeptDocument
 from app.session.notices import Notices
 from app.session.questions import Question, StartOverQuestion

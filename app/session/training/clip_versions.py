@@ -13,9 +13,9 @@ from datetime import datetime
 
 from app.background.jobs import JobContext, Jobs
 from app.background.latest import LatestWorker
-from app.project import clip_versions
-from app.project.clip_versions import ClipVersion
-from app.project.opened_project import OpenedProject
+from app.project.clips import clip_versions
+from app.project.clips.clip_versions import ClipVersion
+from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.notices import Notices
 from app.status import VersionStatus

@@ -11,8 +11,8 @@ from app.background.jobs import JobContext, Jobs
 from app.plan.next_plan import NextPlan
 from app.plan.sequence import SequencePlan
 from app.playback.modes.arrays import AnchorArrays
-from app.project.clip_catalog import ClipCatalog
-from app.project.opened_project import OpenedProject
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opened_project import OpenedProject
 from app.session.notices import Notices
 from app.session.questions import RetrainQuestion, retrain_question
 from app.session.training.training_notices import tell

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from app.project.clip_catalog import ClipCatalog
-from app.project.opened_project import OpenedProject
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opened_project import OpenedProject
 from app.session.questions import OwnSetting, SettingsQuestion, retrain_question
 from app.training.own_settings import derived_value, offered
 from engine.errors import ProjectError

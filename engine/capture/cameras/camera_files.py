@@ -19,7 +19,7 @@ from engine.capture.files.frame_files import (
     plain_name,
 )
 from engine.capture.files.places import place_in
-from engine.capture.format_checks import shortened
+from engine.capture.layout.format_checks import shortened
 from engine.errors import CaptureError
 from engine.text import shown
 

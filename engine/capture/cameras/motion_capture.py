@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.assembling import assemble
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, Files, listed, natural_key
 from engine.capture.files.frame_search import FrameSearch
-from engine.capture.findings import Findings
-from engine.capture.format_checks import is_name, parse_size, shortened, size_problem
-from engine.capture.format_result import MATCH, Layout, Probe
+from engine.capture.layout.assembling import assemble
+from engine.capture.layout.findings import Findings
+from engine.capture.layout.format_checks import is_name, parse_size, shortened, size_problem
+from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.errors import CaptureError
 from engine.storage.xml_files import XmlElement, XmlError, read_xml
 from engine.text import shown

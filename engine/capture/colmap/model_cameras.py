@@ -12,7 +12,7 @@ from engine.camera.lens import Lens
 from engine.capture.colmap.camera_models import calibration_of
 from engine.capture.colmap.model_files import ColmapImage, ColmapModel, has_model, read_model
 from engine.capture.files.frame_files import natural_key
-from engine.capture.format_checks import parse_size, shortened, size_problem
+from engine.capture.layout.format_checks import parse_size, shortened, size_problem
 from engine.errors import CaptureError
 from engine.text import shown
 

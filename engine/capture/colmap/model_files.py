@@ -19,7 +19,7 @@ import numpy as np
 
 from engine.capture.colmap.camera_models import BY_NAME, MODELS, UNREAD_PARAMS
 from engine.capture.files.places import MAX_NAME_BYTES
-from engine.capture.limits import MAX_CAMERA_ID
+from engine.capture.layout.limits import MAX_CAMERA_ID
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 from engine.text import shown

@@ -9,7 +9,7 @@ from pathlib import Path
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, Files, folders_in, frames_in_folder, listed, plain_name
 from engine.capture.files.places import place_in
 from engine.capture.files.recording_names import by_order, by_pattern, by_serial, folder_names
-from engine.capture.format_checks import shortened
+from engine.capture.layout.format_checks import shortened
 from engine.errors import CaptureError
 from engine.text import shown
 

@@ -22,7 +22,7 @@ import numpy as np
 from PIL import Image
 
 from engine.capture.cameras.orientation import UPRIGHT, Turn, may_be_turned, turn_of_frame
-from engine.capture.limits import MAX_PIXELS
+from engine.capture.layout.limits import MAX_PIXELS
 from engine.errors import CaptureError
 from engine.storage.files import check_regular, open_regular
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from engine.capture.files.frame_files import natural_key, plain_name
-from engine.capture.format_checks import shortened
+from engine.capture.layout.format_checks import shortened
 from engine.errors import CaptureError
 from engine.text import shown
 

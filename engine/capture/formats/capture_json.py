@@ -15,13 +15,13 @@ import numpy as np
 from msgspec import Meta
 
 from engine.camera.lens import PARAMETER_NAMES, Lens, LensModel
-from engine.capture.assembling import assemble
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.files.frame_files import image_files
 from engine.capture.files.places import place_in
-from engine.capture.format_checks import check_fps, is_name, parse_matrix, read_json_object
-from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.limits import MAX_SIDE
+from engine.capture.layout.assembling import assemble
+from engine.capture.layout.format_checks import check_fps, is_name, parse_matrix, read_json_object
+from engine.capture.layout.format_result import MATCH, Layout, Probe
+from engine.capture.layout.limits import MAX_SIDE
 from engine.capture.pixels.frame_fit import FrameFit
 from engine.errors import CaptureError
 from engine.storage.typed_json import EntryError, to_type

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from engine.capture.assembling import assemble
 from engine.capture.cameras.camera_files import find_camera_frames, missing_frames
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.colmap.model_cameras import ModelRig, find_model, read_rig
 from engine.capture.files.frame_files import Files
-from engine.capture.format_checks import shortened
-from engine.capture.format_result import MATCH, Layout, Probe
+from engine.capture.layout.assembling import assemble
+from engine.capture.layout.format_checks import shortened
+from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.capture.points import points_that_came
 from engine.text import shown
 

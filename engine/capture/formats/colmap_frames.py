@@ -14,9 +14,9 @@ from pathlib import Path
 from engine.capture.cameras.camera_files import match_names
 from engine.capture.colmap.model_cameras import ModelRig, find_model, read_rig
 from engine.capture.files.frame_files import IMAGE_SUFFIXES, Files, folders_in, images_in, listed
-from engine.capture.format_checks import shortened
-from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.formats.colmap import layout_of
+from engine.capture.layout.format_checks import shortened
+from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.errors import CaptureError
 from engine.text import shown
 

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from engine.camera.lens import Lens
-from engine.capture.assembling import assemble
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.cameras.opencv_numbers import rotation_matrix
 from engine.capture.files.frame_files import natural_key
 from engine.capture.files.frame_search import FrameSearch
-from engine.capture.findings import Findings
-from engine.capture.format_checks import is_name, parse_matrix, parse_size, read_json_list, size_problem
-from engine.capture.format_result import MATCH, Layout, Probe
+from engine.capture.layout.assembling import assemble
+from engine.capture.layout.findings import Findings
+from engine.capture.layout.format_checks import is_name, parse_matrix, parse_size, read_json_list, size_problem
+from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.errors import CaptureError
 from engine.text import shown
 

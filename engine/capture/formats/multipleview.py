@@ -13,9 +13,9 @@ from engine.capture.cameras.camera_files import match_names
 from engine.capture.colmap.model_cameras import find_model, read_rig
 from engine.capture.colmap.model_files import has_model
 from engine.capture.files.frame_files import Files, folders_in, frames_in_folder
-from engine.capture.format_checks import check_equal_counts, shortened
-from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.formats.colmap import layout_of
+from engine.capture.layout.format_checks import check_equal_counts, shortened
+from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.errors import CaptureError
 from engine.text import shown
 

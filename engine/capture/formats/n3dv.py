@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.assembling import assemble
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.files.frame_files import (
     IMAGE_SUFFIXES,
@@ -25,8 +24,9 @@ from engine.capture.files.frame_files import (
     natural_key,
 )
 from engine.capture.files.places import place_in
-from engine.capture.format_checks import check_equal_counts, parse_size, size_problem
-from engine.capture.format_result import MATCH, Layout, Probe
+from engine.capture.layout.assembling import assemble
+from engine.capture.layout.format_checks import check_equal_counts, parse_size, size_problem
+from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.capture.points import points_that_came
 from engine.errors import CaptureError
 from engine.storage.npy_files import NpyError, read_npy

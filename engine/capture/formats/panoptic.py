@@ -17,7 +17,8 @@ import numpy as np
 from engine.capture.files.duplicates import CameraFiles, check_duplicates
 from engine.capture.files.media import ImageHeader, read_image_header
 from engine.capture.files.places import place_in
-from engine.capture.format_checks import (
+from engine.capture.frames import ImageFrames
+from engine.capture.layout.format_checks import (
     check_equal_counts,
     check_image_header,
     check_K,
@@ -30,9 +31,8 @@ from engine.capture.format_checks import (
     shortened,
     size_problem,
 )
-from engine.capture.format_result import MATCH, CameraEntry, Layout, Probe
-from engine.capture.frames import ImageFrames
-from engine.capture.limits import MAX_CAMERA_ID
+from engine.capture.layout.format_result import MATCH, CameraEntry, Layout, Probe
+from engine.capture.layout.limits import MAX_CAMERA_ID
 from engine.capture.points import points_that_came
 from engine.errors import CaptureError
 

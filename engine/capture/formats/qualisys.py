@@ -24,7 +24,7 @@ from engine.capture.cameras.motion_capture import (
 )
 from engine.capture.cameras.opencv_numbers import lens_of
 from engine.capture.files.frame_files import Files
-from engine.capture.format_result import Layout, Probe
+from engine.capture.layout.format_result import Layout, Probe
 from engine.errors import CaptureError
 from engine.storage.xml_files import XmlElement
 

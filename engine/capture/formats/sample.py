@@ -14,7 +14,8 @@ from typing import Any
 from engine.capture.files.duplicates import CameraFiles, check_duplicates
 from engine.capture.files.media import VideoHeader, read_video_header
 from engine.capture.files.places import place_in
-from engine.capture.format_checks import (
+from engine.capture.frames import VideoFrames, is_turned_as_calibrated
+from engine.capture.layout.format_checks import (
     check_equal_counts,
     check_fps,
     check_image_size,
@@ -30,8 +31,7 @@ from engine.capture.format_checks import (
     shortened,
     size_problem,
 )
-from engine.capture.format_result import MATCH, CameraEntry, Layout, Probe
-from engine.capture.frames import VideoFrames, is_turned_as_calibrated
+from engine.capture.layout.format_result import MATCH, CameraEntry, Layout, Probe
 from engine.errors import CaptureError
 from engine.text import shown
 

@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 
 from engine.camera.lens import Lens
-from engine.capture.assembling import assemble
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.cameras.motion_capture import calibrations
 from engine.capture.cameras.opencv_numbers import lens_of, pose_of, shifted
 from engine.capture.files.frame_files import Files, listed, natural_key
 from engine.capture.files.frame_search import FrameSearch
 from engine.capture.files.recording_names import folder_names
-from engine.capture.findings import Findings
-from engine.capture.format_checks import is_name, parse_matrix, parse_size, shortened, size_problem
-from engine.capture.format_result import MATCH, Layout, Probe
+from engine.capture.layout.assembling import assemble
+from engine.capture.layout.findings import Findings
+from engine.capture.layout.format_checks import is_name, parse_matrix, parse_size, shortened, size_problem
+from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.capture.times.frame_times import TIMES_FILE, read_frame_times_table
 from engine.errors import CaptureError
 from engine.storage.files import read_bytes

@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from engine.capture.assembling import assemble
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.cameras.transforms_numbers import K_of, lens_of, world_to_camera_of
 from engine.capture.files.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Files, images_in, listed
 from engine.capture.files.frame_search import FrameSearch
 from engine.capture.files.media import read_image_header
 from engine.capture.files.places import place_in
-from engine.capture.findings import Findings
-from engine.capture.format_checks import check_fps, parse_matrix, parse_size, read_json_object, size_problem
-from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.grouped_frames import FrameGroup, ListedFrame, grouped, time_faults
+from engine.capture.layout.assembling import assemble
+from engine.capture.layout.findings import Findings
+from engine.capture.layout.format_checks import check_fps, parse_matrix, parse_size, read_json_object, size_problem
+from engine.capture.layout.format_result import MATCH, Layout, Probe
+from engine.capture.layout.grouped_frames import FrameGroup, ListedFrame, grouped, time_faults
 from engine.errors import CaptureError
 from engine.text import shown
 

@@ -26,7 +26,7 @@ from engine.capture.cameras.motion_capture import (
     whole_size,
 )
 from engine.capture.files.frame_files import Files
-from engine.capture.format_result import Layout, Probe
+from engine.capture.layout.format_result import Layout, Probe
 from engine.errors import CaptureError
 from engine.storage.xml_files import XmlElement
 

@@ -14,9 +14,9 @@ import numpy as np
 from engine.capture.files.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, images_in, listed
 from engine.capture.files.media import read_image_header, read_video_header
 from engine.capture.files.places import place_in
-from engine.capture.format_checks import raise_problems, shortened
-from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames
+from engine.capture.layout.format_checks import raise_problems, shortened
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.errors import CaptureError
 
 FOLDER = "masks"

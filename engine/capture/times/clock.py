@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.capture.frames import FrameSource, IndexedFrames
-from engine.capture.limits import FPS_RANGE
+from engine.capture.layout.limits import FPS_RANGE
 from engine.errors import CaptureError
 from engine.text import rate_text
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from engine.capture.files.media import read_frame_times
-from engine.capture.format_result import CameraEntry
 from engine.capture.frames import FrameSource, IndexedFrames, VideoFrames
+from engine.capture.layout.format_result import CameraEntry
 from engine.capture.times.clock import common_clock
 from engine.errors import CaptureError
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from engine.capture.format_checks import read_json_object
-from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.formats.capture_json import FILE, SCHEMA
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
+from engine.capture.layout.format_checks import read_json_object
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.pixels.frame_fit import FrameFit
 from engine.capture.writers.frame_files import name_in
 from engine.errors import CaptureError

@@ -9,8 +9,8 @@ import numpy as np
 
 from engine.camera.rotations import quats_of
 from engine.capture.colmap.camera_models import MODELS, model_of
-from engine.capture.format_result import Layout
 from engine.capture.frames import ImageFrames
+from engine.capture.layout.format_result import Layout
 from engine.capture.points import CapturePoints
 from engine.capture.writers.frame_files import plain_source, safe_names
 from engine.capture.writers.point_files import write_colmap_points

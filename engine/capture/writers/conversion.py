@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import VideoFrames
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.points import points_of, said_of
 from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.capture.writers.colmap import write_colmap

@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from PIL import Image
 
-from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.errors import CaptureError
 from engine.storage.files import check_regular
 

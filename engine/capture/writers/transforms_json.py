@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from engine.camera.lens import Lens
-from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import ImageFrames
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.points import CapturePoints
 from engine.capture.writers.frame_files import name_in, plain_source
 from engine.capture.writers.point_files import write_ply

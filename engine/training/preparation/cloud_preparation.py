@@ -21,7 +21,7 @@ from engine.capture.came_along import came_along
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, exclusion_key
-from engine.capture.format_result import Layout
+from engine.capture.layout.format_result import Layout
 from engine.capture.points import points_of
 from engine.cloud.background.background import estimate_background
 from engine.cloud.background.exposure import Exposure

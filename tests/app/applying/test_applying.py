@@ -15,10 +15,10 @@ from app.applying.applying import apply_permanently, stage
 from app.applying.deletions import find_deletions
 from app.evaluation.headless import TrainedProject, open_trained
 from app.export.scene_frames import SceneFrames
-from app.project import clip_exchange
-from app.project.clip_versions import list_versions, restore_version, set_aside
+from app.project.clips import clip_exchange
+from app.project.clips.clip_versions import list_versions, restore_version, set_aside
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from engine.clip_files.array_names import LOG_DRIFT
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.editing.actions import Delete, Expose, Hide, Recolor, Smooth, Transform

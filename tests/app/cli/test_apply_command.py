@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.clip_files.clip_state import read_clip_state
 from engine.editing.actions import Delete
 from engine.editing.edit import Edit, Picked, PickedRows

@@ -6,7 +6,7 @@ import pytest
 
 from app.cli.commands import COMMANDS
 from app.export.staging import check_target
-from app.project.project_access import read_settings
+from app.project.opening.project_access import read_settings
 from engine.errors import ProjectError
 from tests.app.fakes import write_capture
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from app.project.clip_versions import set_aside
+from app.project.clips.clip_versions import set_aside
+from app.project.opening.project_access import create_project, default_settings, open_project
 from app.project.project import Project
-from app.project.project_access import create_project, default_settings, open_project
 from engine.capture.capture import open_capture
 from tests.app.made_projects import clip_header, write_header
 

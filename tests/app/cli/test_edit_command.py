@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.edit import Box, Everything, Scope, Sphere
 from tests.app.made_projects import make_project

@@ -7,7 +7,7 @@ import pytest
 
 from app.cli.cli import main
 from app.document.project_settings import ProjectSettings
-from app.project.project_access import create_project
+from app.project.opening.project_access import create_project
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from engine.gate.reasons import STILL
 from engine.gate.regions import GateRegion

@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from app.project.capture_report import report_of
+from app.project.opening.capture_report import report_of
 from engine.capture.capture import open_capture
 from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.clip_files.clip_state import read_clip_state, write_clip_state

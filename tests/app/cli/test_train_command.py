@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.cli.cli import main
-from app.project.project_access import open_project, read_settings
+from app.project.opening.project_access import open_project, read_settings
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.fakes import N_STEPS, make_fake, write_capture
 

@@ -19,8 +19,8 @@ from app.command_text.step_command import step_command
 from app.document.changes.note_changes import put_marker, set_label
 from app.document.changes.world_changes import set_scale
 from app.document.project_document import ProjectDocument, World
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.scripting import scripted_project
 from engine.capture.exclusions import ExcludedFrames, Exclusions
 from engine.editing.actions import Delete, Hide

@@ -10,7 +10,7 @@ from app.document.changes.clip_changes import with_merge, with_reference, with_s
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.storing.stored_document import document_of, plain_document
-from app.project.clip_names import clip_name
+from app.project.clips.clip_names import clip_name
 from engine.errors import ProjectError
 
 N = 40

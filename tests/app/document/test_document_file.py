@@ -18,7 +18,7 @@ from app.document.project_document import (
 from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import BACKUP_FILE, MAX_DOCUMENT_BYTES, read_document, write_document
 from app.document.storing.stored_document import plain_document
-from app.project.project_access import create_project, open_project
+from app.project.opening.project_access import create_project, open_project
 from engine.camera.path_presets import turntable
 from engine.capture.exclusions import ExcludedFrames, Exclusions, PaintedMask, Stroke
 from engine.editing.actions import Delete, Expose, Transform

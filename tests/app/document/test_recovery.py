@@ -11,7 +11,7 @@ from app.document.storing.document_store import DocumentStore
 from app.document.storing.journal_file import read_journal
 from app.document.storing.recovery import look_for_recovery, plain_history, recover
 from app.document.storing.replay import journal_path, journal_steps
-from app.project.project_access import create_project, open_project, repair_project
+from app.project.opening.project_access import create_project, open_project, repair_project
 from engine.errors import ProjectError
 from tests.app.document.documents import EMPTY, SETTINGS, as_bytes, random_events
 

@@ -12,7 +12,7 @@ from app.evaluation.speed import window_drawing
 from app.evaluation.speed.frame_rates import RATES_FILE, FrameRates, frame_rates, kept_rates
 from app.evaluation.speed.laps import ENOUGH_LAPS, ENOUGH_S, Lap, Rate, camera_of, enough, frames_of, rate_of
 from app.evaluation.speed.window_drawing import Drawn, draw_with, drawn_laps, read_said, said_by
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import change_header, train
 

@@ -18,7 +18,7 @@ from app.cli.cli import main
 from app.evaluation.evaluation import ClipMeasuring, evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.kept_figures import KeptFigures
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.metrics.clips.seams import PairRow
 from engine.metrics.clips.summary import EvalRow
 from engine.metrics.columns import COLUMNS

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.evaluation.headless import TrainedProject, open_trained
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from tests.app.residuals.conftest import make_project
 
 

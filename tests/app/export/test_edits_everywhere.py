@@ -28,8 +28,8 @@ from app.export.video.render import render_video
 from app.playback.frame_decoder import ShownFrame
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.project.opened_project import opened_project
-from app.project.project_access import open_project
+from app.project.opening.opened_project import opened_project
+from app.project.opening.project_access import open_project
 from app.training.service import ShownState
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.edit import Edit, Everything, Picked, PickedRows, Scope, Sphere, Target

@@ -18,7 +18,7 @@ from app.export.export_process import ExportProcess
 from app.export.export_progress import ExportProgress
 from app.export.export_worker import Wanted
 from app.export.metrics_job import MetricsJob
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.storage.files import PARTIAL_PREFIX
 
 DEADLINE_S = 120.0

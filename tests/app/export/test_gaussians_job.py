@@ -21,7 +21,7 @@ from app.export.export_progress import ExportCancelled, ExportProgress
 from app.export.gaussian_files import GaussianFile, base_name, moment_files, static_file
 from app.export.gaussians_job import GaussiansJob, estimate, run
 from app.export.scene_frames import Part, SceneFrames
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.splats import Splats
@@ -163,7 +163,7 @@ def test_names_are_those_of_sequences():
 
 def test_a_project_with_another_name_gives_it_to_its_files(project: Path, tmp_path: Path):
     from app.evaluation.headless import open_trained
-    from app.project.project_access import open_project
+    from app.project.opening.project_access import open_project
 
     renamed = project.rename(tmp_path / "Tänzer 数 100%s {x}")
     opened = open_trained(open_project(renamed, is_writable=False))

@@ -10,7 +10,7 @@ import pytest
 from app.evaluation.headless import open_trained
 from app.export.player_job import PlayerJob, run
 from app.playback.views.orbit_view import OrbitView
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.camera.rig import CameraRig
 from tests.app.residuals.conftest import make_project
 from tests.browser import Browser, chromium

@@ -10,7 +10,7 @@ from app.playback.ahead import MOST_UNASKED, Ahead
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.playback.views.orbit_view import OrbitView
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.training.service import ShownState
 from tests.app.fakes import write_trained
 

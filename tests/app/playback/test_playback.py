@@ -14,7 +14,7 @@ from app.playback.picture_source import PictureSource
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.playback.views.orbit_view import OrbitView
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.training.service import ShownState
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.images.exposure_curve import to_reference

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.project.capture_report import refusal_of, report_of
+from app.project.opening.capture_report import refusal_of, report_of
 from engine.capture.capture import open_capture
 from engine.errors import CaptureError, OutsideError
 from tests.app.fakes import write_capture

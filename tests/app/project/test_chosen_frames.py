@@ -44,7 +44,7 @@ def test_frames_that_are_not_there_are_refused_and_those_that_are_told(folder: P
 
 def test_another_size_needs_no_file_to_be_read_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = open_capture(folder)
-    monkeypatch.setattr("engine.capture.capture._read_layout", None)
+    monkeypatch.setattr("engine.capture.capture.read_layout", None)
     small = whole.resized(0.5, (1, 3))
     assert small.frame(0, 0).shape == (12, 16, 3)
     assert (small.n_frames, small.scale, small.path) == (2, 0.5, whole.path)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.project.clip_bytes import COMPONENT_NAMES, HEADER, OTHER, component_of, storage_of
+from app.project.clips.clip_bytes import COMPONENT_NAMES, HEADER, OTHER, component_of, storage_of
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from engine.errors import ProjectError
 from tests.app.made_projects import clip_header

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.project.clip_catalog import ClipCatalog, anchor_counts
+from app.project.clips.clip_catalog import ClipCatalog, anchor_counts
 from app.project.project import Project
 from app.training.service import TrainingService
 from engine.capture.clip import split_clips
@@ -92,7 +92,7 @@ def test_each_header_is_read_once_while_its_file_stays(tmp_path: Path, monkeypat
         read.append(path.name)
         return look_at_clip(path)
 
-    monkeypatch.setattr("app.project.header_cache.look_at_clip", counted)
+    monkeypatch.setattr("app.project.clips.header_cache.look_at_clip", counted)
     catalog = ClipCatalog(project, 20)
     assert sorted(read) == [f"{index:04d}.safetensors" for index in range(20)]
     ClipCatalog(project, 20)

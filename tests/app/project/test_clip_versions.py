@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from app.project import clip_versions
-from app.project.clip_catalog import ClipCatalog
-from app.project.clip_versions import (
+from app.project.clips import clip_versions
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.clips.clip_versions import (
     MAX_VERSIONS,
     forget_oldest,
     list_versions,
@@ -20,8 +20,8 @@ from app.project.clip_versions import (
     set_aside,
     version_path,
 )
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from engine.errors import DiskError, ProjectError
 from tests.app.made_projects import clip_header, make_project, write_header
 
@@ -198,7 +198,7 @@ def test_a_disk_that_refuses_leaves_clip_and_versions_as_they_were(
     with pytest.raises(DiskError, match="earlier version"):
         restore_version(project, 0, 1)
     monkeypatch.undo()
-    monkeypatch.setattr("app.project.clip_versions.replace_file", refuse)
+    monkeypatch.setattr("app.project.clips.clip_versions.replace_file", refuse)
     with pytest.raises(DiskError):
         restore_version(project, 0, 1)
     monkeypatch.undo()

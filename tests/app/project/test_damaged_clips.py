@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.document.changes.clip_changes import with_reference
-from app.project.clip_catalog import ClipCatalog
-from app.project.clip_versions import (
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.clips.clip_versions import (
     DAMAGED,
     best_version,
     list_versions,

@@ -12,7 +12,7 @@ import pytest
 from app.document.project_settings import ProjectSettings
 from app.document.storing.kept_json import kept_text, write_kept
 from app.project.folders import FOLDERS
-from app.project.project_access import create_project, open_project, repair_project
+from app.project.opening.project_access import create_project, open_project, repair_project
 from engine.errors import ProjectError
 
 SETTINGS = ProjectSettings(capture="somewhere", fingerprint="abc")

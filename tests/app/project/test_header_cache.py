@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from app.project import header_cache
-from app.project.header_cache import HeaderCache
+from app.project.clips import header_cache
+from app.project.clips.header_cache import HeaderCache
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from tests.app.made_projects import clip_header
 from tests.clip_headers import make_header

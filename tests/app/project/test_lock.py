@@ -17,7 +17,7 @@ import pytest
 from app.document.project_settings import ProjectSettings
 from app.project import lock as module
 from app.project.lock import ProcessLock, boot_id, is_process_alive, machine_id, process_start, read_owner
-from app.project.project_access import create_project, open_project
+from app.project.opening.project_access import create_project, open_project
 from engine.errors import DiskError, ProjectError
 
 ROOT = Path(__file__).resolve().parents[3]

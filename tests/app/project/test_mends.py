@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace as with_entries
 
-from app.project.clip_versions import list_versions, set_aside
+from app.project.clips.clip_versions import list_versions, set_aside
 from app.project.mends import in_place
 from app.project.mends.in_place import as_cut_now, put_in_place, take_back, version_before, why_not_back
 from app.project.mends.record import (
@@ -24,8 +24,8 @@ from app.project.mends.record import (
     records_dir,
     write_record,
 )
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from engine.errors import DiskError, ProjectError
 from engine.mending.figures import Attempt, StretchFigures
 from tests.app.made_projects import clip_header, make_project, write_header

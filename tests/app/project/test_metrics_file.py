@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.project.metrics_file import read_metrics
+from app.project.clips.metrics_file import read_metrics
 from app.project.recents import RecentProject
 from app.session.projects.settings import Settings
 from engine.storage.json_files import checked_line

@@ -7,7 +7,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
-from app.project.opened_project import OpenedProject, opened_project
+from app.project.opening.opened_project import OpenedProject, opened_project
 
 
 def test_it_follows_the_settings_of_the_project(make_opened: Callable[..., OpenedProject]):

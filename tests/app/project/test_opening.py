@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.project.opening import check_capture, open_capture_of, projects_of
-from app.project.project_access import create_project, default_settings
+from app.project.opening.opening import check_capture, open_capture_of, projects_of
+from app.project.opening.project_access import create_project, default_settings
 from app.project.projects_folder import VARIABLE, new_project_dir, projects_dir, usual_project_dir
 from app.project.recents import RecentProject
 from engine.capture.capture import open_capture

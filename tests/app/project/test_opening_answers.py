@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from app.project.opening_answers import LastAnswers, OpeningAnswers, answers_to_keep, default_answers, working_size
+from app.project.opening.opening_answers import (
+    LastAnswers,
+    OpeningAnswers,
+    answers_to_keep,
+    default_answers,
+    working_size,
+)
 from engine.capture.capture import open_capture
 from engine.errors import CaptureError
 from tests.app.fakes import write_capture

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from app.document.project_settings import ProjectSettings
-from app.project.metrics_file import read_metrics
-from app.project.project_access import create_project, default_settings, open_project, read_settings
+from app.project.clips.metrics_file import read_metrics
+from app.project.opening.project_access import create_project, default_settings, open_project, read_settings
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 

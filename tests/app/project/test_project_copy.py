@@ -7,7 +7,7 @@ import pytest
 
 from app.background.jobs import JobCancelled
 from app.document.project_document import Marker
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.project.project_copy import copy_bytes, copy_project
 from engine.errors import ProjectError
 from tests.app.made_projects import make_chain

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from app.project.clip_catalog import ClipCatalog
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.training.build import build_training
 from app.training.curves import read_curves
 from app.training.messages import TrainJob

@@ -13,10 +13,10 @@ from PIL import Image
 
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.project.clip_catalog import ClipCatalog
-from app.project.opened_project import OpenedProject, opened_project
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opened_project import OpenedProject, opened_project
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.residuals.residuals import Residuals
 from app.training.service import ShownState
 from engine.capture.capture import open_capture

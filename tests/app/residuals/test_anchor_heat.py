@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from app.evaluation.headless import open_trained
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.residuals.anchor_heat import MIN_PIXELS, cameras_around
 from app.residuals.heat_map import LEVELS
 from engine.metrics.clips.anchor_shares import anchor_shares, anchors_at

@@ -7,7 +7,7 @@ import pytest
 
 from app.evaluation.evaluation import boundary_maps, evaluate_project
 from app.evaluation.headless import open_trained
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.residuals.figures import mean_excess
 from app.residuals.heat_map import HEAT_KINDS, LEVELS
 from engine.capture.capture import Capture

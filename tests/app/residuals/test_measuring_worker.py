@@ -10,7 +10,7 @@ import pytest
 
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.residuals import measuring_worker
 from app.residuals.figures import ClipFigures, Figures
 from app.residuals.heat_map import LEVELS

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.scripting.scripted_project import open_scripted
 from tests.app.conftest import inline
 from tests.app.residuals.conftest import make_project

@@ -15,8 +15,8 @@ from PIL import Image
 import clipgstream
 from app.document.changes.edit_words import n_picked
 from app.document.changes.note_changes import put_marker
+from app.project.opening.project_access import create_project, default_settings, open_project
 from app.project.project import Project
-from app.project.project_access import create_project, default_settings, open_project
 from app.scripting.scripted_project import ScriptedProject, open_scripted
 from engine.capture.capture import open_capture
 from engine.editing.actions import Delete, Expose, Hide

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import shutil
 
-from app.project.opening_answers import LastAnswers, OpeningAnswers
-from app.project.project_access import read_settings
+from app.project.opening.opening_answers import LastAnswers, OpeningAnswers
+from app.project.opening.project_access import read_settings
 from app.session import commands as c
 from app.session.projects.settings import Settings
 from tests.app.conftest import poll_until

@@ -18,9 +18,9 @@ from app.export.export_progress import ExportResult
 from app.export.jobs.answers import Answers
 from app.export.jobs.table import KINDS
 from app.playback.timeline import Timeline
-from app.project.opened_project import OpenedProject, opened_project
+from app.project.opening.opened_project import OpenedProject, opened_project
+from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.project.project_access import open_project
 from app.scripting.scripted_project import open_scripted
 from app.session import commands
 from app.session.exporting import Exporting, ExportPage

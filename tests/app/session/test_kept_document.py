@@ -12,7 +12,7 @@ import pytest
 from app.document.history import DocumentHistory, Event
 from app.document.project_document import Marker
 from app.document.project_settings import ProjectSettings
-from app.project.project_access import create_project, open_project
+from app.project.opening.project_access import create_project, open_project
 from app.session.editing import kept_document
 from app.session.editing.kept_document import KeptDocument
 

@@ -9,8 +9,8 @@ from functools import partial
 import pytest
 
 from app.background.jobs import Jobs
-from app.project.opened_project import OpenedProject
-from app.project.project_access import open_project
+from app.project.opening.opened_project import OpenedProject
+from app.project.opening.project_access import open_project
 from app.session.notices import Notices
 from app.session.training.live_training import LiveTraining
 from app.training import run

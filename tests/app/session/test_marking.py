@@ -8,7 +8,7 @@ import pytest
 from app.cli.cli import main
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.stored_document import plain_document
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.session import commands as c
 from app.session.marking import effect_text, region_text
 from app.training.build import build_training

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.project.clip_versions import list_versions
+from app.project.clips.clip_versions import list_versions
 from app.project.project import Project
 from app.session import commands as c
 from app.session.clips.clip_commands import ApplyDeletions

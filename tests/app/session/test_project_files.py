@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from app.document.storing.replay import journal_path
-from app.project.project_access import open_project
-from app.project.project_choices import ProjectChoices
+from app.project.opening.project_access import open_project
+from app.project.opening.project_choices import ProjectChoices
 from app.session import commands as c
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, SaveProjectAs
 from app.session.files.file_questions import RecoveryQuestion, RelocationQuestion, SaveAsQuestion, SavingQuestion

@@ -14,7 +14,7 @@ from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture
 from app.playback.render import RenderRequest
 from app.playback.views.orbit_view import OrbitView
 from app.project import project_picture
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.project.project_picture import SIZE, fitted, picture_path, read_picture, write_picture
 from app.session.projects import project_pictures
 from app.session.projects.project_pictures import ProjectPictures

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from app.plan.sequence import ClipForecast, clip_forecast, sequence_forecast, together
-from app.project.clip_catalog import ClipRecord
-from app.project.clip_versions import version_path
+from app.project.clips.clip_catalog import ClipRecord
+from app.project.clips.clip_versions import version_path
 from app.project.project import Project
 from app.session import commands as c
 from app.session.projects.settings import Settings
@@ -269,7 +269,7 @@ def test_the_log_holds_what_program_and_training_said(session: Session) -> None:
 
 
 def test_a_thousand_waiting_clips_are_queued_and_reordered_at_once(tmp_path, monkeypatch) -> None:
-    from app.project.clip_catalog import ClipCatalog
+    from app.project.clips.clip_catalog import ClipCatalog
     from engine.capture.clip import split_clips
     from tests.app.made_projects import make_project
 

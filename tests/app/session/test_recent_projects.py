@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from app.project.clip_catalog import ClipCatalog
-from app.project.opened_project import OpenedProject
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.opening.opened_project import OpenedProject
 from app.session.projects.recent_projects import RecentProjects
 from app.session.projects.settings import Settings
 from tests.app.fakes import write_trained

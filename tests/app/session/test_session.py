@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from app.project.project_access import open_project, read_settings
+from app.project.opening.project_access import open_project, read_settings
 from app.session import commands as c
 from app.session.questions import LeaveQuestion
 from app.status import PlanStatus

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.session.commands import SetClipLength, SetHoldout, SetPreset, SettingCommand, SetTrainSetting
 from app.session.projects.setting_changes import changed_settings
 from engine.errors import EngineError

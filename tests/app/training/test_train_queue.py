@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from app.project.opened_project import OpenedProject
+from app.project.opening.opened_project import OpenedProject
 from app.training import run
 from app.training.messages import ClipTrained, SnapshotWritten, TrainingFailed, TrainJob
 from app.training.own_settings import ALLOWED, offered, with_own
@@ -50,7 +50,7 @@ def six(make_opened: Make) -> OpenedProject:
     """Six clips of one frame."""
     from dataclasses import replace
 
-    from app.project.opened_project import opened_project
+    from app.project.opening.opened_project import opened_project
 
     opened = make_opened()
     opened.project.update(replace(opened.project.settings, clip_length=1))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.capture.files.media import ImageHeader
-from engine.capture.format_checks import (
+from engine.capture.layout.format_checks import (
     check_equal_counts,
     check_fps,
     check_image_header,
@@ -20,7 +20,7 @@ from engine.capture.format_checks import (
     raise_problems,
     shortened,
 )
-from engine.capture.limits import FPS_RANGE, MAX_NAME_LENGTH, MAX_POSITION, MAX_SIDE
+from engine.capture.layout.limits import FPS_RANGE, MAX_NAME_LENGTH, MAX_POSITION, MAX_SIDE
 from engine.errors import CaptureError
 
 PATH = Path("cameras.json")

@@ -17,7 +17,7 @@ from PIL import Image
 
 from engine.capture.capture import open_capture
 from engine.capture.capture_summary import describe
-from engine.capture.limits import MAX_SIDE
+from engine.capture.layout.limits import MAX_SIDE
 from engine.errors import CaptureError
 from tests.engine.capture.layouts import written_transforms
 from tests.engine.capture.layouts.scene import make_scene
@@ -284,7 +284,7 @@ def test_a_message_repeats_no_megabytes(make_sample: MakeCapture) -> None:
 def test_a_file_of_millions_of_numbers_is_refused_before_it_is_parsed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("engine.capture.format_checks.MAX_META_VALUES", 1000)
+    monkeypatch.setattr("engine.capture.layout.format_checks.MAX_META_VALUES", 1000)
     parsed: list[int] = []
     monkeypatch.setattr("engine.storage.json_files.json.loads", lambda *_, **__: parsed.append(1))
     (tmp_path / "transforms.json").write_text(f'{{"frames": [], "x": [{"0," * 1001}0]}}')

@@ -12,7 +12,7 @@ import pytest
 from scipy.ndimage import uniform_filter
 
 from engine.capture.capture import open_capture
-from engine.capture.format_result import CameraEntry
+from engine.capture.layout.format_result import CameraEntry
 
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "caliscope_4cam"
 STATED_PX = 1.1

@@ -16,7 +16,7 @@ import numpy as np
 
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
-from engine.capture.format_result import Layout
+from engine.capture.layout.format_result import Layout
 from engine.synthetic import textures
 from engine.synthetic.rigs import looking_at
 

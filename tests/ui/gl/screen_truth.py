@@ -79,7 +79,7 @@ def compared(
 def main(folder: Path) -> None:
     """Every clip of a project, from twenty random views each."""
     from app.evaluation.headless import open_trained
-    from app.project.project_access import open_project
+    from app.project.opening.project_access import open_project
     from ui.gl import make_headless_context
 
     size = (960, 600)

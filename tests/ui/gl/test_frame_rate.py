@@ -7,7 +7,7 @@ import pytest
 
 from app.evaluation.headless import open_trained
 from app.evaluation.speed.laps import frames_of
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import change_header, train
 from ui import frame_rate

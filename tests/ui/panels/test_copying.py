@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from pyglet.window import key, mouse
 
 from app.cli.cli import main
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from app.session.commands import AskExport, CloseQuestion, OpenProject
 from app.session.editing.edit_commands import AddEdit, PutMarker
 from engine.editing.actions import Delete

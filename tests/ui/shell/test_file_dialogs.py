@@ -11,7 +11,7 @@ from PIL import Image
 from pyglet.window import key
 
 from app.document.storing.recovery import Recovery
-from app.project.project_choices import ProjectChoices
+from app.project.opening.project_choices import ProjectChoices
 from app.session.commands import CloseQuestion, OpenCapture, OpenProject
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, SaveProjectAs, ShowProjectFolder
 from app.session.files.file_questions import (

@@ -14,7 +14,7 @@ from typing import Any
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
-from app.project.project_choices import ProjectChoices
+from app.project.opening.project_choices import ProjectChoices
 from app.session.commands import LookAtVideos, OpenCapture, OpenProject
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme

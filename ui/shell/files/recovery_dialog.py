@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from imgui_bundle import ImVec2, imgui
 
 from app.document.storing.recovery import Recovery
-from app.project.project_choices import ProjectChoices
+from app.project.opening.project_choices import ProjectChoices
 from app.session.commands import CloseQuestion, Command, OpenProject
 from app.session.files.file_commands import ShowProjectFolder
 from app.session.files.file_questions import RecoveryQuestion

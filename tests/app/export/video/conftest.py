@@ -17,7 +17,7 @@ from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
 from app.export.video.render import WrittenVideo, render_video
 from app.export.video.views import camera_view
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.metrics.pictures.colors import to_levels
 from tests.app.stored_project import copy_stored
 

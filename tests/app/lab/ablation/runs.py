@@ -10,7 +10,7 @@ import pytest
 from app.lab.ablation import measuring
 from app.lab.ablation.running import Callbacks, run_ablation
 from app.lab.ablation.variants import VARIANTS, chosen_variants
-from app.project.project_access import default_settings
+from app.project.opening.project_access import default_settings
 from engine.capture.capture import Capture
 from engine.metrics.clips.seams import PairRow
 from tests.app.conftest import inline

@@ -11,8 +11,8 @@ import pytest
 
 from app.document.project_settings import ProjectSettings
 from app.evaluation.headless import open_trained
+from app.project.opening.project_access import create_project, default_settings
 from app.project.project import Project
-from app.project.project_access import create_project, default_settings
 from app.training.messages import TrainJob
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state

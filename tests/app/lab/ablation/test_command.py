@@ -8,7 +8,7 @@ import pytest
 
 from app.lab.ablation.running import project_folder
 from app.lab.ablation.variants import FULL, VARIANTS
-from app.project.project_access import read_settings
+from app.project.opening.project_access import read_settings
 from tests.app.lab.ablation.runs import BY_NAME
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.project.project_access import read_settings
+from app.project.opening.project_access import read_settings
 from engine.training.config import TrainConfig
 from engine.training.presets import PRESETS, preset
 

@@ -16,7 +16,7 @@ from app.lab.ablation.measuring import MEASURED_FILE
 from app.lab.ablation.running import RESULT_FILE, TABLE_FILE, project_folder
 from app.lab.ablation.table import as_text
 from app.lab.ablation.variants import FULL, with_source_steps
-from app.project.project_access import open_project, read_settings
+from app.project.opening.project_access import open_project, read_settings
 from engine.errors import ProjectError, TrainingError
 from tests.app.fakes import make_fake
 from tests.app.lab.ablation.runs import BASE, BY_NAME

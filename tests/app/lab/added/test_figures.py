@@ -15,7 +15,7 @@ from app.lab.added import figures, lpips, tof
 from app.lab.added.figures import COLUMNS, with_added_figures
 from app.lab.added.tof import MissingPackage
 from app.lab.flicker import FLOW_FIGURES, flicker_figures
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.metrics.pictures.colors import to_levels
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import Measure, change_header, train

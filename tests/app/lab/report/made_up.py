@@ -14,7 +14,7 @@ import numpy as np
 from app.evaluation.evaluation import Frames, Scope
 from app.evaluation.headless import TrainedProject
 from app.lab.report.write import write_report
-from app.project.project_access import create_project, default_settings
+from app.project.opening.project_access import create_project, default_settings
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from engine.metrics.clips.seams import PairRow, SeamMaps

@@ -11,7 +11,7 @@ from app.evaluation.headless import open_trained
 from app.lab.report.measured import N_PICTURES
 from app.lab.report.page.labels import FIGURE_LABELS
 from app.lab.report.seam_parts import N_BOUNDARIES
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.clip_files.clip_state import read_clip_header
 from engine.metrics.clips.seams import PairRow
 from engine.metrics.columns import COLUMNS

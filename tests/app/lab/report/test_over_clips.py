@@ -10,7 +10,7 @@ from PIL import Image
 
 from app.evaluation.headless import open_trained
 from app.lab.report.over_clips import ClipExposure, exposures_of, over_clips_section
-from app.project.project_access import open_project
+from app.project.opening.project_access import open_project
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from tests.app.lab.report.made_up import train
 from tests.clip_headers import with_header

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.document.changes.clip_changes import with_merge
-from app.project.clip_versions import set_aside
+from app.project.clips.clip_versions import set_aside
 from app.project.disk.room import WHAT, make_room, room_of
 from app.project.disk.use import disk_use
 from app.project.project import Project

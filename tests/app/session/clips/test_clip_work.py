@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from app.project.clip_versions import DAMAGED, version_path
+from app.project.clips.clip_versions import DAMAGED, version_path
 from app.project.project import Project
 from app.session import commands as c
 from app.session.clips.clip_commands import (

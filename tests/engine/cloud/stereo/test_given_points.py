@@ -11,7 +11,7 @@ import pytest
 
 from engine.camera.projection import unproject
 from engine.camera.rig import CameraRig
-from engine.capture.format_result import Layout
+from engine.capture.layout.format_result import Layout
 from engine.capture.points import CapturePoints
 from engine.capture.writers.point_files import write_ply
 from engine.cloud.stereo import static_cloud as clouds

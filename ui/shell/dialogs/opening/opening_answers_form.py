@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
 
-from app.project.capture_report import CaptureReport
-from app.project.opening_answers import OpeningAnswers
+from app.project.opening.capture_report import CaptureReport
+from app.project.opening.opening_answers import OpeningAnswers
 from app.session.questions import OpeningPage
 from app.session.session_view import OpeningView
 from app.status import OpeningForecast

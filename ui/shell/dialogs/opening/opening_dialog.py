@@ -11,7 +11,7 @@ from pathlib import Path
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.playback.modes.arrays import Picture
-from app.project.capture_report import CaptureReport, RefusedFolder
+from app.project.opening.capture_report import CaptureReport, RefusedFolder
 from app.session.commands import CloseQuestion, OpenCapture
 from app.session.questions import OpeningPage
 from app.session.session_view import OpeningView, SessionView

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.project.capture_report import CaptureReport
+from app.project.opening.capture_report import CaptureReport
 from ui.panels.state import Rect, UiState
 from ui.style import theme
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.project.capture_report import RefusedFolder
+from app.project.opening.capture_report import RefusedFolder
 from app.session.commands import CloseQuestion, LookAtVideos, OpenCapture
 from ui.panels.pieces.widgets import (
     elided,

@@ -13,7 +13,7 @@ from app.lab.report.measured import clip_borders, worst_pictures
 from app.lab.report.page.markup import escaped, tag
 from app.lab.report.page.tables import Table, TableColumn
 from app.lab.report.pareto import pareto_front
-from app.project.clip_bytes import storage_of
+from app.project.clips.clip_bytes import storage_of
 from app.project.project_facts import short_names
 from engine.errors import ProjectError
 from tests.app.lab.report.made_up import report

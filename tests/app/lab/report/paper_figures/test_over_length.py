@@ -8,7 +8,7 @@ import pytest
 
 from app.lab.report.paper_figures import over_length
 from app.lab.report.paper_figures.over_length import clip_length_section, sequence_length_section
-from app.project.project_access import default_settings
+from app.project.opening.project_access import default_settings
 from engine.capture.capture import open_capture
 from tests.app.lab.report.paper_figures.made_up import clip, compared
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from app.project.project_access import DEFAULT_CLIP_LENGTH
+from app.project.opening.project_access import DEFAULT_CLIP_LENGTH
 from engine.capture.capture import Capture, working_sizes
 from engine.capture.holdout_choice import suggested_holdout
 from engine.capture.pixels.frame_fit import FrameFit

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from app.project.clip_names import PROGRAM_NAME
+from app.project.clips.clip_names import PROGRAM_NAME
 from app.project.project import Project
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, read_clip_state

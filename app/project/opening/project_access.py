@@ -11,12 +11,12 @@ from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import PROJECT_FILE
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.recovery import plain_history, recover
-from app.project.clip_exchange import finish_exchange
+from app.project.clips.clip_exchange import finish_exchange
 from app.project.folders import check_folders
-from app.project.interrupted import finish_interrupted
 from app.project.lock import ProcessLock
+from app.project.opening.interrupted import finish_interrupted
+from app.project.opening.sweeping import sweep
 from app.project.project import LOCK_FILE, LOCK_FILES, READ_ONLY, Project
-from app.project.sweeping import sweep
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
 

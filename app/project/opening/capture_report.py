@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from engine.camera.lens import Lens
-from engine.capture.capture import FORMATS, Capture
+from engine.capture.capture import Capture
 from engine.capture.capture_summary import describe
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed
+from engine.capture.formats.table import FORMATS
 from engine.capture.pixels.frame_fit import FrameFit
 from engine.errors import CaptureError, EngineError
 from engine.text import duration_text, printable, rate_text

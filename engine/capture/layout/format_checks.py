@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from engine.capture.files.media import ImageHeader
-from engine.capture.limits import (
+from engine.capture.layout.limits import (
     FOCAL_RANGE,
     FPS_RANGE,
     MAX_META_BYTES,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from app.project.clip_versions import finish_restoring
+from app.project.clips.clip_versions import finish_restoring
 from app.project.mends.in_place import recover
 from app.project.project import Project
 from engine.errors import ProjectError

@@ -13,7 +13,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from engine.capture.files.frame_files import natural_key
-from engine.capture.format_checks import shortened
+from engine.capture.layout.format_checks import shortened
 
 POSE_DIGITS = 6
 """Poses that are the same to so many places are of one camera."""

@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from app.document.storing.kept_json import kept_text, read_kept, write_kept
-from app.project.clip_names import is_clip_file
+from app.project.clips.clip_names import is_clip_file
 from engine.errors import ProjectError
 from engine.storage.files import disk_error, replace_file
 

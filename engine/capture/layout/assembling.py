@@ -15,15 +15,15 @@ import numpy as np
 
 from engine.capture.cameras.described_camera import DescribedCamera, SeenFiles, mask_source, seen_files
 from engine.capture.files.duplicates import CameraFiles, check_duplicates
-from engine.capture.format_checks import (
+from engine.capture.frames import IndexedFrames
+from engine.capture.layout.format_checks import (
     check_K,
     check_names,
     check_pose,
     raise_problems,
     shortened,
 )
-from engine.capture.format_result import CameraEntry, Layout
-from engine.capture.frames import IndexedFrames
+from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.pixels.frame_fit import FIT_WORDS, FrameFit, OtherSize
 from engine.capture.times.timed_frames import at_common_moments, own_times
 from engine.errors import CaptureError

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.project.header_cache import FoundHeader
-from app.project.metrics_file import read_metrics
+from app.project.clips.header_cache import FoundHeader
+from app.project.clips.metrics_file import read_metrics
 from app.project.project import Project
 from engine.capture.exclusions import exclusion_key
 from engine.clip_files.clip_header import ClipHeader

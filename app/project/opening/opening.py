@@ -13,11 +13,10 @@ from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import PROJECT_FILE, DamagedDocument
 from app.document.storing.journal_file import JournalDamage
 from app.document.storing.recovery import damaged_project, plain_history
-from app.project.clip_catalog import ClipCatalog
-from app.project.clip_names import finished_files
-from app.project.opening_answers import OpeningAnswers, window_scale
-from app.project.project import LOCK_FILE, Project
-from app.project.project_access import (
+from app.project.clips.clip_catalog import ClipCatalog
+from app.project.clips.clip_names import finished_files
+from app.project.opening.opening_answers import OpeningAnswers, window_scale
+from app.project.opening.project_access import (
     create_project,
     default_settings,
     is_project,
@@ -25,7 +24,8 @@ from app.project.project_access import (
     read_settings,
     repair_project,
 )
-from app.project.project_choices import AS_USUAL, ProjectChoices
+from app.project.opening.project_choices import AS_USUAL, ProjectChoices
+from app.project.project import LOCK_FILE, Project
 from app.project.projects_folder import new_project_dir, project_name, projects_dir, usual_project_dir
 from app.project.recents import RecentProject
 from engine.capture.capture import Capture, open_capture

@@ -1,0 +1,1 @@
+"""What readers of formats return, and the checks that they share."""
