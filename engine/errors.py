@@ -46,7 +46,7 @@ class EngineError(Exception):
     def _place(self) -> str:
         return printable(str(self.path)).replace("\n", "\\n")
 
-    def told_apart(self) -> tuple[str, str]:
+    def parts(self) -> tuple[str, str]:
         """What happened and what to do, for those who show them apart. Joined by a space they are str(self)."""
         if self.hint and self.path is not None:
             return self.message, f"{self.hint} - {self._place}"
@@ -83,9 +83,9 @@ class CaptureError(EngineError):
         n_more = len(self.problems) - len(listed)
         return "\n".join([super().__str__(), *listed, *([f"  and {n_more} more like these."] if n_more else [])])
 
-    def told_apart(self) -> tuple[str, str]:
+    def parts(self) -> tuple[str, str]:
         """As of every error; listed problems carry their own hints and stand with what happened."""
-        return (str(self), "") if self.problems else super().told_apart()
+        return (str(self), "") if self.problems else super().parts()
 
     def said_of(self, what: str) -> "CaptureError":
         """The same kind of problem with what it is of named in front, as `Camera "a"`."""

@@ -17,7 +17,7 @@ import moderngl
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed.laps import Lap, camera_of, enough, frames_of
-from app.evaluation.speed.window_drawing import Drawn, said_by
+from app.evaluation.speed.window_drawing import WindowLaps, said_by
 from app.playback.frame_decoder import ClipFiles, FrameRequest, decode_frame
 from app.project.opening.project_access import open_project
 from engine.errors import EngineError
@@ -84,19 +84,19 @@ def _context() -> moderngl.Context:
     return moderngl.create_standalone_context(require=330)
 
 
-def main(folder: Path) -> Drawn:
+def main(folder: Path) -> WindowLaps:
     """Measure a project; says why where that cannot be done."""
     use_kernel_cache()
     use_threads(None)
     try:
         ctx = _context()
     except Exception as error:  # noqa: BLE001 - drivers raise anything
-        return Drawn([], "", str(error) if isinstance(error, ContextError) else f"no OpenGL 3.3 ({error})")
+        return WindowLaps([], "", str(error) if isinstance(error, ContextError) else f"no OpenGL 3.3 ({error})")
     try:
         opened = open_trained(open_project(folder, is_writable=False))
-        return Drawn(list(enough(drawn_laps(opened, ctx))), renderer_name(ctx))
+        return WindowLaps(list(enough(drawn_laps(opened, ctx))), renderer_name(ctx))
     except EngineError as error:
-        return Drawn([], "", error.message)
+        return WindowLaps([], "", error.message)
     finally:
         ctx.release()
 

@@ -19,7 +19,7 @@ STARTED_WITHIN_S = 10.0
 """So long the program waits at its end for a process that is being started."""
 
 
-class Unwanted(OSError):
+class NoLongerWanted(OSError):
     """No process is started or waited for any more: the program, or whoever has asked, ends."""
 
 
@@ -41,7 +41,7 @@ class _Starts:
         """Start one in this block."""
         with self._changed:
             if self._is_over:
-                raise Unwanted
+                raise NoLongerWanted
             self._n_starting += 1
         try:
             yield

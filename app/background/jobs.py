@@ -45,7 +45,7 @@ class JobContext:
         return self._is_cancelled.is_set()
 
 
-class Job:
+class BackgroundJob:
     """One function on one thread.
 
     Args:
@@ -105,7 +105,7 @@ class Jobs:
     """
 
     def __init__(self, on_fault: Callable[[str, Exception], None] | None = None) -> None:
-        self._jobs: list[Job] = []
+        self._jobs: list[BackgroundJob] = []
         self._on_fault = on_fault
 
     def start(
@@ -116,9 +116,9 @@ class Jobs:
         on_error: Callable[[Exception], None],
         *,
         can_cancel: bool = False,
-    ) -> Job:
+    ) -> BackgroundJob:
         """Run `work` on a thread; `on_done` or `on_error` follow in `poll`, neither if the user gives it up."""
-        job = Job(name, work, on_done, on_error, can_cancel=can_cancel)
+        job = BackgroundJob(name, work, on_done, on_error, can_cancel=can_cancel)
         self._jobs.append(job)
         return job
 

@@ -29,7 +29,7 @@ print(json.dumps([ctx.info["GL_RENDERER"], ctx.info["GL_VERSION"]]))
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class MachineFinding:
     """One line of the report. `is_fine` is False for what the user should look at."""
 
     subject: str
@@ -37,7 +37,7 @@ class Finding:
     is_fine: bool = True
 
 
-def examine() -> list[Finding]:
+def examine() -> list[MachineFinding]:
     """Look at everything; takes a few seconds, because OpenGL is tried in a process of its own."""
     return [
         _python(),
@@ -53,13 +53,13 @@ def examine() -> list[Finding]:
     ]
 
 
-def _python() -> Finding:
+def _python() -> MachineFinding:
     version = platform.python_version()
     is_fine = (3, 11) <= sys.version_info[:2] < (3, 14)
-    return Finding("Python", f"{version} on {platform.platform()}", is_fine)
+    return MachineFinding("Python", f"{version} on {platform.platform()}", is_fine)
 
 
-def _packages() -> list[Finding]:
+def _packages() -> list[MachineFinding]:
     found, missing = [], []
     for name in PACKAGES:
         try:
@@ -68,45 +68,45 @@ def _packages() -> list[Finding]:
             missing.append(name)
     if len({"open3d", "open3d-cpu"} & set(missing)) == 1:  # either of the two will do
         missing = [name for name in missing if not name.startswith("open3d")]
-    findings = [Finding("Packages", ", ".join(found))]
+    findings = [MachineFinding("Packages", ", ".join(found))]
     if missing:
-        findings.append(Finding("Missing", f"{', '.join(missing)}. Run `make setup`.", is_fine=False))
+        findings.append(MachineFinding("Missing", f"{', '.join(missing)}. Run `make setup`.", is_fine=False))
     return findings
 
 
-def _cores() -> Finding:
+def _cores() -> MachineFinding:
     cores = n_cores()
     threads = n_training_threads(cores, is_window_open=True)
-    return Finding("Cores", f"{cores}; training beside the window uses {threads}")
+    return MachineFinding("Cores", f"{cores}; training beside the window uses {threads}")
 
 
-def _memory() -> Finding:
+def _memory() -> MachineFinding:
     try:
         n_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
-        return Finding("Memory", "unknown")
-    return Finding("Memory", f"{n_bytes / 2**30:.1f} GB", n_bytes > 3 * 2**30)
+        return MachineFinding("Memory", "unknown")
+    return MachineFinding("Memory", f"{n_bytes / 2**30:.1f} GB", n_bytes > 3 * 2**30)
 
 
-def _kernels() -> Finding:
+def _kernels() -> MachineFinding:
     state = cache_state()
     place = f"{state.folder}, {state.n_bytes / 2**20:.1f} MB"
     if state.is_fallback:
         place += f" (a temporary folder, because {cache_dir()} cannot be written)"
     if state.is_warm:
-        return Finding("Kernels", f"compiled, in {place}", not state.is_fallback)
+        return MachineFinding("Kernels", f"compiled, in {place}", not state.is_fallback)
     is_fine = state.reason != UNWRITABLE and not state.is_fallback
     wait = "the first training or picture takes some seconds longer"
-    return Finding("Kernels", f"not compiled: {state.reason}; {wait}. Folder {place}", is_fine)
+    return MachineFinding("Kernels", f"not compiled: {state.reason}; {wait}. Folder {place}", is_fine)
 
 
-def _vectors() -> Finding:
+def _vectors() -> MachineFinding:
     from engine.kernels.lanes import N_LANES
 
     name, width, cpu = host_vectors()
     n_registers = -(-N_LANES // width)
     text = f"{name}, {width} numbers at once: {N_LANES} lanes of a kernel fill {n_registers} register"
-    return Finding("Vectors", f"{text}{'s' if n_registers > 1 else ''} ({cpu})")
+    return MachineFinding("Vectors", f"{text}{'s' if n_registers > 1 else ''} ({cpu})")
 
 
 def host_vectors() -> tuple[str, int, str]:
@@ -132,7 +132,7 @@ def vector_width(features: set[str], machine: str) -> tuple[str, int]:
     return ("SSE", 4) if "sse2" in features else ("no vector instructions known", 1)
 
 
-def _threads() -> Finding:
+def _threads() -> MachineFinding:
     n_threads = use_threads(None)
     from engine.kernels.launch import parallel_guard
     from engine.kernels.numba_internals import layer as layer_of_threads
@@ -144,11 +144,13 @@ def _threads() -> Finding:
     waits = f"; OMP_WAIT_POLICY={policy}" if policy else ""
     text = f"{n_threads}, layer {layer}; an idle one spins {spin} rounds (GOMP_SPINCOUNT){waits}"
     if layer == "workqueue":
-        return Finding("Threads", f"{text}. No OpenMP (libgomp) was found, so kernels run one call at a time.", False)
-    return Finding("Threads", text)
+        return MachineFinding(
+            "Threads", f"{text}. No OpenMP (libgomp) was found, so kernels run one call at a time.", False
+        )
+    return MachineFinding("Threads", text)
 
 
-def _gl() -> Finding:
+def _gl() -> MachineFinding:
     try:
         done = subprocess.run(
             [sys.executable, "-c", _GL_PROBE],
@@ -161,20 +163,20 @@ def _gl() -> Finding:
         renderer, version = json.loads(done.stdout.splitlines()[-1])
     except (OSError, subprocess.TimeoutExpired, ValueError, IndexError):
         hint = "The window needs OpenGL 3.3; training, eval and render do not."
-        return Finding("OpenGL", f"not available. {hint}", is_fine=False)
+        return MachineFinding("OpenGL", f"not available. {hint}", is_fine=False)
     is_software = any(word in renderer.lower() for word in ("llvmpipe", "softpipe", "swrast", "software"))
     how = "software drawing, so the window shows the rasterizer's pictures" if is_software else "graphics card"
-    return Finding("OpenGL", f"{version}, {renderer}: {how}")
+    return MachineFinding("OpenGL", f"{version}, {renderer}: {how}")
 
 
-def _display() -> Finding:
+def _display() -> MachineFinding:
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        return Finding("Display", "none; commands run without a window")
-    return Finding("Display", os.environ.get("DISPLAY", "yes"))
+        return MachineFinding("Display", "none; commands run without a window")
+    return MachineFinding("Display", os.environ.get("DISPLAY", "yes"))
 
 
-def _disk() -> Finding:
+def _disk() -> MachineFinding:
     folder = data_dir()
     place = next(parent for parent in (folder, *folder.parents) if parent.exists())
     free = shutil.disk_usage(place).free
-    return Finding("Projects", f"in {folder / 'projects'}, {free / 2**30:.1f} GB free", free > 2**30)
+    return MachineFinding("Projects", f"in {folder / 'projects'}, {free / 2**30:.1f} GB free", free > 2**30)

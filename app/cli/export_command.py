@@ -12,7 +12,7 @@ from app.cli.terminal.progress import ProgressLine, row_progress
 from app.evaluation.headless import open_trained
 from app.export.edits_line import edits_line
 from app.export.export_progress import ExportProgress, ExportResult
-from app.export.jobs.job import Job
+from app.export.jobs.job import ExportJob
 from app.export.jobs.table import KINDS, formats_of, named_job
 from app.export.picked_frames import frames_text
 from app.project.opening.project_access import open_project
@@ -59,7 +59,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_job_arguments(command, jobs)
 
 
-def _jobs() -> list[type[Job]]:
+def _jobs() -> list[type[ExportJob]]:
     return [job for job in KINDS.values() if job.command == "export"]
 
 
@@ -105,7 +105,7 @@ def check_options(options: argparse.Namespace) -> None:
         raise ProjectError(f"--out does not apply to {name}.", hint="Leave it out.")
 
 
-def job_of(options: argparse.Namespace, opened: Any) -> Job:
+def job_of(options: argparse.Namespace, opened: Any) -> ExportJob:
     """The job that the arguments ask for. Raises ProjectError where there is none."""
     name, out = _what(options)
     entries = given_entries(options, formats_of()[name], opened)
@@ -122,7 +122,7 @@ def _what(options: argparse.Namespace) -> tuple[str, Any]:
     return kinds[0], getattr(options, f"out_{kinds[0]}")
 
 
-def _document(job: Job, result: ExportResult, seconds: float) -> dict[str, Any]:
+def _document(job: ExportJob, result: ExportResult, seconds: float) -> dict[str, Any]:
     asked = {name: getattr(job, name) for name in settings_of(type(job)) if name != "format"}
     if (frames := asked.get("frames")) is not None:
         asked |= {"frames": frames_text(frames), "step": frames.step}

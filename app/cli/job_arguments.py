@@ -8,7 +8,7 @@ from typing import Any
 
 from app.cli.arguments import parse_cameras, parse_range
 from app.evaluation.headless import TrainedProject
-from app.export.jobs.job import Job
+from app.export.jobs.job import ExportJob
 from app.export.picked_frames import PickedFrames, picked_frames
 from engine.errors import ProjectError
 from engine.setting import Flag, Setting, settings_of
@@ -18,7 +18,7 @@ _APART = ("format", "frames")
 _Place = argparse._ActionsContainer
 
 
-def add_job_arguments(command: argparse.ArgumentParser, jobs: Sequence[type[Job]]) -> None:
+def add_job_arguments(command: argparse.ArgumentParser, jobs: Sequence[type[ExportJob]]) -> None:
     """Options of these jobs; what only one of several jobs takes stands in a group of its own."""
     done: set[str] = set(_APART)
     for job in jobs:
@@ -78,7 +78,9 @@ def _help(setting: Setting, flag: Flag) -> str:
     return f"{meaning[0].lower()}{meaning[1:]}{choices}" + (f" (default: {setting.usual})" if has_usual else "")
 
 
-def given_entries(options: argparse.Namespace, job: type[Job], opened: TrainedProject | None = None) -> dict[str, Any]:
+def given_entries(
+    options: argparse.Namespace, job: type[ExportJob], opened: TrainedProject | None = None
+) -> dict[str, Any]:
     """What was given of a job's options, by name.
 
     Args:
@@ -108,7 +110,7 @@ def _given(options: argparse.Namespace, setting: Setting, dest: str, opened: Tra
     return setting.kind(**inner) if inner else value
 
 
-def check_given(options: argparse.Namespace, jobs: Sequence[type[Job]], job: type[Job]) -> None:
+def check_given(options: argparse.Namespace, jobs: Sequence[type[ExportJob]], job: type[ExportJob]) -> None:
     """See that nothing was given that would be passed over. Raises ProjectError."""
     unused = {
         setting.flag_of(value).name: None

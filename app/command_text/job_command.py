@@ -11,7 +11,7 @@ from msgspec import Struct
 from app.command_text.command_text import CommandText
 from app.command_text.quoting import option
 from app.document.project_settings import ProjectSettings
-from app.export.jobs.job import Job
+from app.export.jobs.job import ExportJob
 from app.export.picked_frames import PickedFrames, frames_text
 from engine.clip_files.clip_header import SettingValue
 from engine.setting import Setting, settings_of, value_text
@@ -78,7 +78,7 @@ def mend_command(
     return CommandText(("mend", str(folder), *what, *how), f"project.mend({', '.join(said)})", folder)
 
 
-def export_command(folder: Path, job: Job) -> CommandText:
+def export_command(folder: Path, job: ExportJob) -> CommandText:
     """The command that carries out an export. folder: Of the project."""
     folder, out = folder.absolute(), str(Path(job.out).absolute())
     declared = settings_of(type(job))

@@ -32,7 +32,7 @@ KEPT_SCHEMA = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Scope:
+class EvaluationScope:
     """What is measured of a project.
 
     Attributes:
@@ -59,7 +59,7 @@ class Measuring(Protocol):
     """Measures what is not known of a clip, in any order; ClipMeasuring, or what a test brings."""
 
     def __call__(
-        self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
+        self, opened: TrainedProject, scope: EvaluationScope, clip_index: int, unknown: Frames
     ) -> Iterator[EvalRow | PairRow]: ...
 
 
@@ -100,7 +100,7 @@ def evaluate_project(
     opened = opened.measured
     project, capture = opened.project, opened.capture
     chosen_cameras = list(range(len(capture.rig)) if cameras is None else cameras)
-    scope = Scope(list(clip_indices), chosen_cameras, metrics, precision)
+    scope = EvaluationScope(list(clip_indices), chosen_cameras, metrics, precision)
     for clip_index in {*scope.clips} - {*opened.trained}:
         opened.load(clip_index)  # says what is trained
     kept = {i: kept_figures(opened, scope, i, say) for i in scope.clips}
@@ -155,7 +155,9 @@ def evaluate_project(
     }
 
 
-def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Callable[[str], None]) -> KeptFigures:
+def kept_figures(
+    opened: TrainedProject, scope: EvaluationScope, clip_index: int, say: Callable[[str], None]
+) -> KeptFigures:
     """What is known of a clip.
 
     Raises:
@@ -182,7 +184,7 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
     return KeptFigures(path, content, None if before is None else _fingerprint(opened, before), say)
 
 
-def is_measured(opened: TrainedProject, scope: Scope) -> bool:
+def is_measured(opened: TrainedProject, scope: EvaluationScope) -> bool:
     """Whether `evaluate_project` would have nothing to measure.
 
     Raises:
@@ -206,7 +208,7 @@ class ClipMeasuring:
         self._evaluation: Evaluation | None = None
 
     def __call__(
-        self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
+        self, opened: TrainedProject, scope: EvaluationScope, clip_index: int, unknown: Frames
     ) -> Iterator[EvalRow | PairRow]:
         """Rows and pairs that are not known.
 
@@ -231,7 +233,7 @@ def _fingerprint(opened: TrainedProject, clip_index: int) -> str:
     return opened.header(clip_index).fingerprint
 
 
-def _unknown(opened: TrainedProject, scope: Scope, clip_index: int, kept: KeptFigures) -> Frames:
+def _unknown(opened: TrainedProject, scope: EvaluationScope, clip_index: int, kept: KeptFigures) -> Frames:
     names = opened.capture.rig.names
     found: Frames = {}
     for camera in scope.cameras:
@@ -248,7 +250,7 @@ def _usable(opened: TrainedProject, clip_index: int, camera: int) -> list[int]:
     return [f for f in opened.clips[clip_index].frame_indices() if opened.capture.is_usable(camera, f)]
 
 
-def _later_frames(opened: TrainedProject, scope: Scope, clip_index: int, camera: int) -> list[int]:
+def _later_frames(opened: TrainedProject, scope: EvaluationScope, clip_index: int, camera: int) -> list[int]:
     """Later frames of all pairs of a clip that are measured for a camera."""
     start, usable = opened.clips[clip_index].start, _usable(opened, clip_index, camera)
     first = start if scope.before(clip_index) is not None else start + 1
@@ -256,7 +258,7 @@ def _later_frames(opened: TrainedProject, scope: Scope, clip_index: int, camera:
 
 
 def _in_order(
-    opened: TrainedProject, scope: Scope, kept: dict[int, KeptFigures]
+    opened: TrainedProject, scope: EvaluationScope, kept: dict[int, KeptFigures]
 ) -> tuple[list[EvalRow], list[PairRow]]:
     """Rows and pairs by clip, camera and frame. Which cameras are held out is the project's to say, not the file's."""
     holdout, names = set(opened.project.settings.holdout), opened.capture.rig.names

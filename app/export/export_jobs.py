@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.export.export_progress import ExportResult, Report
-from app.export.jobs.job import Job
+from app.export.jobs.job import ExportJob
 from engine.backends.table import chosen_name
 
 
@@ -22,7 +22,7 @@ class ExportTask:
         backend: Name of what is computed with.
     """
 
-    job: Job
+    job: ExportJob
     project: str
     capture: str
     scale: float

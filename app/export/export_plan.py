@@ -78,7 +78,7 @@ def plan_export(
             if answers.suffix and answers.out.exists():
                 lines = (*lines, "The existing file will be replaced.")
         except EngineError as error:
-            problems.append(" ".join(part for part in error.told_apart() if part))
+            problems.append(" ".join(part for part in error.parts() if part))
         except (OSError, RuntimeError, ValueError) as error:  # a path that cannot be one
             problems.append(f"This place cannot be written to ({error}).")
     return ExportPlan(choices, n_files, n_bytes, _free_bytes(choices.out), tuple(problems), lines)

@@ -12,7 +12,7 @@ from app.export.export_messages import Event, ExportDone, ExportFailed, ExportGo
 from app.export.export_plan import TAKEN, overlap
 from app.export.export_process import Exporter, ExportProcess
 from app.export.export_status import ExportStatus
-from app.training.rate import Rate
+from app.training.rate import SmoothedRate
 from engine.errors import ProjectError
 
 MAX_ENDED = 50
@@ -42,7 +42,7 @@ class ExportQueue:
         self._tasks: dict[int, ExportTask] = {}
         self._exporter: Exporter | None = None
         self._running_id: int | None = None
-        self._rate, self._started_s = Rate(), 0.0
+        self._rate, self._started_s = SmoothedRate(), 0.0
         self._n_added = 0
 
     @property
@@ -147,7 +147,7 @@ class ExportQueue:
         if status is None:
             return
         self._running_id = status.export_id
-        self._rate, self._started_s = Rate(), self._clock()
+        self._rate, self._started_s = SmoothedRate(), self._clock()
         self._exporter = self._launch(replace(self._tasks[status.export_id], n_threads=n_threads))
         self._statuses.remove(status)
         n_not_waiting = sum(one.state != "waiting" for one in self._statuses)

@@ -49,7 +49,7 @@ def _ending(task: ExportTask, wanted: Wanted) -> ExportDone | ExportStopped | Ex
     except ExportCancelled:
         return ExportStopped()
     except EngineError as error:
-        return ExportFailed(*error.told_apart())
+        return ExportFailed(*error.parts())
     except MemoryError:
         return ExportFailed("There is not enough memory.", "Close other programs, or export fewer frames at a time.")
     except Exception as error:  # the edge of the process

@@ -17,7 +17,7 @@ from app.export.read_back import ReadBack
 from app.export.scene_frames import SceneFrames
 from engine.export.formats.table import Format
 from engine.export.splats import Splats
-from engine.export.world import World
+from engine.export.world import FileWorld
 from engine.raster.gaussians import Gaussians
 
 SCHEMA = 1
@@ -56,7 +56,7 @@ class GaussianSequence:
         frames: Sequence[int],
         part: WrittenPart,
         kind: Format,
-        placement: World,
+        placement: FileWorld,
         *,
         n_threads: int,
     ) -> None:

@@ -19,7 +19,7 @@ from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS, FULL_PLY, Format
-from engine.export.world import World, world
+from engine.export.world import FileWorld, world
 from engine.storage.json_files import json_text
 
 
@@ -85,7 +85,7 @@ def _kind(job: GaussiansJob) -> Format:
     return FULL_PLY if job.fields == "full" else FORMATS[job.format]
 
 
-def _world(opened: TrainedProject, job: GaussiansJob) -> World:
+def _world(opened: TrainedProject, job: GaussiansJob) -> FileWorld:
     """Where the scene lies in the files."""
     said = opened.project.document.world.meters_per_unit
     scale = job.scale if job.scale is not None else 1.0 if said is None else said

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import msgspec
 
 from app.csv_text import csv_text
-from app.evaluation.evaluation import Scope, kept_figures
+from app.evaluation.evaluation import EvaluationScope, kept_figures
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.jobs.metrics import MetricsJob
@@ -117,7 +117,7 @@ class _Chosen:
         found: dict[tuple[str, int], tuple[str, str, EvalRow]] = {}
         pairs: dict[tuple[str, int], PairRow] = {}
         for metrics, precision in reversed(_WHICH):
-            scope = Scope(self.opened.trained, range(len(names)), metrics, precision)
+            scope = EvaluationScope(self.opened.trained, range(len(names)), metrics, precision)
             kept = kept_figures(self.opened, scope, clip_index, self._say)
             found |= {key: (metrics, precision, row) for key, row in kept.rows.items()}
             pairs |= kept.pairs

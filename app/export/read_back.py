@@ -12,7 +12,7 @@ import torch
 from app.export.scene_frames import SceneFrames
 from engine.camera.rig import CameraRig
 from engine.export.splats import Splats
-from engine.export.world import World
+from engine.export.world import FileWorld
 from engine.images.psnr import psnr
 from engine.model.clip_view import render_gaussians
 from engine.raster.gaussians import Gaussians
@@ -32,7 +32,7 @@ class ReadBack:
         world: How the scene was placed in the file; undone here.
     """
 
-    def __init__(self, scene: SceneFrames, read: Callable[[BinaryIO], Splats], world: World) -> None:
+    def __init__(self, scene: SceneFrames, read: Callable[[BinaryIO], Splats], world: FileWorld) -> None:
         self._scene, self._read, self._world = scene, read, world
         rig = scene.opened.rig
         self._rig = _reduced(rig.subset(np.unique(np.linspace(0, len(rig) - 1, N_CAMERAS).round().astype(int))))

@@ -35,7 +35,7 @@ class Pictures(Protocol):
         ...
 
 
-class ProjectPictures:
+class RenderedPictures:
     """Renders them. Keeps one clip loaded."""
 
     def __init__(self, opened: TrainedProject) -> None:

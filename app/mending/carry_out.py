@@ -33,7 +33,7 @@ def mend(job: MendJob, report: ReportProgress) -> MendResult:
         EngineError: It cannot be mended; says why.
     """
     from engine.mending.measuring import Threads  # torch takes a second to import
-    from engine.mending.mend import Mending
+    from engine.mending.mend import StretchMending
     from engine.training.clip_training import ClipTraining
 
     started_s = time.monotonic()
@@ -55,7 +55,7 @@ def mend(job: MendJob, report: ReportProgress) -> MendResult:
         )
 
     n_threads = n_cores() if job.n_threads is None else job.n_threads
-    mended = Mending(
+    mended = StretchMending(
         capture,
         stretch,
         opened.clips,

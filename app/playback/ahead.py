@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest
 from app.playback.modes.view_modes import PLAIN, ShownAs, decoded_as
 from app.playback.prefetch_order import Course
-from app.playback.render import Look, PictureKey, Renderer, RenderRequest
+from app.playback.render import PictureKey, Renderer, RenderRequest, RenderView
 from engine.capture.files.frame_runs import runs_of
 
 PLAYING_S = 1.5
@@ -38,11 +38,11 @@ class AskedLook:
         full: The same at full size.
     """
 
-    look: Look
-    full: Look
+    look: RenderView
+    full: RenderView
 
     @property
-    def sizes(self) -> tuple[Look, ...]:
+    def sizes(self) -> tuple[RenderView, ...]:
         """Each size once, the one that was asked for first."""
         return (self.look,) if self.look == self.full else (self.look, self.full)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.background.jobs import Job, JobContext, Jobs
+from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.background.latest import LatestWorker
 from app.playback.modes.arrays import PointArrays
 from app.playback.point_spacing import point_spacing
@@ -46,7 +46,7 @@ class Clouds:
 
     def __init__(self) -> None:
         self.worker: LatestWorker[CloudRequest, PointArrays] = LatestWorker("points", _compute)
-        self._first: Job | None = None
+        self._first: BackgroundJob | None = None
 
     def cloud(self, opened: OpenedProject, reference: ShownState | None) -> PointArrays | None:
         """The best cloud there is; until it is made, the one before; None before the first.

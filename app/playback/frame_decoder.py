@@ -19,7 +19,7 @@ import numpy as np
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker, nothing
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays
-from app.playback.modes.contents import ClipParts
+from app.playback.modes.contents import EditedParts
 from app.playback.modes.view_modes import PLAIN, ShownAs
 from app.playback.picture_source import UNKNOWN, PictureSource
 from engine.backends.table import process_backend
@@ -94,7 +94,7 @@ class LoadedClip:
     """
 
     model: ClipModel
-    parts: ClipParts
+    parts: EditedParts
     anchors: AnchorArrays
     near_plane: float
     step: int | None = None
@@ -132,7 +132,7 @@ class ClipFiles:
         spacing = min(header.spacing, header.moving_spacing or header.spacing)
         anchors = _anchor_arrays(model.anchors(), request.model_key, spacing)
         trained = TrainedClip.of_state(request.clip, model, state, reference)
-        colors, parts = None if trained is None else trained.colors, ClipParts(model, request.clip, state, reference)
+        colors, parts = None if trained is None else trained.colors, EditedParts(model, request.clip, state, reference)
         return LoadedClip(model, parts, anchors, header.near_plane, header.step, colors, trained)
 
     def _read_reference(self, path: Path | None) -> ClipState | None:

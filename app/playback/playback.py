@@ -16,12 +16,12 @@ from app.playback.capture_pictures import CapturedPictures, Gain, PictureRequest
 from app.playback.clouds import CloudRequest, Clouds
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame
 from app.playback.modes.arrays import AnchorArrays, Picture, PointArrays
-from app.playback.modes.coverage import Coverage, CoverageFinder
+from app.playback.modes.coverage import CoverageFinder, CoveredSpace
 from app.playback.modes.mode_arrays import ModeArrays
 from app.playback.modes.trails import TrailMaker, TrailRequest, Trails, trail_frames
 from app.playback.modes.view_modes import PLAIN, ShownAs, decoded_as
 from app.playback.prefetch_order import Course
-from app.playback.render import Look, Renderer
+from app.playback.render import Renderer, RenderView
 from app.playback.timeline import Timeline
 from app.playback.views.orbit_view import OrbitView
 from app.project.opening.opened_project import OpenedProject
@@ -114,7 +114,7 @@ class Playback:
         model = None if request is None else self.decoder.model(request)
         return None if model is None else model.decoder.gaussians_per_anchor
 
-    def coverage(self, timeline: Timeline) -> Coverage | None:
+    def coverage(self, timeline: Timeline) -> CoveredSpace | None:
         """What inherited anchors cover in the clip under the playhead; None until it is loaded and measured."""
         request = self._request(timeline)
         anchors = None if request is None else self.decoder.anchors(request)
@@ -186,7 +186,7 @@ class Playback:
         request = self._request_at(timeline, timeline.frame_index, shown_as, state_of)
         if request is None:
             return None
-        look = Look.of(view, width, height, shown_as=shown_as)
+        look = RenderView.of(view, width, height, shown_as=shown_as)
         full = look if full_size is None else look.in_size(view, *full_size)
         if state_of is None:  # others are not what playing shows next
             self.ahead.note(view_id, AskedLook(look, full))
@@ -209,7 +209,7 @@ class Playback:
             picture = self.renderer.picture(key, shown, look, view_id=view_id)
         return None if picture is None else replace(picture, is_stale=True)
 
-    def _known_picture(self, key: FrameKey, looks: tuple[Look, ...], view_id: Hashable) -> Picture | None:
+    def _known_picture(self, key: FrameKey, looks: tuple[RenderView, ...], view_id: Hashable) -> Picture | None:
         """The first of these that is there."""
         for look in looks:
             picture = self.renderer.known(key, look, view_id=view_id)

@@ -31,7 +31,7 @@ CACHE_BYTES = 256 << 20
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RenderView:
     """From where, through which lens, how large and how something is drawn, whatever it is of.
 
     Attributes:
@@ -54,7 +54,7 @@ class Look:
     set_back: float = field(default=0.0, compare=False)
 
     @classmethod
-    def of(cls, view: OrbitView, width: int, height: int, *, shown_as: ShownAs = PLAIN) -> Look:
+    def of(cls, view: OrbitView, width: int, height: int, *, shown_as: ShownAs = PLAIN) -> RenderView:
         """As a view is now."""
         value_range = range_of(shown_as.mode, view.rig)
         matrices = view.world_to_camera(), view.K(width, height)
@@ -62,14 +62,14 @@ class Look:
             view.look_key, width, height, shown_as, value_range, view.look_through, *matrices, view.near, view.set_back
         )
 
-    def in_size(self, view: OrbitView, width: int, height: int) -> Look:
+    def in_size(self, view: OrbitView, width: int, height: int) -> RenderView:
         """The same in another size; view is that which it was made of."""
         if (width, height) == (self.width, self.height):
             return self
         return replace(self, width=width, height=height, K=view.K(width, height))
 
 
-PictureKey = tuple[FrameKey, Look]
+PictureKey = tuple[FrameKey, RenderView]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class RenderRequest:
     """A frame, looked at. Equal requests give equal pictures."""
 
     frame_key: FrameKey
-    look: Look
+    look: RenderView
     shown: ShownFrame = field(compare=False)
 
     @property
@@ -105,7 +105,7 @@ class Renderer:
         self._taken_up: dict[Hashable, object] = {}
         self._last_pictures: dict[Hashable, Picture] = {}
 
-    def known(self, frame_key: FrameKey, look: Look, *, view_id: Hashable = 0) -> Picture | None:
+    def known(self, frame_key: FrameKey, look: RenderView, *, view_id: Hashable = 0) -> Picture | None:
         """A finished picture; nothing is asked for."""
         picture = self._cache.get((frame_key, look))
         if picture is not None:
@@ -113,7 +113,7 @@ class Renderer:
             self._asked.pop(view_id, None)
         return picture
 
-    def picture(self, key: FrameKey, shown: ShownFrame, look: Look, *, view_id: Hashable = 0) -> Picture | None:
+    def picture(self, key: FrameKey, shown: ShownFrame, look: RenderView, *, view_id: Hashable = 0) -> Picture | None:
         """The picture if it is ready; otherwise it is asked for, and the view's newest one is returned as stale.
 
         Args:
@@ -137,7 +137,7 @@ class Renderer:
         last = self._last_pictures.get(view_id)
         return None if last is None else replace(last, is_stale=True)
 
-    def is_ready(self, frame_key: FrameKey, look: Look) -> bool:
+    def is_ready(self, frame_key: FrameKey, look: RenderView) -> bool:
         """Whether a picture can be shown at once."""
         return (frame_key, look) in self._cache
 
@@ -150,7 +150,7 @@ class Renderer:
         """Another number whenever other pictures are ready."""
         return self._cache.revision
 
-    def n_that_fit(self, look: Look) -> int:
+    def n_that_fit(self, look: RenderView) -> int:
         """How many pictures of a size can be kept."""
         return max(self._cache.max_bytes // (3 * look.width * look.height), 1)
 
@@ -202,7 +202,7 @@ def render(request: RenderRequest, backend: Backend) -> Picture:
     return Picture(image, request.key, duration_s=duration_s, source=request.source, values=values)
 
 
-def _colors(arrays: GaussianArrays, look: Look, backend: Backend) -> np.ndarray:
+def _colors(arrays: GaussianArrays, look: RenderView, backend: Backend) -> np.ndarray:
     """[H, W, 3] uint8"""
     import torch
 
@@ -222,7 +222,7 @@ def _colors(arrays: GaussianArrays, look: Look, backend: Backend) -> np.ndarray:
         return (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).cpu().numpy()
 
 
-def _numbers(arrays: GaussianArrays, look: Look, backend: Backend) -> tuple[np.ndarray, np.ndarray | None]:
+def _numbers(arrays: GaussianArrays, look: RenderView, backend: Backend) -> tuple[np.ndarray, np.ndarray | None]:
     """Picture and values, see app.playback.modes.mode_pictures."""
     import torch
 
@@ -236,7 +236,7 @@ def _numbers(arrays: GaussianArrays, look: Look, backend: Backend) -> tuple[np.n
     )
 
 
-def _gaussians(arrays: GaussianArrays, look: Look) -> Gaussians:
+def _gaussians(arrays: GaussianArrays, look: RenderView) -> Gaussians:
     """Sorted by depth where it is seen from so far away that its depths in float32 are too coarse to sort by: the
     rasterizer keeps the order of equal ones."""
     import torch

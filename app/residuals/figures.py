@@ -55,7 +55,7 @@ class PairFigures:
 
 
 @dataclass(frozen=True, slots=True)
-class ClipFigures:
+class ClipMeasurements:
     """What was found of one clip."""
 
     clip_index: int
@@ -162,7 +162,7 @@ class Figures:
         self._stale_seams |= self._seams_of(clip_index)
         self.revision += 1
 
-    def take(self, found: ClipFigures) -> None:
+    def take(self, found: ClipMeasurements) -> None:
         """Take up what was measured of a clip. What is known already is overwritten."""
         for row in found.rows:
             at = row.frame_index, row.camera_index

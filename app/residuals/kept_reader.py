@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 
 from app.project.opening.opened_project import OpenedProject
-from app.residuals.figures import ClipFigures
+from app.residuals.figures import ClipMeasurements
 from engine.children.priority import lower_thread
 from engine.errors import EngineError
 
@@ -30,14 +30,14 @@ class KeptReader:
 
     def __init__(self, opened: OpenedProject, trained: Sequence[int], clip_indices: Sequence[int]) -> None:
         self._opened, self._trained, self._clip_indices = opened, list(trained), list(clip_indices)
-        self._found: queue.SimpleQueue[ClipFigures | str] = queue.SimpleQueue()
+        self._found: queue.SimpleQueue[ClipMeasurements | str] = queue.SimpleQueue()
         self._is_cancelled = threading.Event()
         self._thread = threading.Thread(target=self._run, name="kept figures", daemon=True)
         self._thread.start()
 
-    def poll(self, n_at_most: int = 20) -> list[ClipFigures | str]:
+    def poll(self, n_at_most: int = 20) -> list[ClipMeasurements | str]:
         """What was read since the last call: figures, and sentences that the user should know."""
-        found: list[ClipFigures | str] = []
+        found: list[ClipMeasurements | str] = []
         while len(found) < n_at_most:
             try:
                 found.append(self._found.get_nowait())

@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from app.evaluation.evaluation import Scope, kept_figures
+from app.evaluation.evaluation import EvaluationScope, kept_figures
 from app.evaluation.headless import TrainedProject, open_trained
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
-from app.residuals.figures import ClipFigures, Figures, PairFigures, RowFigures, pair_figures, row_figures
+from app.residuals.figures import ClipMeasurements, Figures, PairFigures, RowFigures, pair_figures, row_figures
 from engine.capture.capture import Capture
 from engine.errors import EngineError
 
@@ -42,7 +42,7 @@ def note_kept(catalog: ClipCatalog, project: Project, capture: Capture) -> None:
 
 def read_kept(
     opened: TrainedProject, trained: Sequence[int], clip_indices: Sequence[int], say: Callable[[str], None]
-) -> Iterator[ClipFigures]:
+) -> Iterator[ClipMeasurements]:
     """What is known of some clips, one after another. A clip that is damaged is left out.
 
     Args:
@@ -55,7 +55,7 @@ def read_kept(
         rows: list[RowFigures] = []
         pairs: list[PairFigures] = []
         for metrics in READ_METRICS:
-            scope = Scope(trained, range(len(cameras)), metrics, "float")
+            scope = EvaluationScope(trained, range(len(cameras)), metrics, "float")
             try:
                 kept = kept_figures(opened, scope, clip_index, say)
             except EngineError as error:
@@ -66,4 +66,4 @@ def read_kept(
                 if name in cameras:
                     rows.append(row_figures(row, cameras[name], has_flip=has_flip))
             pairs += [pair_figures(pair, cameras[name]) for (name, _), pair in kept.pairs.items() if name in cameras]
-        yield ClipFigures(clip_index, rows, pairs)
+        yield ClipMeasurements(clip_index, rows, pairs)

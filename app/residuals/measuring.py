@@ -13,13 +13,13 @@ from app.evaluation.kept_figures import EVALUATIONS
 from app.playback.timeline import Timeline
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
-from app.residuals.figures import ClipFigures, Figures
+from app.residuals.figures import ClipMeasurements, Figures
 from app.residuals.kept_reader import KeptReader
-from app.residuals.measuring_messages import LookAt, Measured, MeasureJob, MeasuringEnded, SetShare, Trouble
-from app.residuals.measuring_order import Look
+from app.residuals.measuring_messages import LookAt, MeasureJob, MeasuringEnded, PictureMeasured, SetShare, Trouble
+from app.residuals.measuring_order import MeasuringFocus
 from app.residuals.measuring_process import LaunchMeasuring, Measurer, MeasuringProcess
 from app.status import CELL_COLUMNS, ResidualStatus
-from app.training.rate import Rate
+from app.training.rate import SmoothedRate
 from engine.parallel import n_cores
 
 SHARE_WHILE_BUSY = 0.05
@@ -37,7 +37,7 @@ FORECAST_AFTER_S = 60.0
 """Of measuring at full speed: before, nobody can know how long the rest takes."""
 
 
-class Measuring:
+class BackgroundMeasuring:
     """Figures of the open project. For one thread, and nothing here waits.
 
     Args:
@@ -56,12 +56,12 @@ class Measuring:
         self._figures = Figures((), 0)
         self._reader: KeptReader | None = None
         self._process: Measurer | None = None
-        self._look: Look | None = None
-        self._told: tuple[Look, float] | None = None
+        self._look: MeasuringFocus | None = None
+        self._told: tuple[MeasuringFocus, float] | None = None
         self._is_busy = False
         self._is_given_up = False
         self._changed_s = self._status_s = 0.0
-        self._rate = Rate(RATE_TIME_CONSTANT_S)
+        self._rate = SmoothedRate(RATE_TIME_CONSTANT_S)
         self._messages: list[str] = []
         self._status_key: tuple[object, ...] = ()
         self.status = ResidualStatus()
@@ -81,7 +81,7 @@ class Measuring:
         """Say what the user looks at: measured first. Nothing is measured before the first call."""
         clip = timeline.clip
         if clip is not None:
-            self._look = Look(clip.clip_index, camera_index)
+            self._look = MeasuringFocus(clip.clip_index, camera_index)
 
     def poll(self, *, is_busy: bool) -> bool:
         """Take in what was read and measured, and start what is missing. Whether the status has changed.
@@ -119,7 +119,7 @@ class Measuring:
         if self._process is not None:
             self._process.end()
         self._reader = self._process = self._told = None
-        self._rate = Rate(RATE_TIME_CONSTANT_S)
+        self._rate = SmoothedRate(RATE_TIME_CONSTANT_S)
 
     # ---------------------------------------------------------------- what comes in
 
@@ -169,10 +169,10 @@ class Measuring:
         n_new = 0
         for event in process.poll():
             match event:
-                case Measured(clip_index=clip_index, row=row, pair=pair):
+                case PictureMeasured(clip_index=clip_index, row=row, pair=pair):
                     n_new += row is not None
                     rows, pairs = () if row is None else (row,), () if pair is None else (pair,)
-                    self._figures.take(ClipFigures(clip_index, rows, pairs))
+                    self._figures.take(ClipMeasurements(clip_index, rows, pairs))
                 case Trouble(message=message):
                     self._say(message)
                 case MeasuringEnded():

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from app.residuals.figures import PairFigures, RowFigures
-from app.residuals.measuring_order import Look
+from app.residuals.measuring_order import MeasuringFocus
 from engine.backends.table import chosen_name
 
 
@@ -33,7 +33,7 @@ class MeasureJob(msgspec.Struct, frozen=True, eq=False):
     rows: np.ndarray
     pairs: np.ndarray
     is_kept: bool
-    look: Look
+    look: MeasuringFocus
     share: float = 1.0
     backend: str = msgspec.field(default_factory=chosen_name)
 
@@ -41,7 +41,7 @@ class MeasureJob(msgspec.Struct, frozen=True, eq=False):
 class LookAt(msgspec.Struct, frozen=True, tag=True):
     """The user looks at something else."""
 
-    look: Look
+    look: MeasuringFocus
 
 
 class SetShare(msgspec.Struct, frozen=True, tag=True):
@@ -50,7 +50,7 @@ class SetShare(msgspec.Struct, frozen=True, tag=True):
     share: float
 
 
-class Measured(msgspec.Struct, frozen=True, tag=True):
+class PictureMeasured(msgspec.Struct, frozen=True, tag=True):
     """A picture, or two neighbouring frames."""
 
     clip_index: int
@@ -69,4 +69,4 @@ class MeasuringEnded(msgspec.Struct, frozen=True, tag=True):
 
 
 Command = LookAt | SetShare
-Event = Measured | Trouble | MeasuringEnded
+Event = PictureMeasured | Trouble | MeasuringEnded

@@ -12,7 +12,7 @@ Item = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class MeasuringFocus:
     """What the user looks at.
 
     Attributes:
@@ -24,7 +24,7 @@ class Look:
     camera_index: int | None = None
 
 
-def first_item(items: Iterable[Item], look: Look, holdout: Collection[int]) -> Item | None:
+def first_item(items: Iterable[Item], look: MeasuringFocus, holdout: Collection[int]) -> Item | None:
     """The item to measure first; None without items.
 
     Args:
@@ -34,7 +34,7 @@ def first_item(items: Iterable[Item], look: Look, holdout: Collection[int]) -> I
     return min(items, key=lambda item: _rank(item, look, holdout), default=None)
 
 
-def _rank(item: Item, look: Look, holdout: Collection[int]) -> tuple[int, int, int, int, int]:
+def _rank(item: Item, look: MeasuringFocus, holdout: Collection[int]) -> tuple[int, int, int, int, int]:
     clip_index, camera_index = item
     distance = abs(clip_index - look.clip_index)
     group = 0 if camera_index == look.camera_index else 1 if camera_index in holdout else 2

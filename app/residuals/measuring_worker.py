@@ -16,7 +16,7 @@ import numpy as np
 
 from app.background.kernels import use_threads
 from app.background.logs import start_logging
-from app.evaluation.evaluation import Scope, kept_figures
+from app.evaluation.evaluation import EvaluationScope, kept_figures
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.kept_figures import KeptFigures
 from app.project.opening.project_access import open_project
@@ -25,12 +25,12 @@ from app.residuals.kept_reading import WINDOW_METRICS
 from app.residuals.measuring_messages import (
     Event,
     LookAt,
-    Measured,
     MeasureJob,
+    PictureMeasured,
     SetShare,
     Trouble,
 )
-from app.residuals.measuring_order import Item, Look, first_item
+from app.residuals.measuring_order import Item, MeasuringFocus, first_item
 from engine.backends.table import choose_backend
 from engine.capture.capture import open_capture
 from engine.children.child import Parent
@@ -66,7 +66,7 @@ class Talking(Protocol):
     """What the process hears and says, and when it rests."""
 
     @property
-    def look(self) -> Look:
+    def look(self) -> MeasuringFocus:
         """What the user looks at."""
         ...
 
@@ -93,7 +93,7 @@ class Talk:
         self._cpu_s = 0.0  # what was computed before it began counts too
 
     @property
-    def look(self) -> Look:
+    def look(self) -> MeasuringFocus:
         """See `Talking`."""
         return self._look
 
@@ -136,7 +136,7 @@ class _Clips:
 
     def __init__(self, opened: TrainedProject, job: MeasureJob, talk: Talking) -> None:
         self._opened, self._talk = opened, talk
-        self._scope = Scope(job.trained, range(len(opened.capture.rig)), WINDOW_METRICS, "float")
+        self._scope = EvaluationScope(job.trained, range(len(opened.capture.rig)), WINDOW_METRICS, "float")
         self._is_kept = job.is_kept
         self._loaded: OrderedDict[int, TrainedClip] = OrderedDict()
         self._figures: OrderedDict[int, KeptFigures] = OrderedDict()
@@ -249,7 +249,7 @@ def _take(
 ) -> None:
     if isinstance(found, EvalRow):
         rows[found.frame_index, camera] = False
-        talk.send(Measured(clip_index, row=row_figures(found, camera)))
+        talk.send(PictureMeasured(clip_index, row=row_figures(found, camera)))
     else:
         pairs[found.frame_index, camera] = False
-        talk.send(Measured(clip_index, pair=pair_figures(found, camera)))
+        talk.send(PictureMeasured(clip_index, pair=pair_figures(found, camera)))

@@ -17,7 +17,7 @@ from app.residuals.anchor_heat import AnchorHeat, AnchorHeats
 from app.residuals.clip_pictures import ClipPictures
 from app.residuals.heat import Heat, HeatRequest
 from app.residuals.heat_map import HeatMap
-from app.residuals.measuring import Measuring
+from app.residuals.measuring import BackgroundMeasuring
 from app.residuals.measuring_process import LaunchMeasuring, MeasuringProcess
 from app.status import ResidualStatus
 from engine.errors import EngineError, ProjectError
@@ -42,7 +42,7 @@ class Residuals:
         self._pictures = ClipPictures(playback.decoder)
         self._heat = Heat(playback, self._pictures, self._why_none)
         self._anchors = AnchorHeats(playback, self._pictures, self._why_none)
-        self.measuring = Measuring(launch=launch, clock=clock)
+        self.measuring = BackgroundMeasuring(launch=launch, clock=clock)
         self._opened: OpenedProject | None = None
         self._catalog: ClipCatalog | None = None
         self._seen = self._finished

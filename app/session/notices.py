@@ -62,7 +62,7 @@ class Notices:
 
     def add_error(self, title: str, error: EngineError) -> Notice:
         """A failure the user can act on; every problem of a capture is listed."""
-        return self.add("error", title, *error.told_apart())
+        return self.add("error", title, *error.parts())
 
     def add_failure(self, title: str, error: Exception) -> Notice:
         """A failure of any kind; one that the user cannot act on is a bug in the program, and is logged."""

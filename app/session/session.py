@@ -46,7 +46,7 @@ from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
-from app.session.editing.selecting import Selecting
+from app.session.editing.selecting import ProjectSelecting
 from app.session.editing.selection_status import SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exclusions.excluding import apply_exclusion
@@ -56,7 +56,7 @@ from app.session.files.file_commands import SaveProjectAs
 from app.session.files.project_files import ProjectFiles
 from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
-from app.session.mending.mending import Mending
+from app.session.mending.mending import ProjectMending
 from app.session.notices import Notices
 from app.session.paths.camera_paths import CameraPaths
 from app.session.projects.project_opener import ProjectOpener
@@ -164,9 +164,9 @@ class Session(SessionFace):
         self.residuals = Residuals(self.playback)
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
         self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
-        self.mending = Mending(self.live_training, lambda: self.overlays)
+        self.mending = ProjectMending(self.live_training, lambda: self.overlays)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
-        self.selecting = Selecting(
+        self.selecting = ProjectSelecting(
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self._shown_as)
         )
         self.selection = SelectionStatus()

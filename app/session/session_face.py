@@ -9,7 +9,7 @@ import numpy as np
 from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
-from app.playback.modes.coverage import Coverage
+from app.playback.modes.coverage import CoveredSpace
 from app.playback.modes.trails import Trails
 from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.playback import Playback
@@ -26,7 +26,7 @@ from app.session.captures.capture_doctor import CaptureDoctor
 from app.session.captures.doctor_status import DoctorStatus
 from app.session.clips.clip_work import ClipWork
 from app.session.editing.kept_document import KeptDocument
-from app.session.editing.selecting import Selecting
+from app.session.editing.selecting import ProjectSelecting
 from app.session.training.clip_versions import Versions
 from app.session.training.live_training import LiveTraining
 from app.status import (
@@ -44,7 +44,7 @@ from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
-from engine.editing.selection.ranges import Spread
+from engine.editing.selection.ranges import ValueSpread
 from engine.editing.selection.seen_from import SeenFrom
 
 
@@ -62,7 +62,7 @@ class SessionFace:
     live_training: LiveTraining
     versions: Versions
     clip_work: ClipWork
-    selecting: Selecting
+    selecting: ProjectSelecting
     log: LogView
     _jobs: Jobs
 
@@ -185,7 +185,7 @@ class SessionFace:
         """Where selected Gaussians are seen; see Selecting.share."""
         return self.selecting.share(gaussians, view, self.views.current_index)
 
-    def attribute_spread(self, attribute: str) -> Spread | None:
+    def attribute_spread(self, attribute: str) -> ValueSpread | None:
         """How an attribute is spread over the shown frame; see Selecting.spread."""
         return self.selecting.spread(attribute)
 
@@ -194,7 +194,7 @@ class SessionFace:
         shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.anchors
 
-    def shown_coverage(self) -> Coverage | None:
+    def shown_coverage(self) -> CoveredSpace | None:
         """What inherited anchors cover; see Playback.coverage."""
         return self.playback.coverage(self.timeline)
 

@@ -106,7 +106,7 @@ class ProcessWorker:
         try:
             self.child.result()
         except EngineError as error:
-            return TrainingFailed(type(error).__name__, *error.told_apart())
+            return TrainingFailed(type(error).__name__, *error.parts())
         except ChildFailed as error:
             reason = str(error)
         return WorkerDied(reason, tail(self._log_path))

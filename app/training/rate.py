@@ -8,7 +8,7 @@ TIME_CONSTANT_S = 5.0
 """Older speeds fade with this time constant, so that the estimate follows a change of phase within seconds."""
 
 
-class Rate:
+class SmoothedRate:
     """Smoothed units per second. The caller supplies the clock, so that tests need none."""
 
     def __init__(self, time_constant_s: float = TIME_CONSTANT_S) -> None:

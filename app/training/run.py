@@ -22,8 +22,8 @@ from app.project.clips.metrics_file import read_metrics
 from app.project.clips.stage_seconds import memory_of, stages_of
 from app.project.opening.project_access import open_project
 from app.project.project import Project
+from app.training.disk_retries import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.interface import MakeTraining, Training
-from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
     ClipTrained,
     Command,
@@ -45,7 +45,7 @@ from app.training.messages import (
     WarningRaised,
     WorkerReady,
 )
-from app.training.rate import Rate
+from app.training.rate import SmoothedRate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch
 from engine.children.kind import Unwanted
@@ -128,7 +128,7 @@ class TrainingRun:
         """Of all steps of this process."""
         self._n_clipped = 0
         """Those of them whose gradients were scaled down."""
-        self._rate = Rate()
+        self._rate = SmoothedRate()
         self._watch = StageWatch(clock)
         self._memory_before_mb = 0.0
         """Most that earlier runs of the same training held."""
@@ -513,7 +513,7 @@ class TrainingRun:
         logger.error("clip %d failed: %s", self._job.clip_index, trace)
         message, hint = str(error), ""
         if isinstance(error, EngineError):
-            message, hint = error.told_apart()
+            message, hint = error.parts()
         elif isinstance(error, MemoryError):
             message, hint = "There is not enough memory.", "Use a smaller scale or fewer points."
         else:

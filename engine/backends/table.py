@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 
-class Entry(NamedTuple):
+class BackendEntry(NamedTuple):
     """A back end in the table.
 
     Attributes:
@@ -38,8 +38,8 @@ class Entry(NamedTuple):
 AUTO = "auto"
 """The first of the table that works on this machine."""
 BACKENDS = {
-    "cpu": Entry("engine.backends.cpu.backend:CpuBackend", "compiled kernels on the CPU"),
-    "reference": Entry(
+    "cpu": BackendEntry("engine.backends.cpu.backend:CpuBackend", "compiled kernels on the CPU"),
+    "reference": BackendEntry(
         "engine.backends.reference.backend:ReferenceBackend", "plain torch, many times slower", has_devices=True
     ),
 }
@@ -102,7 +102,7 @@ def _best() -> Backend:
     raise ProjectError("No back end works on this machine.", hint="`clipgstream doctor` shows what is missing.")
 
 
-def _entry(name: str) -> tuple[Entry, str]:
+def _entry(name: str) -> tuple[BackendEntry, str]:
     """Row and device of a name."""
     kind, _, device = name.partition(":")
     entry = BACKENDS.get(kind)

@@ -14,14 +14,14 @@ import numpy as np
 from engine.calibration.calibrate import CalibrationJob
 from engine.calibration.calibrated import Calibration
 from engine.calibration.finishing import finished
-from engine.calibration.matching.looking import key_points as looked_for
+from engine.calibration.matching.feature_processes import key_points as looked_for
 from engine.calibration.matching.matching import KeyPoints, all_pairs, match_all
 from engine.calibration.matching.pictures import matching_size, read_pictures
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import WHAT_TO_DO, PairCounts, pair_lines
-from engine.calibration.solving.agreement import Agreement, agreement
+from engine.calibration.solving.agreement import MatchAgreement, agreement
 from engine.calibration.solving.mapping import FirstEstimate, focals_to_try, map_cameras, verified_matches
-from engine.calibration.solving.solving import FINE, ROUGH, Solution, solve
+from engine.calibration.solving.solving import FINE, ROUGH, CalibrationSolution, solve
 from engine.calibration.stages import StageProgress
 from engine.calibration.videos import PlainVideo, common_length, find_videos
 from engine.children.child import Parent
@@ -78,16 +78,16 @@ def calibrate_here(
 
 def _best_solution(
     scratch, key_points, matches, verified, sizes, options: CalibrationOptions, progress: StageProgress
-) -> Solution | None:
+) -> CalibrationSolution | None:
     """Of many starts, alike and unlike, the one that explains most of the verified matches."""
 
-    def judged(one: FirstEstimate | Solution) -> Agreement:
+    def judged(one: FirstEstimate | CalibrationSolution) -> MatchAgreement:
         return agreement(one.rows, one.cameras, key_points, verified, float(sizes.max()))
 
-    def worth(one: FirstEstimate | Solution) -> int:
+    def worth(one: FirstEstimate | CalibrationSolution) -> int:
         return int(judged(one).n_explained.sum()) // 2
 
-    def is_clean(one: FirstEstimate | Solution) -> bool:
+    def is_clean(one: FirstEstimate | CalibrationSolution) -> bool:
         return len(one.rows) == len(sizes) and bool(judged(one).is_plausible.all())
 
     focals = focals_to_try(options.lens)
@@ -107,7 +107,7 @@ def _best_solution(
         )[:1]
     estimates.sort(key=worth, reverse=True)
     chosen = {"lens": options.lens, "is_shared": options.is_lens_shared}
-    best: Solution | None = None
+    best: CalibrationSolution | None = None
     for number, estimate in enumerate(estimates[:N_TRIED_ON]):
 
         def adjusted(share: float, number: int = number) -> None:

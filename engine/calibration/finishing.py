@@ -8,9 +8,9 @@ from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCam
 from engine.calibration.matching.matching import KeyPoints, Pair, all_pairs
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import FEW_MATCHES, PairCounts
-from engine.calibration.solving.agreement import MIN_AGREEING, Agreement, agreement
+from engine.calibration.solving.agreement import MIN_AGREEING, MatchAgreement, agreement
 from engine.calibration.solving.cameras import Cameras
-from engine.calibration.solving.solving import Solution
+from engine.calibration.solving.solving import CalibrationSolution
 from engine.calibration.solving.strain import is_strained
 from engine.calibration.solving.world import find_up, known_scale, unit_scale, upright
 from engine.calibration.videos import MIN_CAMERAS, PlainVideo
@@ -27,7 +27,7 @@ LENS_MODEL: dict[str, LensModel] = {"simple": "opencv", "opencv": "opencv", "fis
 
 
 def finished(
-    solution: Solution,
+    solution: CalibrationSolution,
     videos: list[PlainVideo],
     key_points: list[KeyPoints],
     verified: dict[Pair, np.ndarray],
@@ -65,7 +65,7 @@ def finished(
     return Calibration(found, missing, tuple(warnings), _failure(agreed), _pairs(names, agreed))
 
 
-def _doubts(names: list[str], n_sightings: np.ndarray, agreed: Agreement, strained: np.ndarray) -> list[str]:
+def _doubts(names: list[str], n_sightings: np.ndarray, agreed: MatchAgreement, strained: np.ndarray) -> list[str]:
     """Why each camera may be misplaced; empty for those that nothing speaks against."""
     is_placed, doubts = agreed.is_placed, []
     for row, n in enumerate(n_sightings.tolist()):
@@ -85,13 +85,13 @@ def _doubts(names: list[str], n_sightings: np.ndarray, agreed: Agreement, strain
     return doubts
 
 
-def _strongest(row: int, names: list[str], agreed: Agreement) -> str:
+def _strongest(row: int, names: list[str], agreed: MatchAgreement) -> str:
     other = int(agreed.n_matches[row].argmax())
     n, n_explained = int(agreed.n_matches[row, other]), int(agreed.n_explained[row, other])
     return f"{n_explained} of its {n} matches with {names[other]} are explained"
 
 
-def _failure(agreed: Agreement) -> str:
+def _failure(agreed: MatchAgreement) -> str:
     """Why nothing of it can be trusted; empty where most cameras hold together."""
     n, n_placed = len(agreed.is_placed), int(agreed.is_placed.sum())
     if n_placed >= max(MIN_CAMERAS, (1 - MAX_DOUBTFUL) * n):
@@ -99,7 +99,7 @@ def _failure(agreed: Agreement) -> str:
     return f"Matches contradict the positions of {n - n_placed} of {n} cameras, so none of them can be trusted."
 
 
-def _pairs(names: list[str], agreed: Agreement) -> tuple[PairCounts, ...]:
+def _pairs(names: list[str], agreed: MatchAgreement) -> tuple[PairCounts, ...]:
     return tuple(
         PairCounts(names[a], names[b], int(agreed.n_matches[a, b]), int(agreed.n_explained[a, b]))
         for a, b in all_pairs(len(names))

@@ -21,8 +21,8 @@ from engine.doctor.checks.movement import check_movement
 from engine.doctor.checks.synchronisation import check_synchronisation
 from engine.doctor.epipolar import PairError, pair_errors
 from engine.doctor.finding import Finding, in_order
-from engine.doctor.looking import Look, look_at
 from engine.doctor.neighbours import neighbour_pairs
+from engine.doctor.picture_survey import PictureSurvey, look_at
 from engine.doctor.quick import check_numbers
 from engine.features.matching import match_pairs
 from engine.freed_memory import return_freed_memory
@@ -137,7 +137,7 @@ def _in_turn(tell: Callable[[float, str], None]) -> ReportProgress:
 
 
 def _compare(
-    look: Look, tell_match: Callable[[float, str], None], tell_fit: Callable[[float, str], None]
+    look: PictureSurvey, tell_match: Callable[[float, str], None], tell_fit: Callable[[float, str], None]
 ) -> tuple[list[Finding], list[PairError], np.ndarray]:
     """Match backgrounds of neighbours and judge the calibration by them."""
     rig = look.capture.rig

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from engine.capture.capture import ONE_PASS_CACHE_BYTES, Capture
 from engine.capture.frames import DECODER_BYTES_PER_PIXEL, MAX_DECODER_BYTES
-from engine.doctor.looking import BACKGROUND_ROWS, MATCH_WIDTH_PX, frames_to_look_at
+from engine.doctor.picture_survey import BACKGROUND_ROWS, MATCH_WIDTH_PX, frames_to_look_at
 from engine.features.matching import matching_bytes
 from engine.parallel import n_cores
 

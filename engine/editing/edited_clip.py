@@ -23,7 +23,7 @@ from engine.editing.clip_rows import ClipRows, NamedSet
 from engine.editing.effects import NO_EFFECTS, Effect, Effects
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.over_time import Chosen, IndexedGaussians, held, smoothed
-from engine.editing.selecting import Selecting
+from engine.editing.selecting import TargetFinder
 from engine.editing.still_part import StillPart
 from engine.model.clip_model import ClipModel
 from engine.model.host_array import host_array
@@ -64,7 +64,7 @@ class EditedClip:
     def __init__(self, model: ClipModel, clip: Clip, named: Mapping[str, NamedSet]) -> None:
         self.model, self.clip = model, clip
         self.rows = ClipRows(model, named)
-        self._selecting = Selecting(self.rows, model.backend.device)
+        self._selecting = TargetFinder(self.rows, model.backend.device)
         n_still, k = model.n_constant_rows(), model.decoder.gaussians_per_anchor
         self._still_roles: list[str] = []
         for role in model.roles():  # the leading ones

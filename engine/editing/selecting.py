@@ -17,7 +17,7 @@ MAX_TABLES = 64
 """Sets of picked Gaussians that are kept unpacked, a byte per Gaussian of the clip."""
 
 
-class Selecting:
+class TargetFinder:
     """Targets looked up in one clip. For one thread.
 
     Args:

@@ -12,7 +12,7 @@ from torch import Tensor
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.changed_gaussians import faded, recolored, transformed
 from engine.editing.effects import Effects
-from engine.editing.selecting import Selecting
+from engine.editing.selecting import TargetFinder
 from engine.model.host_array import host_array
 from engine.raster.gaussians import Gaussians
 
@@ -44,7 +44,7 @@ class StillPart:
         lit: Callable[[float], Gaussians],
         index: np.ndarray,
         effects: Effects,
-        selecting: Selecting,
+        selecting: TargetFinder,
         *,
         held_time: Callable[[Hold], float],
         has_light: bool,

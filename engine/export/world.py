@@ -21,7 +21,7 @@ AXES: dict[str, tuple[float, float, float]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class World:
+class FileWorld:
     """A rotation and a scale from the capture's coordinates to those of a file.
 
     Attributes:
@@ -56,7 +56,7 @@ class World:
         )
 
 
-def world(scene_up: np.ndarray, *, up: str | None = None, scale: float = 1.0, is_rub: bool = False) -> World:
+def world(scene_up: np.ndarray, *, up: str | None = None, scale: float = 1.0, is_rub: bool = False) -> FileWorld:
     """How a scene is placed in files.
 
     Args:
@@ -77,7 +77,7 @@ def world(scene_up: np.ndarray, *, up: str | None = None, scale: float = 1.0, is
     words.append("scale as in the capture" if scale == 1.0 else f"{scale:g} units per unit of the capture")
     found = rotation @ (scene_up / np.linalg.norm(scene_up))
     x, y, z = (float(value) for value in found)
-    return World(rotation, scale, (x, y, z), ", ".join(words))
+    return FileWorld(rotation, scale, (x, y, z), ", ".join(words))
 
 
 def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ _TOUCHED = 0.5 / 255.0
 """Where static anchors alone show the same within this, nothing that can move has a part in the picture."""
 
 
-class Diagnosis(msgspec.Struct, frozen=True):
+class SeamDiagnosis(msgspec.Struct, frozen=True):
     """Mean excess change of pixels that stand still, from one frame to the next, in 1/255.
 
     Attributes:
@@ -52,7 +52,9 @@ class Diagnosis(msgspec.Struct, frozen=True):
         return "Moving anchors jump where nothing moves."
 
 
-def diagnose(capture: Capture, clips: Mapping[int, TrainedClip], stretch: Stretch, cameras: Sequence[int]) -> Diagnosis:
+def diagnose(
+    capture: Capture, clips: Mapping[int, TrainedClip], stretch: Stretch, cameras: Sequence[int]
+) -> SeamDiagnosis:
     """Look at the worst pair of a stretch: a boundary, or all of its pairs together.
 
     Args:
@@ -68,7 +70,7 @@ def diagnose(capture: Capture, clips: Mapping[int, TrainedClip], stretch: Stretc
         for camera in (cameras[i] for i in chosen):
             found.append(_of_pair(capture, (shown[0], shown[1]), frame, camera))
     everything, still, plain = np.mean(found, axis=0) if found else np.zeros(3)
-    return Diagnosis(float(everything), float(still), float(max(everything - plain, 0.0)))
+    return SeamDiagnosis(float(everything), float(still), float(max(everything - plain, 0.0)))
 
 
 def _clip_of(clips: Mapping[int, TrainedClip], frame: int) -> TrainedClip | None:

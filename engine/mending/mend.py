@@ -17,7 +17,7 @@ from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.compact import CompactClip
 from engine.errors import ProjectError
-from engine.mending.diagnosis import Diagnosis, diagnose
+from engine.mending.diagnosis import SeamDiagnosis, diagnose
 from engine.mending.figures import Attempt, StretchFigures
 from engine.mending.measuring import StretchMeasuring, Threads
 from engine.mending.remedies import MakeTraining, faded, relit
@@ -51,7 +51,7 @@ class Mended:
     after: StretchFigures
     attempts: tuple[Attempt, ...]
     clips: dict[int, CompactClip]
-    diagnosis: Diagnosis
+    diagnosis: SeamDiagnosis
 
     @property
     def advice(self) -> str:
@@ -63,7 +63,7 @@ class Mended:
         return f"More than half of the excess flicker is left. Retrain {which}, perhaps with more steps."
 
 
-class Mending:
+class StretchMending:
     """Mends one stretch.
 
     Args:

@@ -20,7 +20,7 @@ from engine.synchronisation.epipolar import epipolar_curves
 from engine.synchronisation.motion_energy import motion_curves
 from engine.synchronisation.motion_pictures import MotionPictures, evenly, motion_pictures
 from engine.synchronisation.recording import Recording, recordings_of
-from engine.synchronisation.solving import Solution, solve_curves
+from engine.synchronisation.solving import OffsetSolution, solve_curves
 from engine.synchronisation.synchronisation import Estimate, SourceName, Synchronisation
 from engine.synchronisation.tags import tag_estimates
 
@@ -117,7 +117,7 @@ def _look(
     return motions, starts
 
 
-def _visual(source: SourceName, solution: Solution, n_curves: int, own_sigma: float) -> Estimate:
+def _visual(source: SourceName, solution: OffsetSolution, n_curves: int, own_sigma: float) -> Estimate:
     """The answer of pictures as an estimate."""
     n_known = int((solution.groups >= 0).sum())
     if n_known == 0:

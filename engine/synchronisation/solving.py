@@ -31,7 +31,7 @@ AGREE_FRAMES = 0.75
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class OffsetSolution:
     """One offset per camera.
 
     Attributes:
@@ -49,7 +49,7 @@ class Solution:
     agreements: np.ndarray
 
 
-def solve_curves(n_cameras: int, curves: Sequence[PairCurve]) -> Solution:
+def solve_curves(n_cameras: int, curves: Sequence[PairCurve]) -> OffsetSolution:
     """Offsets of all cameras from the curves of pairs."""
     telling = [curve for curve in curves if _prominence(curve) >= MIN_PROMINENCE and curve.scores.max() >= MIN_SCORE]
     telling.sort(key=_prominence, reverse=True)
@@ -61,7 +61,7 @@ def solve_curves(n_cameras: int, curves: Sequence[PairCurve]) -> Solution:
     return solve_pairs(n_cameras, pairs)
 
 
-def solve_pairs(n_cameras: int, pairs: Sequence[PairOffset]) -> Solution:
+def solve_pairs(n_cameras: int, pairs: Sequence[PairOffset]) -> OffsetSolution:
     """Offsets of all cameras from one measurement per pair, of which some are wrong."""
     groups = _groups(n_cameras, [(pair.first, pair.second) for pair in pairs])
     offsets, sigmas = np.full((2, n_cameras), np.nan)
@@ -79,7 +79,7 @@ def solve_pairs(n_cameras: int, pairs: Sequence[PairOffset]) -> Solution:
             agreeing[camera] += weight * (error <= max(AGREE_FRAMES, OUTLIER_SIGMAS * pair.sigma_frames))
     has_pairs = weights > 0
     agreements[has_pairs] = agreeing[has_pairs] / weights[has_pairs]
-    return Solution(offsets, sigmas, groups, tuple(pairs), agreements)
+    return OffsetSolution(offsets, sigmas, groups, tuple(pairs), agreements)
 
 
 def common_zero(offsets_frames: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from engine.raster.gaussians import Gaussians
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class GaussianScene:
     """Gaussians and one camera; `arguments` are the positional arguments of `rasterize` after the Gaussians."""
 
     gaussians: Gaussians
@@ -60,17 +60,19 @@ def gaussians_of(
     return Gaussians(*(torch.from_numpy(np.asarray(column, np.float32).copy()).double() for column in columns))
 
 
-def simple_scene(gaussians: Gaussians, *, width: int = 160, height: int = 120, **changes: Any) -> Scene:
+def simple_scene(gaussians: Gaussians, *, width: int = 160, height: int = 120, **changes: Any) -> GaussianScene:
     """The Gaussians seen by a camera at the origin."""
     values: dict[str, Any] = {
         "viewmats": torch.eye(4, dtype=torch.float64)[None],
         "Ks": camera(width, height),
         "background": torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64),
     }
-    return Scene(gaussians=gaussians, width=width, height=height, **(values | changes))
+    return GaussianScene(gaussians=gaussians, width=width, height=height, **(values | changes))
 
 
-def layered_scene(n_rows: int, width: int, height: int, size_px: float, *, faint: bool = False, seed: int = 0) -> Scene:
+def layered_scene(
+    n_rows: int, width: int, height: int, size_px: float, *, faint: bool = False, seed: int = 0
+) -> GaussianScene:
     """Gaussians spread over image and depth, log-normal anisotropic sizes, seen from a general pose.
 
     Args:

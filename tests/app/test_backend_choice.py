@@ -11,7 +11,15 @@ from app.session.projects.preferences import Preferences
 from app.training.messages import TrainJob
 from engine.backends import table
 from engine.backends.reference.backend import ReferenceBackend
-from engine.backends.table import AUTO, BACKENDS, Entry, backend_called, choose_backend, chosen_name, process_backend
+from engine.backends.table import (
+    AUTO,
+    BACKENDS,
+    BackendEntry,
+    backend_called,
+    choose_backend,
+    chosen_name,
+    process_backend,
+)
 from engine.errors import ProjectError
 from engine.kernels import compile_ahead
 
@@ -35,7 +43,7 @@ def unfit(monkeypatch) -> str:
     """A back end that is the first of the table and does not work here."""
     others = dict(BACKENDS)
     BACKENDS.clear()
-    monkeypatch.setitem(BACKENDS, "unfit", Entry(f"{__name__}:Unfit", "none"))
+    monkeypatch.setitem(BACKENDS, "unfit", BackendEntry(f"{__name__}:Unfit", "none"))
     BACKENDS.update(others)
     return "unfit"
 

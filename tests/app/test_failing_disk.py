@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from app.project.clips.clip_versions import list_versions
-from app.training import keeping
+from app.training import disk_retries
 from app.training import messages as m
 from app.training.messages import Pause, SnapshotConsumed, Stop
 from engine.clip_files.clip_state import read_clip_state
@@ -211,7 +211,7 @@ def test_without_a_window_it_gives_up_after_some_tries_and_the_same_command_fini
 def test_where_nothing_can_be_kept_it_waits_longer_and_says_so(bench, monkeypatch):
     it = without_window(bench(n_steps=5))
     Disk(monkeypatch, "clips", "checkpoints")
-    assert it.steps(int(keeping.PATIENCE_UNKEPT_S) - 5) is True
+    assert it.steps(int(disk_retries.PATIENCE_UNKEPT_S) - 5) is True
     assert "in memory only" in it.of(m.WarningRaised)[-1].detail
     assert it.steps(60) is False
     assert "Step 5 could not be kept; training again starts from the beginning." in it.events[-1].message
@@ -278,7 +278,7 @@ def test_another_folder_in_the_place_of_a_project_is_left_alone(bench, tmp_path)
 
 
 def test_the_command_ends_with_1_deletes_nothing_and_goes_on_with_room(run, capture_folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(keeping, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(disk_retries, "PATIENCE_S", 0.0)
     disk = Disk(monkeypatch, "clips")
     arguments = ("train", capture_folder, "--project", tmp_path / "p")
     code, _, err = run(*arguments)

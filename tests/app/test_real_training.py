@@ -17,7 +17,7 @@ from app.session.projects.settings import Settings
 from app.session.session import Session
 from engine.assets import asset_path
 from engine.backends import table
-from engine.backends.table import AUTO, Entry, backend_called
+from engine.backends.table import AUTO, BackendEntry, backend_called
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.conftest import poll_until
@@ -51,7 +51,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory, built_once: BuiltOnce) -> 
 
 
 def test_a_process_computes_everything_with_its_back_end(trained, tmp_path, monkeypatch):
-    counting = Entry("tests.engine.backends.counting.backend:CountingCpu", "counts")
+    counting = BackendEntry("tests.engine.backends.counting.backend:CountingCpu", "counts")
     # without "cpu", for which nobody may ask
     monkeypatch.setattr(table, "BACKENDS", {"counting": counting, "reference": table.BACKENDS["reference"]})
     monkeypatch.setattr(table, "_chosen", AUTO)

@@ -10,7 +10,7 @@ import pytest
 from app.project.clips.metrics_file import read_metrics
 from app.project.opening.project_access import create_project, default_settings
 from app.training import messages as m
-from app.training.rate import Rate
+from app.training.rate import SmoothedRate
 from app.training.run import CHECKPOINT_EVERY_S, TrainingRun
 from app.training.snapshots import Cadence, keep_clip
 from engine.capture.capture import open_capture
@@ -318,7 +318,7 @@ def test_so_many_steps_are_done_at_once_as_go_into_a_report(tmp_path, capture_fo
 
 
 def test_the_rate_follows_and_leaves_pauses_out():
-    rate = Rate(time_constant_s=5.0)
+    rate = SmoothedRate(time_constant_s=5.0)
     assert rate.eta_s(10) is None
     for second in range(60):
         rate.update(done=4.0 * second, now_s=float(second))

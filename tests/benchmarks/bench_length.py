@@ -31,7 +31,7 @@ from app.evaluation.headless import open_trained
 from app.lab.ablation.running import Callbacks, project_folder, run_ablation
 from app.lab.ablation.variants import FULL, Variant, chosen_variants
 from app.lab.flicker import flicker_figures
-from app.lab.report.charts import Curve, CurvePanel, draw_over_time
+from app.lab.report.charts import ChartLine, CurvePanel, draw_over_time
 from app.project.opening.project_access import default_settings, open_project
 from app.project.project_facts import read_facts
 from app.training.process import ProcessWorker
@@ -214,7 +214,7 @@ def chart(lines: Sequence[dict[str, Any]]) -> bytes:
         for method, words in METHODS.items():
             found = {line["n_frames"]: line.get(name) for line in lines if line["method"] == method}
             if found:
-                curves.append(Curve(words, [found.get(end) for end in ends], is_main=method == "full"))
+                curves.append(ChartLine(words, [found.get(end) for end in ends], is_main=method == "full"))
         panels.append(CurvePanel(COLUMNS[name][0], curves))
     return draw_over_time(panels, ends, (), "frames from the first")
 

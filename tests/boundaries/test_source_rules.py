@@ -44,6 +44,8 @@ BYTES_ONLY = (
     "app/background/children.py",
     "app/export/export_process.py",
     "app/export/export_worker.py",
+    "app/training/process.py",
+    "app/training/worker.py",
 )
 """Modules whose processes are of multiprocessing still; they send bytes that they encode themselves."""
 
@@ -141,6 +143,16 @@ def test_rule_refuses_seeded_source(seeded: str) -> None:
 )
 def test_rule_accepts_innocent_source(innocent: str) -> None:
     assert not list(banned_uses(innocent))
+
+
+def test_a_public_class_name_means_one_thing() -> None:
+    places: dict[str, list[str]] = {}
+    for path in python_files():
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    assert len(places) > 500, "the classes were not found"
+    assert not {name: found for name, found in places.items() if len(found) > 1}
 
 
 def test_tracked_text_holds_no_machine_paths() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.export.jobs.job import Job
+from app.export.jobs.job import ExportJob
 from app.export.jobs.table import KINDS
 from engine.setting import Setting, settings_of
 from tests.documents.table import table
@@ -15,7 +15,7 @@ def export_tables() -> str:
     return "\n\n".join(f"**{job.title}.** {job.about}\n\n{_options(job)}" for job in KINDS.values())
 
 
-def _options(job: type[Job]) -> str:
+def _options(job: type[ExportJob]) -> str:
     rows: list[tuple[str, ...]] = []
     for name, setting in settings_of(job).items():
         rows.append(_row(name, setting, {short: full for full, short in job.formats().items()}))

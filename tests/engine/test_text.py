@@ -29,7 +29,7 @@ def test_values_are_cut_off() -> None:
 
 def test_messages_hold_nothing_that_a_terminal_obeys() -> None:
     error = EngineError("Camera \x1b[2J.", hint="Rename \ud800.", path=Path("/data/a\nb\x1b"))
-    for text in (str(error), *error.told_apart()):
+    for text in (str(error), *error.parts()):
         assert text.isprintable()
         text.encode("utf-8")
     assert "a\\nb\\x1b" in str(error)

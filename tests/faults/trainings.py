@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from app.cli.cli import main
 from app.project.opening.project_access import open_project
-from app.training import keeping, run
+from app.training import disk_retries, run
 from app.training.build import build_training
 from app.training.interface import Training
 from app.training.messages import TrainJob
@@ -171,7 +171,7 @@ def make_training(job: TrainJob, report: ReportProgress) -> Training:
 if CADENCE in os.environ:
     run.CHECKPOINT_EVERY_S = float(os.environ[CADENCE])
 if PATIENCE in os.environ:
-    keeping.PATIENCE_UNKEPT_S = float(os.environ[PATIENCE])
+    disk_retries.PATIENCE_UNKEPT_S = float(os.environ[PATIENCE])
 
 
 def run_command() -> None:

@@ -19,7 +19,7 @@ from app.export.export_plan import ExportPlan
 from app.export.export_status import ExportStatus
 from app.playback.markers import Markers
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
-from app.playback.modes.coverage import Coverage
+from app.playback.modes.coverage import CoveredSpace
 from app.playback.modes.trails import Trails
 from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.picture_source import PictureSource
@@ -72,7 +72,7 @@ from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
 from engine.capture.exclusions import NOTHING_EXCLUDED
 from engine.doctor.finding import Finding
-from engine.editing.selection.ranges import Spread, spread_of
+from engine.editing.selection.ranges import ValueSpread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
 from engine.gate.regions import GateRegion, sphere_region
 
@@ -323,7 +323,7 @@ class FakeSession:
         """Nothing."""
         return None
 
-    def attribute_spread(self, attribute: str) -> Spread | None:
+    def attribute_spread(self, attribute: str) -> ValueSpread | None:
         """Rises evenly from 0 to 1; residuals are not known."""
         return None if attribute in ("error", "flicker") else spread_of(np.linspace(0.0, 1.0, 1000))
 
@@ -543,7 +543,7 @@ class FakeSession:
         """Anchors of trained clips."""
         return self._anchors if self._is_trained() else None
 
-    def shown_coverage(self) -> Coverage | None:
+    def shown_coverage(self) -> CoveredSpace | None:
         """Nothing is measured here."""
         return None
 

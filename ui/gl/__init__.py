@@ -6,7 +6,7 @@ Whoever makes one of these objects releases it, on the thread of its context.
 from ui.gl.camera import NEAR, clip_matrix, resized_K
 from ui.gl.changes import n_changes, note_change
 from ui.gl.context import ContextError, free_dropped, is_software, make_headless_context, renderer_name
-from ui.gl.image import ImageTexture, Rect, fit_rect
+from ui.gl.image import ImageTexture, PixelRect, fit_rect
 from ui.gl.lines import LineRenderer, frusta_lines
 from ui.gl.points import INHERITED_ANCHOR_COLOR, RESIDUAL_ANCHOR_COLOR, PointRenderer
 from ui.gl.splat_renderer import SplatRenderer
@@ -19,8 +19,8 @@ __all__ = [
     "ContextError",
     "ImageTexture",
     "LineRenderer",
+    "PixelRect",
     "PointRenderer",
-    "Rect",
     "SplatRenderer",
     "Target",
     "clip_matrix",

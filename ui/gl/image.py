@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Rect:
+class PixelRect:
     """A rectangle in pixels of a target, y down, from (x0, y0) to (x1, y1)."""
 
     x0: float
@@ -36,7 +36,7 @@ class Rect:
         return self.y1 - self.y0
 
 
-def fit_rect(image_size: tuple[int, int], target_size: tuple[int, int]) -> Rect:
+def fit_rect(image_size: tuple[int, int], target_size: tuple[int, int]) -> PixelRect:
     """The largest centred rectangle of the image's aspect inside the target.
 
     Args:
@@ -46,7 +46,7 @@ def fit_rect(image_size: tuple[int, int], target_size: tuple[int, int]) -> Rect:
     scale = min(target_size[0] / image_size[0], target_size[1] / image_size[1])
     width, height = image_size[0] * scale, image_size[1] * scale
     x0, y0 = (target_size[0] - width) / 2, (target_size[1] - height) / 2
-    return Rect(x0, y0, x0 + width, y0 + height)
+    return PixelRect(x0, y0, x0 + width, y0 + height)
 
 
 class ImageTexture:
@@ -143,7 +143,7 @@ class ImagePainter:
         self._program = load_program(ctx, "image")
         self._quad = ctx.vertex_array(self._program, [])
 
-    def draw(self, target: Target, image: ImageTexture, rect: Rect | None = None) -> None:
+    def draw(self, target: Target, image: ImageTexture, rect: PixelRect | None = None) -> None:
         """Draw an opaque picture.
 
         Args:
@@ -152,7 +152,7 @@ class ImagePainter:
             rect: Where in the target; the whole of it by default.
         """
         width, height = target.size
-        rect = rect or Rect(0, 0, width, height)
+        rect = rect or PixelRect(0, 0, width, height)
         target.use(moderngl.NOTHING)
         image.texture.use(0)
         self._program["image"] = 0

@@ -11,7 +11,7 @@ from typing import Literal
 import moderngl
 
 from ui.gl.changes import note_change
-from ui.gl.image import ImagePainter, ImageTexture, Rect
+from ui.gl.image import ImagePainter, ImageTexture, PixelRect
 from ui.gl.shaders import load_program
 
 Precision = Literal["f1", "f2", "f4"]
@@ -115,7 +115,7 @@ class Target:
         else:
             self.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
 
-    def draw_image(self, image: ImageTexture, rect: Rect | None = None) -> None:
+    def draw_image(self, image: ImageTexture, rect: PixelRect | None = None) -> None:
         """Draw an opaque picture, such as one from the CPU rasterizer, to draw overlays on top of.
 
         Args:

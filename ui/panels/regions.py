@@ -15,7 +15,7 @@ from ui.panels.pieces.widgets import chip, primary_button, text_right, text_warn
 from ui.panels.state import REGIONS, Dispatch, Rect, UiState
 from ui.style import theme
 from ui.style.numbers import format_count
-from ui.style.palette import Palette
+from ui.style.palette import ThemeColors
 from ui.style.theme import Icon
 from ui.viewport.region_tool import REGION_WORDS
 
@@ -154,7 +154,7 @@ def _draw_row(index: int, region: GateRegion, can_mark: bool, ui: UiState) -> bo
     return is_clicked
 
 
-def draw_region_mark(draw: imgui.ImDrawList, middle: ImVec2, treat: str, palette: Palette | None = None) -> None:
+def draw_region_mark(draw: imgui.ImDrawList, middle: ImVec2, treat: str, palette: ThemeColors | None = None) -> None:
     """The small sign of a treatment: a whole ring for static, a dashed one for moving. palette: Not that of panels."""
     color = theme.u32((theme.REGION_COLORS if palette is None else palette.region_colors)[treat])
     if treat == "static":

@@ -13,12 +13,12 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
 from app.session.projects.preferences import Preferences
-from ui.gl.image import Rect as PixelRect
+from ui.gl.image import PixelRect as PixelRect
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.picture.gestures import Navigation
 from ui.panels.timeline.view_state import TimelineView
 from ui.panels.training.curve_view import CurveView
-from ui.panels.wishes import Wishes
+from ui.panels.ui_requests import UiRequests
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.editing.edit_tool import EditTool
@@ -101,7 +101,7 @@ class UiState:
     scale: UiScale = field(default_factory=UiScale)
     preferences: Preferences = field(default_factory=Preferences)
     keys: KeyMap = field(default_factory=KeyMap)
-    wishes: Wishes = field(default_factory=Wishes)
+    wishes: UiRequests = field(default_factory=UiRequests)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
     selecting: SelectTool = field(default_factory=SelectTool)

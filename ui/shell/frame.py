@@ -67,7 +67,7 @@ from ui.shell.dialogs.opening.opening_dialog import OpeningDialog
 from ui.shell.dialogs.questions import QuestionDialogs
 from ui.shell.dialogs.synchronisation_dialog import SynchronisationDialog
 from ui.shell.finding.help_sheet import HelpSheet
-from ui.shell.finding.palette import Palette
+from ui.shell.finding.palette import ActionPalette
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout.layout import hold_sizes, is_laid_out, lay_out
 from ui.shell.layout.layouts import Layouts
@@ -81,7 +81,7 @@ from ui.style import theme
 from ui.style.fonts import load_fonts
 from ui.style.theme_in_use import ThemeInUse
 from ui.style.ui_scale import UiScale
-from ui.viewport.scene import Scene
+from ui.viewport.scene import ViewportScene
 
 FIRST_FRAMES = 6
 """A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
@@ -140,7 +140,7 @@ class Frame:
         self._theme.follow(values.theme)
         rows = RecentRows(lambda: ImageTexture(ctx))
         self.guard = Guard(lambda: session.notices, self.request_redraw)
-        self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)), rows, self.guard)
+        self.viewport = ViewportPanel(lambda: PicturePane(ViewportScene(ctx), HeatOverlay(ctx)), rows, self.guard)
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
         self.doctor = DoctorPanel(lambda: ImageTexture(ctx))
@@ -152,7 +152,7 @@ class Frame:
         self.synchronisation = SynchronisationDialog()
         self.export = ExportDialog()
         self.opening = OpeningDialog(lambda: ImageTexture(ctx))
-        self.palette = Palette()
+        self.palette = ActionPalette()
         self.help_sheet = HelpSheet()
         self.preferences = PreferencesDialog()
         self.layouts = Layouts()

@@ -18,7 +18,7 @@ VOID = rgb(18, 20, 24)
 
 
 @dataclass(frozen=True, slots=True)
-class Palette:
+class ThemeColors:
     """All colours of one theme. `ui.style.theme` offers those in use under the same names in capitals.
 
     Attributes:
@@ -88,7 +88,7 @@ class Palette:
         }
 
 
-DARK = Palette(
+DARK = ThemeColors(
     name="dark",
     is_light=False,
     backdrop=rgb(24, 27, 32),
@@ -121,7 +121,7 @@ DARK = Palette(
 
 _SKY, _ORANGE, _GREEN = rgb(0, 92, 148), rgb(133, 81, 0), rgb(0, 98, 71)
 _VERMILLION, _PURPLE = rgb(160, 56, 0), rgb(139, 60, 106)
-LIGHT = Palette(
+LIGHT = ThemeColors(
     name="light",
     is_light=True,
     backdrop=rgb(231, 234, 239),

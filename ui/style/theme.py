@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from ui.style.colors import Color
 from ui.style.colors import rgb as rgb  # looked up as theme.rgb by the panels
-from ui.style.palette import DARK, PALETTES, Palette, contrast
+from ui.style.palette import DARK, PALETTES, ThemeColors, contrast
 
 
 def faded(color: Color, alpha: float) -> Color:
@@ -65,18 +65,18 @@ SWITCHED = tuple(name for name in dict(globals()) if name.isupper() and hasattr(
 """Names of the colours that `use` changes."""
 
 
-def use(palette: Palette) -> None:
+def use(palette: ThemeColors) -> None:
     """Draw everything in these colours from now on. Needs the contexts of ImGui and ImPlot."""
     take(palette)
     apply_style()
 
 
-def take(palette: Palette) -> None:
+def take(palette: ThemeColors) -> None:
     """Make these the colours in use, without telling ImGui."""
     globals().update({name: getattr(palette, name.lower()) for name in SWITCHED})
 
 
-def named(name: str) -> Palette:
+def named(name: str) -> ThemeColors:
     """The palette of this name; the dark one where there is none."""
     return PALETTES.get(name, DARK)
 

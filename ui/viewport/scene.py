@@ -118,7 +118,7 @@ class CapturedPicture:
     shown_as: ShownAs | None = None
 
 
-class Scene:
+class ViewportScene:
     """Owns the target, the renderers and the captured picture's texture. GL thread only."""
 
     def __init__(self, ctx: moderngl.Context) -> None:

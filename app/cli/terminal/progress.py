@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from app.training.rate import Rate
+from app.training.rate import SmoothedRate
 from engine.text import duration_text, printable
 
 BAR_WIDTH = 24
@@ -82,7 +82,7 @@ class ProgressLine:
 
 def row_progress(line: ProgressLine, stage: str) -> Callable[[int, int, Any], None]:
     """A callback for done, all and what was done last, which shows a stage and how long it will take."""
-    rate = Rate()
+    rate = SmoothedRate()
 
     def show(done: int, n: int, _row: Any) -> None:
         rate.update(done, time.monotonic())

@@ -18,9 +18,9 @@ from typing import Any
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS
-from app.evaluation.speed.laps import Rate, camera_of, enough, frames_of, rate_of
+from app.evaluation.speed.laps import RenderRate, camera_of, enough, frames_of, rate_of
 from app.evaluation.speed.rasterizing import rasterized_laps, rasterizing
-from app.evaluation.speed.window_drawing import Drawn, drawn_laps
+from app.evaluation.speed.window_drawing import WindowLaps, drawn_laps
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
 from engine.storage.typed_json import to_type
 
@@ -50,8 +50,8 @@ class FrameRates:
     camera: str
     width: int
     height: int
-    cpu: Rate | None
-    gl: Rate | None
+    cpu: RenderRate | None
+    gl: RenderRate | None
     why_no_gl: str = ""
 
     @property
@@ -87,7 +87,7 @@ def frame_rates(
     opened: TrainedProject,
     *,
     clock: Callable[[], float] = time.perf_counter,
-    draw: Callable[[Path], Drawn] = drawn_laps,
+    draw: Callable[[Path], WindowLaps] = drawn_laps,
 ) -> FrameRates:
     """Measure, or take up what was measured on this machine; some seconds. Without OpenGL that is tried again.
 

@@ -37,7 +37,7 @@ class Lap(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
+class RenderRate:
     """How fast pictures are rendered, by medians over laps.
 
     Attributes:
@@ -55,7 +55,7 @@ class Rate:
     drawn_by: str
 
 
-def rate_of(laps: Sequence[Lap], drawn_by: str) -> Rate | None:
+def rate_of(laps: Sequence[Lap], drawn_by: str) -> RenderRate | None:
     """The rate of at least one lap; None without, and where the clock stood still."""
     if not laps:
         return None
@@ -64,7 +64,7 @@ def rate_of(laps: Sequence[Lap], drawn_by: str) -> Rate | None:
     n_gaussians = round(statistics.median(lap.n_gaussians for lap in laps))
     if not whole > 0 or not drawing > 0:
         return None
-    return Rate(1.0 / whole, 1.0 / drawing, n_gaussians, len(laps), drawn_by)
+    return RenderRate(1.0 / whole, 1.0 / drawing, n_gaussians, len(laps), drawn_by)
 
 
 def camera_of(opened: TrainedProject) -> int:

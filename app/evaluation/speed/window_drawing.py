@@ -21,7 +21,7 @@ _module = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class WindowLaps:
     """What the other program said: laps and what drew them, or why there are none."""
 
     laps: list[Lap]
@@ -35,7 +35,7 @@ def draw_with(module: str) -> None:
     _module = module
 
 
-def drawn_laps(project_folder: Path) -> Drawn:
+def drawn_laps(project_folder: Path) -> WindowLaps:
     """Render frames of a project as the window does. Never raises for want of a display or a driver."""
     if not _module:
         return _none("this program has no window")
@@ -61,21 +61,21 @@ def drawn_laps(project_folder: Path) -> Drawn:
     return read_said(out)
 
 
-def said_by(drawn: Drawn) -> str:
+def said_by(drawn: WindowLaps) -> str:
     """The line that the other program prints."""
     return json.dumps({"laps": drawn.laps, "renderer": drawn.renderer, "reason": drawn.reason})
 
 
-def read_said(text: str) -> Drawn:
+def read_said(text: str) -> WindowLaps:
     """What a program said; its last line counts, as drivers print too."""
     try:
         said = json.loads(text.strip().splitlines()[-1])
         laps = [Lap(float(decode), float(draw), int(n)) for decode, draw, n in said["laps"]]
-        return Drawn(laps, str(said["renderer"]), str(said["reason"]))
+        return WindowLaps(laps, str(said["renderer"]), str(said["reason"]))
     except (IndexError, KeyError, TypeError, ValueError):
         logger.warning("drawing sent %r", text[-500:])
         return _none("the program that draws sent nothing readable")
 
 
-def _none(reason: str) -> Drawn:
-    return Drawn([], "", reason)
+def _none(reason: str) -> WindowLaps:
+    return WindowLaps([], "", reason)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from app.export.export_choices import ExportChoices, ExportContext
-from app.export.jobs.job import Job
+from app.export.jobs.job import ExportJob
 from app.export.jobs.question import Question, question_about
 from app.export.jobs.table import KINDS
 from app.export.picked_frames import PickedFrames
@@ -26,7 +26,7 @@ class Answers:
     choices: ExportChoices
 
     @property
-    def job_type(self) -> type[Job]:
+    def job_type(self) -> type[ExportJob]:
         """What is exported."""
         return KINDS[self.choices.kind]
 
@@ -60,7 +60,7 @@ class Answers:
         """The answer to a question; empty where it is not asked."""
         return next((one.chosen(self.choices) for one in self.questions if one.name == name), "")
 
-    def make_job(self) -> Job:
+    def make_job(self) -> ExportJob:
         """The job. Raises ProjectError where an answer cannot be."""
         asked = {question.name: text for question in self.questions if (text := question.chosen(self.choices))}
         entries: dict[str, Any] = {"frames": self._job_frames} if self.job_type.takes("frames") else {}

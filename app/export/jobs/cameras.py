@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from app.export.jobs.job import Job, option
+from app.export.jobs.job import ExportJob, option
 
 
-class CamerasJob(Job, frozen=True):
+class CamerasJob(ExportJob, frozen=True):
     """What is asked for: a new or empty folder."""
 
     kind: ClassVar[str] = "cameras"

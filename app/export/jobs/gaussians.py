@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from app.export.jobs.job import EDITS, FRAMES, Job, option
+from app.export.jobs.job import EDITS, FRAMES, ExportJob, option
 from app.export.picked_frames import PickedFrames
 from engine.export.formats.table import FORMATS
 from engine.export.world import AXES
@@ -26,7 +26,7 @@ def _vector_text(vector: Vector) -> str:
 _SCENE_UPS = {"": "As in the project"} | {_vector_text(axis): name for name, axis in AXES.items()}
 
 
-class GaussiansJob(Job, frozen=True):
+class GaussiansJob(ExportJob, frozen=True):
     """What is asked for: a new or empty folder of files."""
 
     kind: ClassVar[str] = "gaussians"

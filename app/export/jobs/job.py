@@ -61,7 +61,7 @@ class JobModule(Protocol):
         ...
 
 
-class Job(Declared, frozen=True):
+class ExportJob(Declared, frozen=True):
     """What is asked for. Raises ProjectError for a value that an option may not have.
 
     Attributes:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from app.export.jobs.job import FRAMES, Job, option
+from app.export.jobs.job import FRAMES, ExportJob, option
 from app.export.picked_frames import PickedFrames
 
 
-class MetricsJob(Job, frozen=True):
+class MetricsJob(ExportJob, frozen=True):
     """What is asked for: a file. Clips that are not trained are left out."""
 
     kind: ClassVar[str] = "metrics"
@@ -32,5 +32,5 @@ class MetricsJob(Job, frozen=True):
 
     @classmethod
     def suffix(cls, format_name: str) -> str:
-        """See `Job`."""
+        """See `ExportJob`."""
         return f".{format_name}"

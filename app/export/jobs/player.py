@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from app.export.jobs.job import EDITS, FRAMES, Job, option
+from app.export.jobs.job import EDITS, FRAMES, ExportJob, option
 from app.export.picked_frames import PickedFrames
 from engine.setting import Flag
 
 
-class PlayerJob(Job, frozen=True):
+class PlayerJob(ExportJob, frozen=True):
     """What is asked for: an HTML page."""
 
     kind: ClassVar[str] = "player"
@@ -37,7 +37,7 @@ class PlayerJob(Job, frozen=True):
 
     @classmethod
     def suffix(cls, format_name: str) -> str:
-        """See `Job`."""
+        """See `ExportJob`."""
         return ".html"
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 
 from app.export.jobs.cameras import CamerasJob
 from app.export.jobs.gaussians import GaussiansJob
-from app.export.jobs.job import Job
+from app.export.jobs.job import ExportJob
 from app.export.jobs.metrics import MetricsJob
 from app.export.jobs.player import PlayerJob
 from app.export.jobs.video import VideoJob
@@ -15,17 +15,19 @@ from engine.errors import ProjectError
 from engine.setting import settings_of
 from engine.text import shown
 
-KINDS: dict[str, type[Job]] = {job.kind: job for job in (GaussiansJob, VideoJob, PlayerJob, MetricsJob, CamerasJob)}
+KINDS: dict[str, type[ExportJob]] = {
+    job.kind: job for job in (GaussiansJob, VideoJob, PlayerJob, MetricsJob, CamerasJob)
+}
 """By name, in the order in which they are offered."""
 
 
-def formats_of(command: str = "") -> dict[str, type[Job]]:
+def formats_of(command: str = "") -> dict[str, type[ExportJob]]:
     """The job of each format that a command takes, or of every one."""
     jobs = [job for job in KINDS.values() if command in ("", job.command)]
     return {name: job for job in jobs for name in job.formats()}
 
 
-def named_job(format_name: str, out: Path | str, **options: Any) -> Job:
+def named_job(format_name: str, out: Path | str, **options: Any) -> ExportJob:
     """The job of a format.
 
     Args:

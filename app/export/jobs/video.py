@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from app.export.jobs.job import EDITS, FRAMES, Job, option
+from app.export.jobs.job import EDITS, FRAMES, ExportJob, option
 from app.export.jobs.question import Question
 from app.export.video.formats import FORMATS
 from engine.errors import ProjectError
@@ -84,7 +84,7 @@ class Turntable(Declared, frozen=True):
     ] = None
 
 
-class VideoJob(Job, frozen=True):
+class VideoJob(ExportJob, frozen=True):
     """What is asked for: a file, or the folder of a sequence."""
 
     kind: ClassVar[str] = "video"
@@ -234,7 +234,7 @@ class VideoJob(Job, frozen=True):
 
     @classmethod
     def suffix(cls, format_name: str) -> str:
-        """See `Job`."""
+        """See `ExportJob`."""
         return next(iter(FORMATS[format_name].suffixes), "")
 
     @classmethod

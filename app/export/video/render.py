@@ -20,7 +20,7 @@ from app.export.video.passes import Painter, PassPicture
 from app.export.video.plan import VideoPlan, plan_video
 from app.export.video.writers.film import SOUND_RATE, FilmWriter
 from app.export.video.writers.sequence import write_depth_png, write_exr_picture, write_png
-from app.training.rate import Rate
+from app.training.rate import SmoothedRate
 from engine.capture.files.sound import SoundReader
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
@@ -78,7 +78,7 @@ def render_video(
     scene = SceneFrames(opened, n_threads=n_threads, features=job.features, edits=edits)
     plan = plan_video(job, scene)
     painter = Painter(scene, job, plan.moments, plan.view_of, plan.step)
-    n, rate = len(plan.moments), Rate()
+    n, rate = len(plan.moments), SmoothedRate()
     rate.update(0, time.monotonic())
     with _writer(job, plan) as write:
         for number in range(n):

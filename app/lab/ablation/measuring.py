@@ -15,7 +15,7 @@ from app.evaluation.source_clip_means import later_figures
 from app.evaluation.speed.frame_rates import FrameRates, RatesOf, kept_rates
 from app.lab.added.figures import missing, with_added_figures
 from app.lab.flicker import flicker_figures
-from app.lab.pictures import ProjectPictures
+from app.lab.pictures import RenderedPictures
 from app.project.opening.project_access import open_project
 from app.project.project import Project
 from app.project.project_facts import read_facts
@@ -32,7 +32,7 @@ MEASURED_FILE = "measured.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class VariantFigures:
     """Figures of a trained variant, None where one does not exist; on how many frames of each camera; and how fast it
     is rendered, None where nobody measured that."""
 
@@ -40,13 +40,13 @@ class Measured:
     n_frames: int
     rates: FrameRates | None = None
 
-    def with_rates(self, rates: FrameRates | None) -> Measured:
+    def with_rates(self, rates: FrameRates | None) -> VariantFigures:
         """The same with how fast it is rendered, which no file of figures holds: times differ from run to run."""
         return self if rates is None else replace(self, figures=self.figures | rates.figures(), rates=rates)
 
 
 @dataclass(frozen=True, slots=True)
-class Scope:
+class VariantScope:
     """What is measured of a variant.
 
     Attributes:
@@ -61,7 +61,9 @@ class Scope:
     precision: Precision
 
 
-def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None], rates_of: RatesOf) -> Measured:
+def measure(
+    place: Path, scope: VariantScope, on_row: Callable[[int, int, Any], None], rates_of: RatesOf
+) -> VariantFigures:
     """Figures of a trained variant, from its file when that is of these clips and this scope.
 
     Args:
@@ -87,7 +89,7 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None], 
         on_progress=on_row,
     )
     if scope.metrics == "all":
-        document = with_added_figures(document, opened, ProjectPictures(opened))
+        document = with_added_figures(document, opened, RenderedPictures(opened))
     group = "held_out" if document["means"]["held_out"] else "trained_on"
     means = document["means"][group]
     figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
@@ -105,7 +107,7 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None], 
     return measured.with_rates(rates_of(opened))
 
 
-def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measured | None:
+def kept_figures(place: Path, settings: ProjectSettings, scope: VariantScope) -> VariantFigures | None:
     """Figures that an earlier call has measured with these settings; None where there are none."""
     try:
         project = open_project(place, is_writable=False)
@@ -122,7 +124,7 @@ def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measur
         return kept
 
 
-def _key(project: Project, scope: Scope) -> dict[str, Any]:
+def _key(project: Project, scope: VariantScope) -> dict[str, Any]:
     """Everything that the figures depend on."""
     lacking = missing() if scope.metrics == "all" else {"lpips": ""}
     headers = [read_clip_header(project.clip_path(i)) for i in scope.clips]
@@ -137,7 +139,7 @@ def _key(project: Project, scope: Scope) -> dict[str, Any]:
     }
 
 
-def _read(path: Path, key: dict[str, Any]) -> Measured | None:
+def _read(path: Path, key: dict[str, Any]) -> VariantFigures | None:
     try:
         content = read_checked_json(path)
     except (OSError, JsonError):
@@ -148,7 +150,7 @@ def _read(path: Path, key: dict[str, Any]) -> Measured | None:
     return _measured(figures, n_frames) if isinstance(figures, dict) and isinstance(n_frames, int) else None
 
 
-def _measured(figures: dict[str, float | None], n_frames: int) -> Measured:
+def _measured(figures: dict[str, float | None], n_frames: int) -> VariantFigures:
     """With what follows from the figures."""
     size = figures.get("megabytes")
-    return Measured(figures | {"mb_per_frame": None if size is None else size / n_frames}, n_frames)
+    return VariantFigures(figures | {"mb_per_frame": None if size is None else size / n_frames}, n_frames)

@@ -19,7 +19,7 @@ from app.evaluation.headless import ClipOutcome, train_clips
 from app.evaluation.speed.frame_rates import DEFINITION as DEFINITION_OF_RATES
 from app.evaluation.speed.frame_rates import FrameRates, RatesOf
 from app.lab.ablation.curves import curves_of
-from app.lab.ablation.measuring import Measured, Scope, kept_figures, measure
+from app.lab.ablation.measuring import VariantFigures, VariantScope, kept_figures, measure
 from app.lab.ablation.table import DEFINITION, VariantResult, as_csv, summarize
 from app.lab.ablation.variants import Variant, rank, settings_of, variant_called
 from app.project.opening.project_access import check_settings, create_project, open_project
@@ -101,7 +101,7 @@ def run_ablation(
     clips = settings.clips(capture.n_frames)[:n_clips]
     todo = [_Task(capture, settings, variant, seed, clips) for seed in seeds for variant in variants]
     borders = [clip.start for clip in clips[1:]]
-    all_clips = Scope(range(n_clips), borders, metrics, precision)
+    all_clips = VariantScope(range(n_clips), borders, metrics, precision)
     found = _finished(folder, capture, settings, clips, all_clips)
     first_of: dict[tuple[str, int], Path] = {}  # what trains the reference clip of a family
     for task in todo:
@@ -152,7 +152,7 @@ def project_folder(folder: Path, name: str, seed: int) -> Path:
 
 
 def _finished(
-    folder: Path, capture: Capture, base: ProjectSettings, clips: Sequence[Clip], scope: Scope
+    folder: Path, capture: Capture, base: ProjectSettings, clips: Sequence[Clip], scope: VariantScope
 ) -> dict[tuple[str, int], VariantResult]:
     """What lies measured in the folder and fits the settings, by variant and seed."""
     found = {}
@@ -196,8 +196,8 @@ class _Task:
 
 
 def _measured(
-    place: Path, task: _Task, first: Path, scope: Scope, launch: Launch, callbacks: Callbacks, rates_of: RatesOf
-) -> Measured:
+    place: Path, task: _Task, first: Path, scope: VariantScope, launch: Launch, callbacks: Callbacks, rates_of: RatesOf
+) -> VariantFigures:
     """Train what is missing and measure. first: the project whose reference clip this one takes over."""
     variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
     project = _open(place, settings)

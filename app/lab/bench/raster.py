@@ -22,7 +22,7 @@ from app.lab.bench.scenes import RECIPES, Recipe
 from app.lab.bench.timing import interleaved, peak_extra_mb
 from engine.raster import Gaussians, Rendering, rasterize
 from engine.raster.rasterizer import Rasterizer
-from engine.synthetic.gaussian_scenes import Scene
+from engine.synthetic.gaussian_scenes import GaussianScene
 
 FORWARD_OPERATIONS, BACKWARD_OPERATIONS = 20, 43
 """Instructions on the multiply-add ports per block of sixteen pairs, counted in the two inner loops: exponent 3,
@@ -40,7 +40,7 @@ class Pass:
     backward_ms: float
 
 
-def run_pass(scene: Scene, dtype: torch.dtype, backend: Rasterizer) -> Pass:
+def run_pass(scene: GaussianScene, dtype: torch.dtype, backend: Rasterizer) -> Pass:
     """Draw a scene and differentiate everything, 2D means included, against a fixed random upstream gradient."""
     leaves = Gaussians(*(tensor.to(dtype).clone().requires_grad_() for tensor in scene.gaussians.tensors()))
     background = scene.background.to(dtype)
@@ -54,7 +54,7 @@ def run_pass(scene: Scene, dtype: torch.dtype, backend: Rasterizer) -> Pass:
     return Pass(leaves, rendering, (middle - started) * 1e3, (time.perf_counter() - middle) * 1e3)
 
 
-def evaluated_pairs(scene: Scene) -> int:
+def evaluated_pairs(scene: GaussianScene) -> int:
     """(pixel, Gaussian) evaluations of a scene: sixteen for every 4x4 block that a Gaussian of a tile changes."""
     leaves = Gaussians(*(tensor.float().requires_grad_() for tensor in scene.gaussians.tensors()))
     image = rasterize(leaves, *scene.arguments, backend=FAST).image
@@ -125,7 +125,7 @@ def prepare_memory(recipe: Recipe) -> Callable[[], object]:
     configure_threads()
     warm_up()
 
-    def ready(scene: Scene) -> Callable[[], object]:
+    def ready(scene: GaussianScene) -> Callable[[], object]:
         leaves = Gaussians(*(tensor.float().requires_grad_() for tensor in scene.gaussians.tensors()))
         upstream = torch.ones(1, scene.height, scene.width, 3)
 
@@ -140,12 +140,12 @@ def prepare_memory(recipe: Recipe) -> Callable[[], object]:
     return ready(recipe.scene())
 
 
-def _stages(scene: Scene, backend: Rasterizer) -> tuple[float, float]:
+def _stages(scene: GaussianScene, backend: Rasterizer) -> tuple[float, float]:
     done = run_pass(scene, torch.float32, backend)
     return done.forward_ms, done.backward_ms
 
 
-def _check(name: str, size: str, scene: Scene) -> dict[str, SpeedError]:
+def _check(name: str, size: str, scene: GaussianScene) -> dict[str, SpeedError]:
     """Both back ends in float32 beside float64 brute force."""
     exact = run_pass(scene, torch.float64, EXACT)
     candidates = {path: partial(_stages, scene, backend) for path, backend in COMPARED.items()}

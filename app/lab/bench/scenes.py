@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from engine.synthetic.gaussian_scenes import Scene, layered_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Recipe:
     size_px: float
     faint: bool = False
 
-    def scene(self) -> Scene:
+    def scene(self) -> GaussianScene:
         """The scene of this recipe."""
         return layered_scene(self.n_rows, self.width, self.height, self.size_px, faint=self.faint)
 

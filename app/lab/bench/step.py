@@ -27,7 +27,7 @@ STAGES = ("decode forward", "raster forward", "loss", "raster backward", "decode
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class StepWindow:
     """A part of the picture, pixels: what a step draws and compares instead of all of it."""
 
     left: int
@@ -62,9 +62,9 @@ class StepRun:
         window: Part of the picture that is drawn and compared, by the same camera; None for all of it.
     """
 
-    def __init__(self, recipe: ClipRecipe, *, backend: Backend = FAST, window: Window | None = None) -> None:
+    def __init__(self, recipe: ClipRecipe, *, backend: Backend = FAST, window: StepWindow | None = None) -> None:
         self._config = TrainConfig(gaussians_per_anchor=recipe.gaussians_per_anchor)
-        window = window or Window(0, 0, recipe.width, recipe.height)
+        window = window or StepWindow(0, 0, recipe.width, recipe.height)
         self._backend = backend
         self._model = make_clip(recipe, backend=backend)
         self._view = _seen_through(make_view(recipe), window)
@@ -152,7 +152,7 @@ class StepRun:
         return found.loss + self._config.volume_weight * gaussians.scales.prod(1).mean()
 
 
-def _seen_through(view: View, window: Window) -> View:
+def _seen_through(view: View, window: StepWindow) -> View:
     """The camera of a part of the picture: the same rays."""
     K = view.K.clone()
     K[0, 2] -= window.left

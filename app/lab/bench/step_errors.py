@@ -11,7 +11,7 @@ from torch import Tensor
 from app.lab.bench.compared import COMPARED, EXACT, FAST
 from app.lab.bench.raster import relative_errors
 from app.lab.bench.rows import SpeedError, StepErrors
-from app.lab.bench.step import StepRun, Window
+from app.lab.bench.step import StepRun, StepWindow
 from app.lab.bench.timing import interleaved
 from engine.backends.backend import Backend
 from engine.training.plan.synthetic_clip import ClipRecipe
@@ -66,10 +66,10 @@ def measure_errors(recipe: ClipRecipe, *, scene: str, fast: Backend = FAST) -> t
     return errors, marks
 
 
-def middle(recipe: ClipRecipe) -> Window:
+def middle(recipe: ClipRecipe) -> StepWindow:
     """The part of a picture that is compared: its middle, or all of it where it is no larger."""
     width, height = min(WINDOW_PX[0], recipe.width), min(WINDOW_PX[1], recipe.height)
-    return Window((recipe.width - width) // 2, (recipe.height - height) // 2, width, height)
+    return StepWindow((recipe.width - width) // 2, (recipe.height - height) // 2, width, height)
 
 
 def _by_name(actual: dict[str, Tensor], expected: dict[str, Tensor]) -> dict[str, float]:
@@ -77,7 +77,7 @@ def _by_name(actual: dict[str, Tensor], expected: dict[str, Tensor]) -> dict[str
     return {name: relative_errors([actual[name]], [truth]) for name, truth in expected.items() if truth.norm() > 0}
 
 
-def _update_error(recipe: ClipRecipe, window: Window, fast: Backend) -> float:
+def _update_error(recipe: ClipRecipe, window: StepWindow, fast: Backend) -> float:
     """Adam of the fast path beside float64 given the very same gradients.
 
     From gradients of its own float64 would differ without meaning: the first step of Adam is the sign of a gradient,

@@ -32,7 +32,7 @@ _STYLES = ("-", "--", ":", "-.")
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class ChartLine:
     """One line over frames or clips; None where there is no value. Faint ones stand behind the others; a line without
     a label is not in the legend."""
 
@@ -47,7 +47,7 @@ class CurvePanel:
     """Curves over the same frames, with the label of the vertical axis."""
 
     label: str
-    curves: Sequence[Curve]
+    curves: Sequence[ChartLine]
 
 
 @dataclass(frozen=True, slots=True)

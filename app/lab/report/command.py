@@ -49,7 +49,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
-    from app.lab.report.paper_figures.by_hand import Wishes
+    from app.lab.report.paper_figures.by_hand import FigureOptions
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 
     read_settings(options.project)  # refuses a folder that is not a project before anything else
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             out=options.out,
             metrics=options.metrics,
             precision=options.precision,
-            wishes=Wishes(options.boundary, options.camera, options.crop),
+            wishes=FigureOptions(options.boundary, options.camera, options.crop),
             on_stage=stage_progress(line),
             say=line.say,
             rates_of=wanted_rates(options),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from app.lab.report.charts import Curve, CurvePanel, draw_over_time
+from app.lab.report.charts import ChartLine, CurvePanel, draw_over_time
 from app.lab.report.comparison import main_group
 from app.lab.report.measured import GROUP_WORDS
 from app.lab.report.page.parts import Figure, Section
@@ -99,10 +99,10 @@ def _psnr_by_clip(evaluation: Mapping[str, Any], group: str) -> dict[int, list[f
 
 
 def _quality_chart(rows: Sequence[dict[str, Any]]) -> Figure:
-    quality = [Curve(words, _column(rows, name), is_main=name == "psnr") for name, words in _PSNR.items()]
+    quality = [ChartLine(words, _column(rows, name), is_main=name == "psnr") for name, words in _PSNR.items()]
     panels = [
         CurvePanel("PSNR, dB", quality),
-        CurvePanel("mean so far, dB", [Curve("clips up to this one", _column(rows, "psnr_so_far"), is_main=True)]),
+        CurvePanel("mean so far, dB", [ChartLine("clips up to this one", _column(rows, "psnr_so_far"), is_main=True)]),
     ]
     return _chart(
         "length_quality",
@@ -116,11 +116,11 @@ def _seam_charts(rows: Sequence[dict[str, Any]]) -> list[Figure]:
     if not any(row["seam_score"] is not None or row["seam_ratio_static"] is not None for row in rows):
         return []
     ratios = [
-        Curve("static pixels", _column(rows, "seam_ratio_static")),
-        Curve("moving pixels", _column(rows, "seam_ratio_moving")),
+        ChartLine("static pixels", _column(rows, "seam_ratio_static")),
+        ChartLine("moving pixels", _column(rows, "seam_ratio_moving")),
     ]
     panels = [
-        CurvePanel("seam score, 1/255", [Curve("static pixels", _column(rows, "seam_score"), is_main=True)]),
+        CurvePanel("seam score, 1/255", [ChartLine("static pixels", _column(rows, "seam_score"), is_main=True)]),
         CurvePanel("seam ratio", ratios),
     ]
     caption = "The seam at the beginning of each clip. A score of 0 and a ratio of 1: no seam."
@@ -131,13 +131,13 @@ def _cost_charts(rows: Sequence[dict[str, Any]]) -> list[Figure]:
     panels = []
     if any(row["wall_s"] is not None for row in rows):
         seconds = [
-            Curve("both", _column(rows, "wall_s"), is_main=True),
-            Curve("preparation", _column(rows, "preparation_s")),
-            Curve("training", _column(rows, "training_s")),
+            ChartLine("both", _column(rows, "wall_s"), is_main=True),
+            ChartLine("preparation", _column(rows, "preparation_s")),
+            ChartLine("training", _column(rows, "training_s")),
         ]
         panels.append(CurvePanel("seconds", seconds))
     if any(row["memory_mb"] is not None for row in rows):
-        panels.append(CurvePanel("memory, MB", [Curve("most held", _column(rows, "memory_mb"), is_main=True)]))
+        panels.append(CurvePanel("memory, MB", [ChartLine("most held", _column(rows, "memory_mb"), is_main=True)]))
     if not panels:
         return []
     caption = "What each clip took on the machine that trained it, kernels compiled before."

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from app.lab.pictures import Pictures
-from app.lab.report.charts import Curve, CurvePanel, draw_over_time, draw_pictures
+from app.lab.report.charts import ChartLine, CurvePanel, draw_over_time, draw_pictures
 from app.lab.report.comparison import main_group
 from app.lab.report.page.labels import FIGURE_LABELS, figure_label
 from app.lab.report.page.parts import Figure, Folded, Section
@@ -135,11 +135,11 @@ def time_section(evaluation: dict[str, Any]) -> Section:
     found = {(row["camera"], row["frame_index"]): row for row in evaluation["rows"]}
 
     def panel(name: str, label: str) -> CurvePanel:
-        curves = [Curve(c, [found.get((c, f), {}).get(name) for f in numbers]) for c in cameras]
+        curves = [ChartLine(c, [found.get((c, f), {}).get(name) for f in numbers]) for c in cameras]
         for part in (group, *(other for other in GROUP_WORDS if other != group)):
             if frames.get(part):
                 words = f"mean, {GROUP_WORDS[part]}"
-                curves.append(Curve(words, frames[part][name], is_main=part == group))
+                curves.append(ChartLine(words, frames[part][name], is_main=part == group))
         return CurvePanel(label, curves)
 
     panels = [panel("psnr", "PSNR, dB"), panel("psnr_moving", "PSNR, moving pixels, dB")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from app.evaluation.evaluation import Measuring, Scope, evaluate_project, is_measured
+from app.evaluation.evaluation import EvaluationScope, Measuring, evaluate_project, is_measured
 from app.evaluation.headless import TrainedProject
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def evaluation_of(
     """
     held_out = opened.capture.camera_indices(opened.project.settings.holdout) if is_held_out_enough else []
     cameras = held_out or range(len(opened.capture.rig))
-    scopes = [Scope(opened.trained, cameras, choice, precision) for choice in choices]
+    scopes = [EvaluationScope(opened.trained, cameras, choice, precision) for choice in choices]
     scope = next((scope for scope in scopes if is_measured(opened, scope)), scopes[-1])
     return evaluate_project(
         opened,

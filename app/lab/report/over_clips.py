@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from app.evaluation.headless import TrainedProject
-from app.lab.report.charts import Curve, CurvePanel, draw_over_time
+from app.lab.report.charts import ChartLine, CurvePanel, draw_over_time
 from app.lab.report.comparison import main_group
 from app.lab.report.measured import GROUP_WORDS
 from app.lab.report.page.parts import Figure, Section
@@ -95,7 +95,7 @@ def over_clips_section(evaluation: dict[str, Any], exposures: Mapping[int, ClipE
 
 def _psnr_panel(means: Mapping[int, Mapping[str, Any]]) -> CurvePanel:
     curves = [
-        Curve(words, [found.get(name) for found in means.values()], is_main=name == "psnr")
+        ChartLine(words, [found.get(name) for found in means.values()], is_main=name == "psnr")
         for name, words in _LINES.items()
     ]
     return CurvePanel("PSNR, dB", curves)
@@ -143,10 +143,11 @@ def _exposure_parts(exposures: Mapping[int, ClipExposure]) -> list[Any]:
     named = sorted(np.argsort(-largest, kind="stable")[:N_NAMED].tolist())
     others = [row for row in range(len(names)) if row not in named]
     curves = [
-        Curve("other cameras" if i == 0 else "", _plain(percents[row]), is_faint=True) for i, row in enumerate(others)
+        ChartLine("other cameras" if i == 0 else "", _plain(percents[row]), is_faint=True)
+        for i, row in enumerate(others)
     ]
-    curves += [Curve(f"camera {names[row]}", _plain(percents[row])) for row in named]
-    curves.append(Curve("median", _plain(np.nanmedian(percents, axis=0)), is_main=True))
+    curves += [ChartLine(f"camera {names[row]}", _plain(percents[row])) for row in named]
+    curves.append(ChartLine("median", _plain(np.nanmedian(percents, axis=0)), is_main=True))
     borders = [one.frames[0] for one in known[1:]]
     chart = Figure(
         "exposure",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from app.lab.pictures import Pictures
-from app.lab.report.charts import Curve, CurvePanel, MapPanel, draw_maps, draw_over_time
+from app.lab.report.charts import ChartLine, CurvePanel, MapPanel, draw_maps, draw_over_time
 from app.lab.report.measured import GROUP_WORDS, Tick, clip_borders
 from app.lab.report.page.parts import Figure, Folded, Part, Section
 from app.lab.report.page.tables import Table, TableColumn
@@ -185,9 +185,9 @@ def _over_time(evaluation: dict[str, Any]) -> Figure:
         CurvePanel(
             f"{part} pixels, 1/255",
             [
-                Curve("E, excess", mean(f"excess_{part}"), is_main=True),
-                Curve("R, render", mean(f"change_{part}")),
-                Curve("G, truth", mean(f"truth_change_{part}")),
+                ChartLine("E, excess", mean(f"excess_{part}"), is_main=True),
+                ChartLine("R, render", mean(f"change_{part}")),
+                ChartLine("G, truth", mean(f"truth_change_{part}")),
             ],
         )
         for part in _PARTS

@@ -17,7 +17,7 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed.frame_rates import RatesOf
 from app.lab.added.figures import with_added_figures
 from app.lab.flicker import flicker_figures
-from app.lab.pictures import Pictures, ProjectPictures
+from app.lab.pictures import Pictures, RenderedPictures
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
 from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
@@ -28,7 +28,7 @@ from app.lab.report.measuring import evaluation_of
 from app.lab.report.over_clips import exposures_of, over_clips_section
 from app.lab.report.page.page import page_html
 from app.lab.report.page.parts import Section
-from app.lab.report.paper_figures.by_hand import Places, Wishes, checked_places
+from app.lab.report.paper_figures.by_hand import FigureOptions, Places, checked_places
 from app.lab.report.paper_figures.sections import STEPS, paper_sections
 from app.lab.report.rendering import rendering_section
 from app.lab.report.seam_parts import seams_section, shown_boundaries
@@ -61,12 +61,12 @@ def write_report(
     out: Path | None = None,
     metrics: Choice | None = None,
     precision: Precision = "float",
-    wishes: Wishes | None = None,
+    wishes: FigureOptions | None = None,
     beginning: Sequence[Section] = (),
     on_stage: OnStage,
     say: Callable[[str], None] = logger.warning,
     measuring: Measuring | None = None,
-    make_pictures: Callable[[TrainedProject], Pictures] = ProjectPictures,
+    make_pictures: Callable[[TrainedProject], Pictures] = RenderedPictures,
     rates_of: RatesOf = lambda opened: None,
 ) -> Path:
     """Write the report of a project.
@@ -98,7 +98,7 @@ def write_report(
     others, left_out = _others(folder, compare)
     names = short_names([folder, *(one.project.folder for one, _ in others)])
     opened = open_trained(facts.project)
-    places = checked_places(wishes or Wishes(), opened.capture, [facts, *(one for one, _ in others)])
+    places = checked_places(wishes or FigureOptions(), opened.capture, [facts, *(one for one, _ in others)])
     own: list[Choice] = ["all", "quick"] if metrics == "quick" else ["all"]
     rest: list[Choice] = ["all"] if metrics == "all" else ["all", "quick"]
     compared: list[Compared] = []

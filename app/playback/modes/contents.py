@@ -55,7 +55,7 @@ def part_of(model: ClipModel, content: str) -> ClipModel:
             return model
 
 
-class ClipParts:
+class EditedParts:
     """Parts of one loaded clip with the edits that hold, and what is known of their Gaussians.
 
     Args:

@@ -23,7 +23,7 @@ RANGE_RADII = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Coverage:
+class CoveredSpace:
     """Spheres of the anchors that a source clip inherits, and its residual anchors.
 
     Attributes:
@@ -58,9 +58,9 @@ class CoverageFinder:
     """Coverage on demand; the newest request wins. Methods are for one thread, not the one it owns."""
 
     def __init__(self) -> None:
-        self.worker: LatestWorker[CoverageRequest, Coverage] = LatestWorker("coverage", coverage_of)
+        self.worker: LatestWorker[CoverageRequest, CoveredSpace] = LatestWorker("coverage", coverage_of)
 
-    def find(self, anchors: AnchorArrays) -> Coverage | None:
+    def find(self, anchors: AnchorArrays) -> CoveredSpace | None:
         """Of all anchors of a clip; None until it is measured."""
         request = CoverageRequest(anchors.key, anchors)
         newest = self.worker.newest
@@ -78,7 +78,7 @@ class CoverageFinder:
         self.worker.close()
 
 
-def coverage_of(request: CoverageRequest) -> Coverage:
+def coverage_of(request: CoverageRequest) -> CoveredSpace:
     """Measure. There are no spheres where a clip inherits no anchor that can change, as in the reference clip."""
     from engine.cloud.motion.dedup import mean_neighbor_distance, union_distance
 
@@ -92,7 +92,7 @@ def coverage_of(request: CoverageRequest) -> Coverage:
     points = _of_role(anchors.own_positions, anchors.own_roles, "residual")
     radii = mean_neighbor_distance(centers, k=N_NEIGHBORS)
     distances = union_distance(points, centers, radii)
-    return Coverage(centers, radii.astype(np.float32), points, distances.astype(np.float32), request.key)
+    return CoveredSpace(centers, radii.astype(np.float32), points, distances.astype(np.float32), request.key)
 
 
 def _of_role(positions: np.ndarray, roles: np.ndarray | None, role: str) -> np.ndarray:

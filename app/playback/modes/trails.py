@@ -11,7 +11,7 @@ import numpy as np
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker
 from app.playback.modes import hues
-from app.playback.modes.contents import ClipParts
+from app.playback.modes.contents import EditedParts
 from engine.capture.clip import Clip
 from engine.editing.effects import Effects
 
@@ -54,7 +54,7 @@ class TrailRequest:
     model_key: Hashable
     frame_index: int
     effects: tuple[Effects, ...]
-    parts: ClipParts = field(compare=False)
+    parts: EditedParts = field(compare=False)
 
 
 class TrailMaker:

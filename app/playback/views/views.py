@@ -20,7 +20,7 @@ COUNTS = (1, 2, 4)
 
 
 @dataclass
-class Look:
+class ViewState:
     """From where one view looks, and what it shows."""
 
     view: OrbitView = field(default_factory=OrbitView)
@@ -36,7 +36,7 @@ class Views:
 
     def __init__(self) -> None:
         self.n_shown = 1
-        self._looks = [Look()]
+        self._looks = [ViewState()]
         self._active = 0
         self._drawn: int | None = None
 
@@ -51,12 +51,12 @@ class Views:
         return self._active if self._drawn is None else self._drawn
 
     @property
-    def current(self) -> Look:
+    def current(self) -> ViewState:
         """What belongs to `current_index`."""
         return self._looks[self.current_index]
 
     @property
-    def shown(self) -> list[Look]:
+    def shown(self) -> list[ViewState]:
         """Everything that is on screen, in order."""
         return self._looks[: self.n_shown]
 
@@ -105,7 +105,7 @@ class Views:
         for look in self._looks:
             look.view.rig = rig
 
-    def _copied(self, look: Look) -> Look:
+    def _copied(self, look: ViewState) -> ViewState:
         view = copy.copy(look.view)  # a rig is shared, the pose is not
         view.pivot, view.up = look.view.pivot.copy(), look.view.up.copy()
-        return Look(view, copy.copy(look.overlays))
+        return ViewState(view, copy.copy(look.overlays))

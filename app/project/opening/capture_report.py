@@ -194,13 +194,13 @@ def report_of(capture: Capture) -> CaptureReport:
 def refusal_of(path: Path, error: EngineError) -> RefusedFolder:
     """Put into words why a folder does not open. Reads the folder's list of files."""
     problems: Sequence[EngineError] = error.problems if isinstance(error, CaptureError) else ()
-    several = tuple(problem.told_apart() for problem in problems) if len(problems) > 1 else ()
+    several = tuple(problem.parts() for problem in problems) if len(problems) > 1 else ()
     if isinstance(error, CaptureError) and error.needs_links:
         found = tuple((problem.message, "") for problem in problems)
         return RefusedFolder(path, error.message, MINE, found, needs_links=True)
     videos = () if several else _videos_in(path)
     is_all = several or error.path in (None, path)  # else the place is said, too
-    message, hint = (error.message, error.hint) if is_all else error.told_apart()
+    message, hint = (error.message, error.hint) if is_all else error.parts()
     return RefusedFolder(path, message, hint, several, videos if len(videos) >= LEAST_VIDEOS else ())
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.background.jobs import Job, JobContext, Jobs
+from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.calibration.job import CalibrationOutcome, CalibrationRequest, calibration_work, written
 from app.project.opening.capture_report import refusal_of
 from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
@@ -30,7 +30,7 @@ class Calibrating:
         self.page: CalibrationPage | None = None
         self.revision = 0
         self._jobs = Jobs()
-        self._job: Job | None = None
+        self._job: BackgroundJob | None = None
         self._failed: tuple[CalibrationRequest, Calibration] | None = (
             None  # what came of it last, if nothing was written
         )

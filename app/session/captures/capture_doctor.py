@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.background.jobs import Job, JobContext, Jobs
+from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.background.latest import LatestWorker
 from app.project.opening.opened_project import OpenedProject
 from app.session.captures.doctor_status import DoctorStatus
@@ -45,7 +45,7 @@ class CaptureDoctor:
         self.run: Callable[[Capture, ReportProgress], Diagnosis] = examine_apart
         self._status = DoctorStatus()
         self._opened: OpenedProject | None = None
-        self._job: Job | None = None
+        self._job: BackgroundJob | None = None
         self._n_opened = 0
         self._quick: LatestWorker[int, tuple[tuple[Finding, ...], int]] = LatestWorker("quick look", self._look_quickly)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.background.jobs import Job, JobContext, Jobs
+from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.project.opening.opened_project import OpenedProject
 from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
 from app.status import JobStatus
@@ -33,7 +33,7 @@ class Synchronising:
         self.page: SynchronisationPage | None = None
         self.revision = 0
         self._jobs = Jobs()
-        self._job: Job | None = None
+        self._job: BackgroundJob | None = None
         self._capture: Capture | None = None
         self._found: Synchronisation | None = None
 

@@ -30,7 +30,7 @@ from app.session.editing.selection_commands import (
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.selection.projected import project_gaussians
-from engine.editing.selection.ranges import Spread, spread_of
+from engine.editing.selection.ranges import ValueSpread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.share import selected_share
 from engine.errors import ProjectError
@@ -76,7 +76,7 @@ class _SpreadWork:
     gaussians: GaussianArrays = field(compare=False)
     anchors: AnchorValues | None = field(compare=False)
 
-    def answer(self) -> Spread | None:
+    def answer(self) -> ValueSpread | None:
         values = values_of(self.attribute, self.gaussians, self.anchors)
         return spread_of(values, is_log=ATTRIBUTES[self.attribute].is_log)
 
@@ -97,7 +97,7 @@ class _ShareWork:
         return selected_share(projected, gaussians.opacities, self.selected)
 
 
-class Selecting:
+class ProjectSelecting:
     """The selection of the open project.
 
     Args:
@@ -257,7 +257,7 @@ class Selecting:
             self.selection.counts,
         )
 
-    def spread(self, attribute: str) -> Spread | None:
+    def spread(self, attribute: str) -> ValueSpread | None:
         """How an attribute is spread over the shown frame; the last one until that is known, None before.
 
         Raises:

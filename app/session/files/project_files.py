@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from app.background.jobs import Job, JobContext, Jobs
+from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.document.storing.recovery import DamagedProject
 from app.export.show_in_folder import show_in_folder
 from app.project.opening.opening import LostCapture, OtherCapture
@@ -49,7 +49,7 @@ class ProjectFiles:
     ) -> None:
         self._jobs, self._notices = jobs, notices
         self._ask, self._open_project, self._settle = ask, open_project, settle
-        self._saving: Job | None = None
+        self._saving: BackgroundJob | None = None
 
     def ask_about(self, asked: OpenCapture, error: Exception) -> bool:
         """A project does not open. Whether the user is asked what to do about it."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from app.background.jobs import Job, JobContext, Jobs
+from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.mending.mend_project import MendOutcome, mend_work
 from app.mending.request import MendRequest
 from app.playback.timeline import Timeline
@@ -29,7 +29,7 @@ from app.status import CAPTURED, JobStatus, Overlays
 from engine.errors import EngineError, ProjectError
 
 
-class Mending:
+class ProjectMending:
     """For one thread, which does not wait.
 
     Args:
@@ -46,7 +46,7 @@ class Mending:
         self.revision = 0
         self._live, self._overlays = live, overlays
         self._jobs = Jobs()
-        self._job: Job | None = None
+        self._job: BackgroundJob | None = None
         self._stopped: tuple[int, ...] = ()
         self._opened: OpenedProject | None = None
 
@@ -225,12 +225,12 @@ class Mending:
         self._jobs.close(timeout_s=3.0)
 
     def _start(self, work: Callable[[JobContext], Any], take: Callable[[Any], None]) -> None:
-        self._job = self._jobs.start("Mending", work, take, self._fail)
+        self._job = self._jobs.start("ProjectMending", work, take, self._fail)
 
     def _fail(self, error: Exception) -> None:
         if self.page is None:
             return
-        said = error.told_apart() if isinstance(error, EngineError) else (f"{type(error).__name__}: {error}", "")
+        said = error.parts() if isinstance(error, EngineError) else (f"{type(error).__name__}: {error}", "")
         state = "asking" if self.page.state == "running" else self.page.state
         self._show(replace(self.page, state=state, failure=said[0], hint=said[1]))
 

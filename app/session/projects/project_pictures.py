@@ -12,7 +12,7 @@ from app.background.kernels import prepare_drawing
 from app.playback.frame_decoder import ShownFrame
 from app.playback.modes.arrays import Picture
 from app.playback.modes.view_modes import PLAIN
-from app.playback.render import Look, RenderRequest, render
+from app.playback.render import RenderRequest, RenderView, render
 from app.playback.views.orbit_view import OrbitView
 from app.project.opening.opened_project import OpenedProject
 from app.project.project_picture import SIZE, picture_path, read_picture, write_picture
@@ -48,7 +48,7 @@ class ProjectPictures:
             view: From where.
         """
         folder = opened.project.folder.resolve()
-        look = Look.of(view, *SIZE)
+        look = RenderView.of(view, *SIZE)
 
         def work(context: JobContext) -> None:
             if shown is not None and is_cache_warm():  # compiling kernels for it would take a minute

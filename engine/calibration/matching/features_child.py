@@ -18,7 +18,7 @@ from engine.progress import Progress
 
 
 def look(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.ndarray]:
-    """Answer what engine.calibration.matching.looking asks."""
+    """Answer what engine.calibration.matching.feature_processes asks."""
     parts = [
         MovingPart(int(moment), arrays[f"picture{row}"], (int(corner[0]), int(corner[1])), arrays[f"is_moving{row}"])
         for row, (moment, corner) in enumerate(zip(arrays["moments"], arrays["corners"], strict=True))

@@ -33,7 +33,7 @@ explained by chance where a room looks alike from several sides."""
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class MatchAgreement:
     """Of cameras with the verified matches they have with each other.
 
     Attributes:
@@ -83,7 +83,7 @@ class Agreement:
 
 def agreement(
     rows: np.ndarray, cameras: Cameras, key_points: list[KeyPoints], verified: dict[Pair, np.ndarray], width: float
-) -> Agreement:
+) -> MatchAgreement:
     """How far cameras explain verified matches.
 
     Args:
@@ -103,4 +103,4 @@ def agreement(
     for (a, b), found in matches.items():
         n_matches[a, b] = n_matches[b, a] = len(found)
         n_explained[a, b] = n_explained[b, a] = len(fitting[a, b])
-    return Agreement(n_matches, n_explained)
+    return MatchAgreement(n_matches, n_explained)

@@ -16,7 +16,7 @@ from engine.calibration.solving.mapping import FirstEstimate
 from engine.calibration.solving.tracks import Tracks, build_tracks, cleaned, fitting_matches
 
 
-class Stage(NamedTuple):
+class SolvingStage(NamedTuple):
     """One turn.
 
     Attributes:
@@ -30,9 +30,9 @@ class Stage(NamedTuple):
     is_last: bool = False
 
 
-ROUGH = (Stage(16.0, is_common=True), Stage(12.0, is_common=True), Stage(6.0))
+ROUGH = (SolvingStage(16.0, is_common=True), SolvingStage(12.0, is_common=True), SolvingStage(6.0))
 """While estimates are rough."""
-FINE = (Stage(3.0, is_last=True), Stage(2.0, is_last=True))
+FINE = (SolvingStage(3.0, is_last=True), SolvingStage(2.0, is_last=True))
 """At the end."""
 ALIKE = 0.06
 """Standard deviation of ln(focal length) among cameras that are taken for alike."""
@@ -41,7 +41,7 @@ N_ITERATIONS = 25
 
 
 @dataclass(frozen=True, slots=True)
-class Solution:
+class CalibrationSolution:
     """Cameras that were found and what they saw.
 
     Attributes:
@@ -70,9 +70,9 @@ def solve(
     *,
     lens: str,
     is_shared: bool,
-    stages: Sequence[Stage],
+    stages: Sequence[SolvingStage],
     progress: Callable[[float], None] = lambda _: None,
-) -> Solution:
+) -> CalibrationSolution:
     """Adjust an estimate until points land where they were seen.
 
     Args:
@@ -119,7 +119,7 @@ def solve(
         )
         tracks = cleaned(cameras, points, tracks.seen, reach_px)
         progress((number + 1) / len(stages))
-    return Solution(rows, cameras, tracks, estimate.are_alike)
+    return CalibrationSolution(rows, cameras, tracks, estimate.are_alike)
 
 
 def _with_lens(cameras: Cameras, lens: str) -> Cameras:

@@ -180,7 +180,7 @@ def _check_motionless(name: str, Ks: np.ndarray, poses: np.ndarray, path: Path) 
         return []
     return [
         CaptureError(
-            f'Camera "{name}" moves after frame {int(np.argmin(is_same))}.',
+            f'Camera "{name}" moves from frame {int(np.argmin(is_same))} on.',
             hint="Only cameras that stand still are supported; take this one out.",
             path=path,
         )

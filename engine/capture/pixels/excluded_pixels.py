@@ -17,7 +17,7 @@ from engine.capture.exclusions import Exclusions, Stroke
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class ExcludedStretch:
     """Frames [first, stop) of a camera in which the same pixels are excluded.
 
     Attributes:
@@ -46,10 +46,10 @@ class ExcludedPixels:
 
     def __init__(self, exclusions: Exclusions, names: Sequence[str], n_frames: int, size: tuple[int, int]) -> None:
         self._exclusions, self._names, self._n_frames, self._size = exclusions, tuple(names), n_frames, size
-        self._stretches: dict[int, list[Stretch]] = {}
+        self._stretches: dict[int, list[ExcludedStretch]] = {}
         self._lock = threading.Lock()
 
-    def stretches(self, camera_index: int) -> list[Stretch]:
+    def stretches(self, camera_index: int) -> list[ExcludedStretch]:
         """All frames of a camera, in order; neighbours differ in what is excluded, or may."""
         with self._lock:
             if camera_index not in self._stretches:
@@ -93,12 +93,12 @@ class ExcludedPixels:
                 return found, None
         return found, left
 
-    def _cut(self, name: str) -> list[Stretch]:
+    def _cut(self, name: str) -> list[ExcludedStretch]:
         n_frames, (width, height) = self._n_frames, self._size
         everything = np.ones((height, width), bool)
         everything.flags.writeable = False
         if name in self._exclusions.cameras:
-            return [Stretch(0, n_frames, everything)]
+            return [ExcludedStretch(0, n_frames, everything)]
         frames = [one for one in self._exclusions.frames if one.camera in (None, name)]
         masks = [(one, self._painted(one.strokes)) for one in self._exclusions.masks if one.camera == name]
         ends = {0, n_frames}
@@ -108,13 +108,13 @@ class ExcludedPixels:
         stretches = []
         for first, stop in itertools.pairwise(bounds):
             if any(one.first <= first < one.stop for one in frames):
-                stretches.append(Stretch(first, stop, everything))
+                stretches.append(ExcludedStretch(first, stop, everything))
                 continue
             here = [pixels for mask, pixels in masks if mask.first <= first < mask.stop]
             is_excluded = np.logical_or.reduce(here) if here else None
             if is_excluded is not None:
                 is_excluded = is_excluded if is_excluded.any() else None
-            stretches.append(Stretch(first, stop, is_excluded))
+            stretches.append(ExcludedStretch(first, stop, is_excluded))
         return stretches
 
     def _painted(self, strokes: Sequence[Stroke]) -> np.ndarray:

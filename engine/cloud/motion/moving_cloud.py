@@ -17,7 +17,7 @@ from engine.camera.depth_range import near_plane
 from engine.camera.projection import project, projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.fusion import keep_inliers
-from engine.cloud.keeping import Arrays, Keep, do_now
+from engine.cloud.kept_results import Arrays, Keep, do_now
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility, surface_rows
 
 logger = logging.getLogger(__name__)

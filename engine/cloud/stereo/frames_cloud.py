@@ -18,7 +18,7 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import scene_colors
 from engine.cloud.fusion import fuse_tiers, keep_inliers
-from engine.cloud.keeping import Arrays, Keep, do_now
+from engine.cloud.kept_results import Arrays, Keep, do_now
 from engine.cloud.stereo.coloring import balance, colored_by_neighbors, observe
 from engine.cloud.stereo.depth.changed_depths import changed_depth_maps
 from engine.cloud.stereo.depth.depth_maps import estimate_depth_maps

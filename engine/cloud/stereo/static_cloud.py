@@ -16,7 +16,7 @@ import numpy as np
 
 from engine.camera.rig import CameraRig
 from engine.cloud.fusion import fuse_tiers, keep_inliers
-from engine.cloud.keeping import Keep, do_now
+from engine.cloud.kept_results import Keep, do_now
 from engine.cloud.stereo.coloring import balance, colored_by_neighbors, observe
 from engine.cloud.stereo.depth.depth_maps import estimate_depth_maps
 from engine.cloud.stereo.sampling import median_footprint, sample_tiers, seen_pixels, working_pictures

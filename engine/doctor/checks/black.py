@@ -6,7 +6,7 @@ import numpy as np
 
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.finding import Finding, PictureEvidence
-from engine.doctor.looking import Look
+from engine.doctor.picture_survey import PictureSurvey
 from engine.doctor.words import spans
 
 DARK, BRIGHT = 20.0, 240.0
@@ -22,7 +22,7 @@ def empty_pictures(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return is_black, np.percentile(flat, 100.0 - NEARLY_ALL, axis=1) > BRIGHT
 
 
-def check_black(look: Look) -> list[Finding]:
+def check_black(look: PictureSurvey) -> list[Finding]:
     """Empty pictures of each camera."""
     found = []
     for name, camera in zip(look.names, look.cameras, strict=True):

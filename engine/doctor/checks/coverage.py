@@ -26,7 +26,7 @@ WIDE_DEG = 32.0
 
 
 @dataclass(frozen=True, slots=True)
-class Coverage:
+class CameraCoverage:
     """Of each camera.
 
     Attributes:
@@ -38,7 +38,7 @@ class Coverage:
     nearest_deg: np.ndarray
 
 
-def measure_coverage(rig: CameraRig) -> Coverage:
+def measure_coverage(rig: CameraRig) -> CameraCoverage:
     """Send rays through each picture and count who else sees places along them."""
     projections = projection_matrices(rig)
     distances = np.linalg.norm(rig.focus_point() - rig.centers, axis=1)
@@ -58,10 +58,10 @@ def measure_coverage(rig: CameraRig) -> Coverage:
             size = (int(value) for value in rig.image_sizes[other])
             n_seeing += is_in_picture(*project(places, projections[other]), *size)
         shares[camera] = float((n_seeing >= min(N_OTHERS, len(rig) - 1)).mean())
-    return Coverage(shares, angles.min(1) if len(rig) > 1 else np.full(1, np.inf))
+    return CameraCoverage(shares, angles.min(1) if len(rig) > 1 else np.full(1, np.inf))
 
 
-def check_coverage(rig: CameraRig, coverage: Coverage) -> list[Finding]:
+def check_coverage(rig: CameraRig, coverage: CameraCoverage) -> list[Finding]:
     """Cameras that see what others do not, and gaps between neighbours."""
     if len(rig) < 2:
         text = "With only one camera, depth cannot be measured."

@@ -11,7 +11,7 @@ import numpy as np
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.checks.black import empty_pictures
 from engine.doctor.finding import Finding, PictureEvidence
-from engine.doctor.looking import Look
+from engine.doctor.picture_survey import PictureSurvey
 from engine.doctor.words import spans
 
 STILL_SHARE = 0.08
@@ -32,7 +32,7 @@ def changes(gray: np.ndarray) -> np.ndarray:
     return steps.reshape(len(steps), -1).mean(1)
 
 
-def check_frozen(look: Look) -> list[Finding]:
+def check_frozen(look: PictureSurvey) -> list[Finding]:
     """Frozen cameras, and moments that all cameras show twice."""
     rows = [row for row, camera in enumerate(look.cameras) if camera is not None]
     is_next = look.is_consecutive
@@ -59,7 +59,7 @@ def check_frozen(look: Look) -> list[Finding]:
     return found
 
 
-def _frozen(look: Look, row: int, frames: list[int], n_looked_at: int) -> Finding:
+def _frozen(look: PictureSurvey, row: int, frames: list[int], n_looked_at: int) -> Finding:
     name, share = look.names[row], len(frames) / n_looked_at
     is_bad = share > BAD_SHARE
     first = frames[0]
@@ -83,7 +83,7 @@ def _frozen(look: Look, row: int, frames: list[int], n_looked_at: int) -> Findin
     )
 
 
-def _repeated(look: Look, frames: np.ndarray, n_cameras: int) -> list[Finding]:
+def _repeated(look: PictureSurvey, frames: np.ndarray, n_cameras: int) -> list[Finding]:
     listed_frames = [int(frame) for frame in frames]
     gaps = np.diff(listed_frames)
     every = f", every {int(gaps[0])} frames" if len(gaps) > 1 and (gaps == gaps[0]).all() and gaps[0] > 1 else ""

@@ -9,7 +9,7 @@ import numpy as np
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.alignment import align
 from engine.doctor.finding import Finding, PictureEvidence
-from engine.doctor.looking import Look
+from engine.doctor.picture_survey import PictureSurvey
 from engine.parallel import map_ordered
 
 MOVED_SHARE = 0.0022
@@ -22,7 +22,7 @@ LEAST_DIFFERENCE = 1.0
 """Grey levels; with less there is nothing to explain."""
 
 
-def check_movement(look: Look, tell: Callable[[float], None] = lambda done: None) -> list[Finding]:
+def check_movement(look: PictureSurvey, tell: Callable[[float], None] = lambda done: None) -> list[Finding]:
     """Compare pictures over the whole length with the first one.
 
     tell: Called with the share that is done; may raise.
@@ -55,7 +55,7 @@ def check_movement(look: Look, tell: Callable[[float], None] = lambda done: None
     return findings
 
 
-def _finding(look: Look, row: int, frames: list[int], found: np.ndarray, has_moved: np.ndarray) -> Finding:
+def _finding(look: PictureSurvey, row: int, frames: list[int], found: np.ndarray, has_moved: np.ndarray) -> Finding:
     name, width = look.names[row], int(look.capture.rig.image_sizes[row, 0])
     worst = int(found.argmax())
     first = int(np.flatnonzero(has_moved)[0])

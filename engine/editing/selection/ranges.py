@@ -8,7 +8,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spread:
+class ValueSpread:
     """How many Gaussians have which value.
 
     Attributes:
@@ -42,7 +42,7 @@ class Spread:
         return float(min(max(share, 0.0), 1.0))
 
 
-def spread_of(values: np.ndarray, *, n_bins: int = 64, is_log: bool = False) -> Spread | None:
+def spread_of(values: np.ndarray, *, n_bins: int = 64, is_log: bool = False) -> ValueSpread | None:
     """How values are spread; None where none is known.
 
     Args:
@@ -60,7 +60,7 @@ def spread_of(values: np.ndarray, *, n_bins: int = 64, is_log: bool = False) -> 
     width = float(places.max())
     bins = np.zeros(len(known), np.int64) if width <= 0.0 else (places / width * n_bins).astype(np.int64)
     counts = np.bincount(np.minimum(bins, n_bins - 1), minlength=n_bins)
-    return Spread(counts, low, high, is_log, len(values) - len(known))
+    return ValueSpread(counts, low, high, is_log, len(values) - len(known))
 
 
 def in_range(values: np.ndarray, low: float, high: float) -> np.ndarray:

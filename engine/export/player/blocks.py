@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.conventions import ALPHA_MIN
 from engine.export.player.row_coding import color_max, encoded_rows, fitting_rounding, folded, rounded_colors
-from engine.export.player.still_part import StillPart, shared_rows, still_part
+from engine.export.player.still_part import PlayerStillPart, shared_rows, still_part
 from engine.export.splats import Splats
 
 
@@ -46,7 +46,7 @@ class Packer:
         part = still_part(n_frames, lambda frame: seen(still(frame)))
         if part is None:  # then all of it is stored for every frame
             frames = [joined(seen(still(frame)), seen(moving(frame))) for frame in range(n_frames)]
-            part = StillPart(frames[0][:0], {0: frames[0].colors[:0]})
+            part = PlayerStillPart(frames[0][:0], {0: frames[0].colors[:0]})
         else:
             frames = [seen(moving(frame)) for frame in range(n_frames)]
         if self._shared is None:
@@ -55,14 +55,14 @@ class Packer:
         description = {**self._still(part, pieces), "moving": _moving(frames, pieces)}
         return deflated(pieces, description)
 
-    def _share(self, part: StillPart) -> None:
+    def _share(self, part: PlayerStillPart) -> None:
         self._shared = part.splats
         rounding = fitting_rounding([part.splats])
         self._shared_colors = rounded_colors(part.splats.colors, rounding.color_max)
         description = {"n": len(part.splats), "rounding": rounding.described()}
         self.shared = deflated([encoded_rows(part.splats, rounding)], description)
 
-    def _still(self, part: StillPart, pieces: list[bytes]) -> dict[str, Any]:
+    def _still(self, part: PlayerStillPart, pieces: list[bytes]) -> dict[str, Any]:
         """Which shared rows are hidden, further rows, and the light on all that remain."""
         assert self._shared is not None
         found, is_hidden = shared_rows(self._shared, part.splats)

@@ -15,7 +15,7 @@ SAME_COLOR = 0.25 / 255.0
 
 
 @dataclass(frozen=True, slots=True)
-class StillPart:
+class PlayerStillPart:
     """What stands still in one clip.
 
     Attributes:
@@ -28,7 +28,7 @@ class StillPart:
     colors: dict[int, np.ndarray]
 
 
-def still_part(n_frames: int, at: Callable[[int], Splats]) -> StillPart | None:
+def still_part(n_frames: int, at: Callable[[int], Splats]) -> PlayerStillPart | None:
     """What stands still in a clip; None where anything but colours differs between its frames.
 
     Args:
@@ -44,10 +44,10 @@ def still_part(n_frames: int, at: Callable[[int], Splats]) -> StillPart | None:
         share = np.float32(frame / (n_frames - 1))
         is_even = is_even and not _differs(other.colors, first.colors + (last.colors - first.colors) * share)
     if not is_even:
-        return StillPart(first, {frame: at(frame).colors for frame in range(n_frames)})
+        return PlayerStillPart(first, {frame: at(frame).colors for frame in range(n_frames)})
     if _differs(first.colors, last.colors):
-        return StillPart(first, {0: first.colors, n_frames - 1: last.colors})
-    return StillPart(first, {0: first.colors})
+        return PlayerStillPart(first, {0: first.colors, n_frames - 1: last.colors})
+    return PlayerStillPart(first, {0: first.colors})
 
 
 def _differs(some: np.ndarray, others: np.ndarray) -> bool:

@@ -27,7 +27,7 @@ CHOICES: tuple[Choice, ...] = get_args(Choice)
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class PictureFigures:
     """Figures of one picture.
 
     Attributes:
@@ -47,7 +47,7 @@ def measure_picture(
     is_valid: np.ndarray | None = None,
     metrics: Choice = "all",
     precision: Precision = "float",
-) -> Measured:
+) -> PictureFigures:
     """Compare a picture with the truth, where the camera sees anything.
 
     Where it sees nothing, the truth stands in both pictures, which windows and filters then look at, and no mean is
@@ -107,7 +107,7 @@ def _psnr_in_same_light(
 
 def _filled(
     found: dict[str, float | None], fault: str | None, metrics: Choice, is_moving: np.ndarray, shape: tuple[int, ...]
-) -> Measured:
+) -> PictureFigures:
     """Every column in order, NaN as None, and a reason for each None."""
     figures: dict[str, float | None] = {}
     missing: dict[str, str] = {}
@@ -126,4 +126,4 @@ def _filled(
             missing[name] = side if is_small else "the camera sees too little of the picture"
         else:
             missing[name] = "no moving pixels" if not is_moving.any() else "no pixels that do not move"
-    return Measured(figures, missing)
+    return PictureFigures(figures, missing)

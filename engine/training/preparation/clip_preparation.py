@@ -23,7 +23,7 @@ from engine.capture.exclusions import exclusion_key
 from engine.clip_files.clip_header import ClipHeader, Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.cloud.background.exposure import Exposure
-from engine.cloud.keeping import Keep
+from engine.cloud.kept_results import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.frames_cloud import FramesCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
@@ -46,13 +46,13 @@ from engine.training.preparation.cloud_preparation import (
     blank,
     correct_backgrounds,
     estimate_backgrounds,
+    filled_from_render,
     frames_cloud,
     key_of_corrected,
     motion_masks,
     moving_cloud,
     read_backgrounds,
-    seen_still,
-    shown_elsewhere,
+    stable_in_clip,
     static_cloud,
     write_backgrounds,
 )
@@ -201,7 +201,7 @@ class ClipPreparation:
         parts = replace(parts, backgrounds=backgrounds)
         masks = self._motion_masks(parts, pictures)
         cloud, moving_spacing = self._moving_cloud(parts, pictures, masks)
-        parts = replace(parts, backgrounds=seen_still(backgrounds, pictures, masks))
+        parts = replace(parts, backgrounds=stable_in_clip(backgrounds, pictures, masks))
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
         self._say("Carving what moves", f"{len(cloud.points):,} moving anchors")
@@ -278,7 +278,7 @@ class ClipPreparation:
         if not self._config.needs_backgrounds:
             return
         is_valid = self._capture.valid_of(self._camera_indices)
-        backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains), is_valid)
+        backgrounds = filled_from_render(backgrounds, self._render_static(model, gains), is_valid)
         key = self._key_of_corrected()
         kept = read_backgrounds(self._prep_dir, key)
         if kept is None or not kept.equals(backgrounds):
@@ -376,8 +376,8 @@ class ClipPreparation:
         estimated = self._estimated(clip, exposures)
         keep = self._keep_after(model, gains, estimated)
         backgrounds = self._corrected(estimated, model, gains, pictures, keep)
-        seen = seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
-        return shown_elsewhere(seen, self._render_static(model, gains), pictures.is_valid)
+        seen = stable_in_clip(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
+        return filled_from_render(seen, self._render_static(model, gains), pictures.is_valid)
 
     def _corrected(
         self,

@@ -27,7 +27,7 @@ from engine.cloud.background.background import estimate_background
 from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.background.recheck import recheck_background
-from engine.cloud.keeping import Arrays, Keep, do_now
+from engine.cloud.kept_results import Arrays, Keep, do_now
 from engine.cloud.motion.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
 from engine.cloud.stereo.frames_cloud import FramesCloud, build_frames_cloud
 from engine.cloud.stereo.given_points import true_points
@@ -295,7 +295,7 @@ def moving_pixels(
     return found | (masked if valid is None else masked & valid)
 
 
-def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.ndarray) -> Backgrounds:
+def stable_in_clip(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.ndarray) -> Backgrounds:
     """Backgrounds in the light of a clip: where a camera sees something stand still in most frames, their mean.
 
     Args:
@@ -326,7 +326,7 @@ def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.n
     return Backgrounds(np.stack(images), np.stack(is_seen))
 
 
-def shown_elsewhere(
+def filled_from_render(
     backgrounds: Backgrounds, render_static: Callable[[int], np.ndarray], is_valid: np.ndarray | None
 ) -> Backgrounds:
     """Backgrounds of a trained clip: where nothing was seen to stand still, what its static anchors show instead.

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from engine.cloud.keeping import Arrays
+from engine.cloud.kept_results import Arrays
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
 from engine.storage.array_files import ArraysError, read_arrays, read_metadata, write_arrays

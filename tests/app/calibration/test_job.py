@@ -201,7 +201,7 @@ def test_time_left_follows_from_the_share_that_is_done() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--distance", "cam00", "cam99", "2"], "no camera 'cam99'"),
+        (["--distance", "cam00", "cam99", "2"], "Camera 'cam99' does not exist"),
         (["--distance", "cam00", "cam00", "2"], "from cam00 to cam00 is 2 m"),
         (["--distance", "cam00", "cam01", "far"], "not a number of metres"),
         (["--distance", "cam00", "cam01", "-1"], "is -1 m"),

@@ -88,7 +88,7 @@ def test_an_export_as_python(job, tmp_path, monkeypatch):
         def run(self, opened: Any, job: Any, report: Any) -> None:
             made.append(job)
 
-    monkeypatch.setattr("app.export.jobs.job.Job.load", lambda job: Work())
+    monkeypatch.setattr("app.export.jobs.job.ExportJob.load", lambda job: Work())
     monkeypatch.setattr(scripted_project.ScriptedProject, "open_trained", lambda project: None)
     command = as_command(tmp_path / "it's mine", job)
     exec(compile(command.python, "pasted", "exec"), {"__name__": "__main__"})

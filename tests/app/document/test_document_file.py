@@ -157,7 +157,7 @@ ODD = [
     (("edits", 2, "action", "quat"), [0, 0, 0, 0], "not a rotation"),
     (("markers", 0, "frame_index"), -1, "frame_index"),
     (("labels", 0, "kind"), "lamp", "kind"),
-    (("exclusions", "frames", 0, "stop"), 3, "are none"),
+    (("exclusions", "frames", 0, "stop"), 3, "empty range"),
     (("exclusions", "masks", 0, "strokes", 0, "points"), [], "points"),
     (("world", "up"), [0, 0, 0], "unit length"),
     (("world", "meters_per_unit"), 0, "out of range"),

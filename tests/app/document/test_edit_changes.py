@@ -65,7 +65,7 @@ def test_an_edit_that_is_not_there_is_refused(edit_id: int) -> None:
     for act in (change.remove_edit, change.toggle_edit, change.duplicate_edit, change.edit_with):
         with pytest.raises(ProjectError, match=f"no edit {edit_id}"):
             act(document, edit_id)
-    with pytest.raises(ProjectError, match="no position 3"):
+    with pytest.raises(ProjectError, match="Position 3 is outside"):
         change.move_edit(document, 1, 3)
 
 

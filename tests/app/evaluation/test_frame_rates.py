@@ -10,14 +10,14 @@ from app.evaluation.evaluation import EVALUATIONS
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed import window_drawing
 from app.evaluation.speed.frame_rates import RATES_FILE, FrameRates, frame_rates, kept_rates
-from app.evaluation.speed.laps import ENOUGH_LAPS, ENOUGH_S, Lap, Rate, camera_of, enough, frames_of, rate_of
-from app.evaluation.speed.window_drawing import Drawn, draw_with, drawn_laps, read_said, said_by
+from app.evaluation.speed.laps import ENOUGH_LAPS, ENOUGH_S, Lap, RenderRate, camera_of, enough, frames_of, rate_of
+from app.evaluation.speed.window_drawing import WindowLaps, draw_with, drawn_laps, read_said, said_by
 from app.project.opening.project_access import open_project
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import change_header, train
 
 HEADER = {"camera_names": [], "near_plane": 0.1, "spacing": 0.2}
-DRAWN = Drawn([Lap(0.01, 0.03, 500), Lap(0.01, 0.03, 700), Lap(0.02, 0.06, 600)], "a card")
+DRAWN = WindowLaps([Lap(0.01, 0.03, 500), Lap(0.01, 0.03, 700), Lap(0.02, 0.06, 600)], "a card")
 
 
 class Clock:
@@ -92,7 +92,7 @@ def test_what_was_measured_is_not_measured_again_until_a_clip_changes(opened):
     assert kept_rates(opened) is None
     first = frame_rates(opened, clock=Clock(), draw=lambda folder: DRAWN)
     assert kept_rates(opened) == first
-    assert frame_rates(opened, clock=lambda: 0.0, draw=lambda folder: Drawn([], "")) == first
+    assert frame_rates(opened, clock=lambda: 0.0, draw=lambda folder: WindowLaps([], "")) == first
     change_header(opened.project.clip_path(1), fingerprint="another")
     again = open_trained(opened.project)
     assert kept_rates(again) is None
@@ -100,7 +100,7 @@ def test_what_was_measured_is_not_measured_again_until_a_clip_changes(opened):
 
 
 def test_without_opengl_the_reason_stands_there_and_it_is_tried_again(opened):
-    rates = frame_rates(opened, clock=Clock(), draw=lambda folder: Drawn([], "", "no driver"))
+    rates = frame_rates(opened, clock=Clock(), draw=lambda folder: WindowLaps([], "", "no driver"))
     assert rates.cpu is not None
     assert (rates.gl, rates.why_no_gl) == (None, "no driver")
     assert rates.figures()["fps_gl"] is None
@@ -138,7 +138,7 @@ def test_figures_are_not_touched_by_times(opened):
 def program(tmp_path, monkeypatch):
     """Makes a module the program that draws; gives what it said."""
 
-    def draw(source: str) -> Drawn:
+    def draw(source: str) -> WindowLaps:
         (tmp_path / "made_up_drawing.py").write_text(source)
         monkeypatch.setenv("PYTHONPATH", str(tmp_path))
         monkeypatch.setattr(window_drawing, "_module", "")
@@ -176,7 +176,7 @@ def test_a_program_that_hangs_is_ended(program, monkeypatch):
 
 def test_without_a_window_s_program_nothing_is_drawn(monkeypatch, tmp_path):
     monkeypatch.setattr(window_drawing, "_module", "")
-    assert drawn_laps(tmp_path) == Drawn([], "", "this program has no window")
+    assert drawn_laps(tmp_path) == WindowLaps([], "", "this program has no window")
     monkeypatch.setattr(window_drawing, "_module", "anything")
     monkeypatch.setattr(sys, "executable", str(tmp_path / "nothing here"))
     assert "could not be started" in drawn_laps(tmp_path).reason
@@ -184,9 +184,9 @@ def test_without_a_window_s_program_nothing_is_drawn(monkeypatch, tmp_path):
 
 def test_said_and_read_are_the_same():
     assert read_said(said_by(DRAWN)) == DRAWN
-    assert read_said(said_by(Drawn([], "", "no driver"))) == Drawn([], "", "no driver")
+    assert read_said(said_by(WindowLaps([], "", "no driver"))) == WindowLaps([], "", "no driver")
 
 
 def test_rates_without_a_figure_say_so():
-    rates = FrameRates("0", 4, 3, None, Rate(1.0, 2.0, 3, 4, "OpenGL, a card"))
+    rates = FrameRates("0", 4, 3, None, RenderRate(1.0, 2.0, 3, 4, "OpenGL, a card"))
     assert rates.figures() == {"fps_cpu": None, "fps_gl": 1.0, "n_gaussians": None}

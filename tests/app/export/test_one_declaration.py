@@ -18,7 +18,7 @@ from app.cli.cli import build_parser
 from app.command_text.job_command import export_command
 from app.export.export_choices import ExportChoices
 from app.export.jobs.answers import Answers
-from app.export.jobs.job import EDITS, Job, option
+from app.export.jobs.job import EDITS, ExportJob, option
 from app.export.jobs.table import KINDS, named_job
 from engine.setting import Flag
 from tests.app.export.test_export_choices import CONTEXT
@@ -27,7 +27,7 @@ from tests.documents.exports import export_tables
 ROOT = Path(__file__).resolve().parents[3]
 
 
-class KiteJob(Job, frozen=True):
+class KiteJob(ExportJob, frozen=True):
     """A made-up kind of export."""
 
     kind: ClassVar[str] = "kites"

@@ -27,7 +27,7 @@ from app.lab.bench.iteration import SIZES, measure_iteration
 from app.lab.bench.raster import evaluated_pairs, limit_shares, measure_raster
 from app.lab.bench.rows import SpeedError
 from app.lab.bench.scenes import RECIPES, Recipe
-from app.lab.bench.step import STAGES, StepRun, Window
+from app.lab.bench.step import STAGES, StepRun, StepWindow
 from app.lab.bench.step_errors import measure_errors, middle
 from app.lab.bench.suite import FULL, QUICK, Plan, document
 from app.lab.bench.table import report_text
@@ -191,14 +191,14 @@ def test_the_steps_row_has_speed_and_error(is_source):
 
 
 def test_a_step_in_a_window_draws_that_part_of_the_picture():
-    window = Window(8, 5, 16, 12)
+    window = StepWindow(8, 5, 16, 12)
     whole, part = StepRun(TINY_CLIP, backend=EXACT).kept(), StepRun(TINY_CLIP, backend=EXACT, window=window).kept()
     expected, shifted = whole.image[5:17, 8:24], whole.image[6:18, 8:24]
     assert (part.image - expected).abs().mean() < 0.005  # not zero: footprints beyond a border are held at its slope
     assert (part.image - shifted).abs().mean() > 0.01
     assert part.image.std() > 0.05
     assert part.gradients.keys() == whole.gradients.keys()
-    assert middle(ClipRecipe(10, 1, 480, 360)) == Window(208, 156, 64, 48)
+    assert middle(ClipRecipe(10, 1, 480, 360)) == StepWindow(208, 156, 64, 48)
 
 
 class _Skewed(torch.autograd.Function):

@@ -10,7 +10,7 @@ from app.playback.frame_decoder import ShownFrame
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays
 from app.playback.modes.view_modes import ALL, ShownAs
 from app.playback.picture_source import PictureSource
-from app.playback.render import Look, RenderRequest
+from app.playback.render import RenderRequest, RenderView
 from app.playback.views.orbit_view import OrbitView
 from engine.clip_files.roles import ROLES
 from engine.raster.pinhole_view import PinholeView
@@ -73,7 +73,7 @@ def view() -> OrbitView:
 
 def request(shown: ShownFrame, mode: str, *, view_: OrbitView | None = None) -> RenderRequest:
     """What draws it in a mode."""
-    look = Look.of(view() if view_ is None else view_, *SIZE, shown_as=ShownAs(mode))
+    look = RenderView.of(view() if view_ is None else view_, *SIZE, shown_as=ShownAs(mode))
     return RenderRequest((1, "path", 1, "a state", "", ShownAs(), 4), look, shown)
 
 

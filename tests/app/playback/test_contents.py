@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.playback.modes.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE, ClipParts, part_of
+from app.playback.modes.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE, EditedParts, part_of
 from app.playback.modes.view_modes import CONTENTS
 from engine.clip_files.clip_state import ClipState
 from engine.model.clip_model import ClipModel
@@ -15,8 +15,8 @@ from tests.clip_headers import make_header
 from tests.engine.metrics.tiny_clips import CLIP_LENGTH, make_model
 
 
-def parts_of(model: ClipModel, state: ClipState, base: ClipState | None) -> ClipParts:
-    return ClipParts(model, CLIP, state, base)
+def parts_of(model: ClipModel, state: ClipState, base: ClipState | None) -> EditedParts:
+    return EditedParts(model, CLIP, state, base)
 
 
 @pytest.mark.parametrize("content", CONTENTS)

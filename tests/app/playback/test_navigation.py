@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from app.playback.frame_decoder import ShownFrame
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture
 from app.playback.modes.view_modes import ShownAs
-from app.playback.render import Look, RenderRequest, render
+from app.playback.render import RenderRequest, RenderView, render
 from app.playback.views.orbit_view import FLAT_REACH, OrbitView
 from app.playback.views.pointing import pixel_ray, point_beside, seen_point
 from app.playback.views.scene_axes import AXIS_VIEWS, UP_AXES, axis_rotation, rig_radius, scene_axes, view_from
@@ -353,7 +353,7 @@ def test_without_easing_there_is_nothing_to_wait_for():
 def drawn(view: OrbitView, gaussians: GaussianArrays, mode: str = "color") -> Picture:
     """The rasterizer's picture, 64 x 48."""
     anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="none")
-    look = Look.of(view, 64, 48, shown_as=ShownAs(mode))
+    look = RenderView.of(view, 64, 48, shown_as=ShownAs(mode))
     return render(
         RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(gaussians, anchors)), backend_called("cpu")
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.playback.modes.contents import ClipParts
+from app.playback.modes.contents import EditedParts
 from app.playback.modes.trails import N_TRAILS, TrailMaker, TrailRequest, paths_of, trail_lines
 from engine.editing.actions import Hide
 from engine.editing.edit import Edit, Everything, Scope
@@ -18,7 +18,7 @@ WAIT_S = 60.0
 def test_paths_are_where_the_gaussians_were() -> None:
     _, state = reference()
     model, own = source(state)
-    part = ClipParts(model, CLIP, own, state).apart("dynamic")
+    part = EditedParts(model, CLIP, own, state).apart("dynamic")
     paths, opacities = paths_of(part, 2, [NO_EFFECTS] * 3)
     assert len(paths) == 3, "a trail does not leave its clip"
     for frame in range(3):
@@ -28,7 +28,7 @@ def test_paths_are_where_the_gaussians_were() -> None:
 
 def test_a_path_begins_where_its_anchor_begins_to_exist() -> None:
     model, state = reference()  # its moving anchors exist in frames 0 and 2 only
-    paths, opacities = paths_of(ClipParts(model, CLIP, state, None).apart("dynamic"), 2, [NO_EFFECTS] * 3)
+    paths, opacities = paths_of(EditedParts(model, CLIP, state, None).apart("dynamic"), 2, [NO_EFFECTS] * 3)
     assert np.isnan(paths[1]).all()
     assert np.isfinite(paths[[0, 2]]).all()
     vertices, colors = trail_lines(paths, opacities)
@@ -38,7 +38,7 @@ def test_a_path_begins_where_its_anchor_begins_to_exist() -> None:
 def test_a_path_has_a_gap_where_an_edit_hides_it() -> None:
     _, state = reference()
     model, own = source(state)
-    part = ClipParts(model, CLIP, own, state).apart("dynamic")
+    part = EditedParts(model, CLIP, own, state).apart("dynamic")
     stack = EditStack((Edit(0, "", Everything(), Hide(), Scope(1, 2)),))
     plain, _ = paths_of(part, 2, [NO_EFFECTS] * 3)
     paths, _ = paths_of(part, 2, [stack.at(frame) for frame in range(3)])
@@ -72,7 +72,7 @@ def test_what_stands_still_has_no_trail(n_frames: int) -> None:
 
 def test_trails_of_another_clip_are_not_shown() -> None:
     model, state = reference()
-    parts, effects = ClipParts(model, CLIP, state, None), (NO_EFFECTS,) * 3
+    parts, effects = EditedParts(model, CLIP, state, None), (NO_EFFECTS,) * 3
     maker = TrailMaker()
     try:
         request = TrailRequest("one", 2, effects, parts)

@@ -15,8 +15,8 @@ import pytest
 from app.cli.cli import main
 from app.residuals import measuring
 from app.residuals.figures import PairFigures, RowFigures
-from app.residuals.measuring_messages import LookAt, Measured, MeasureJob, MeasuringEnded, SetShare, Trouble
-from app.residuals.measuring_order import Look
+from app.residuals.measuring_messages import LookAt, MeasureJob, MeasuringEnded, PictureMeasured, SetShare, Trouble
+from app.residuals.measuring_order import MeasuringFocus
 from app.residuals.measuring_process import KEPT, MeasuringProcess
 from app.status import CELL_COLUMNS, ResidualStatus
 from tests.app.residuals.conftest import DEADLINE_S, Opened, color, make_project
@@ -105,7 +105,7 @@ def test_nothing_is_measured_before_somebody_looks(open_residuals, launched):
     opened.residuals.look_at(opened.timeline, 2)
     assert poll(opened).is_measuring
     (measurer,) = launched.all
-    assert measurer.job.look == Look(1, 2)
+    assert measurer.job.look == MeasuringFocus(1, 2)
     assert measurer.job.trained == (0, 1)
     assert measurer.job.is_kept
     assert measurer.job.rows.all()
@@ -113,7 +113,7 @@ def test_nothing_is_measured_before_somebody_looks(open_residuals, launched):
     opened.timeline.seek(0)
     opened.residuals.look_at(opened.timeline, None)
     poll(opened)
-    assert measurer.heard == [LookAt(Look(0, None))]
+    assert measurer.heard == [LookAt(MeasuringFocus(0, None))]
 
 
 def test_what_is_measured_shows_and_what_goes_wrong_is_told(open_residuals, launched):
@@ -122,9 +122,9 @@ def test_what_is_measured_shows_and_what_goes_wrong_is_told(open_residuals, laun
     poll(opened)
     (measurer,) = launched.all
     measurer.events = [
-        Measured(1, row=RowFigures(3, 2, 31.5, 0.125)),
-        Measured(1, pair=PairFigures(3, 2, 2 / 255, 1 / 255, 0.5)),
-        Measured(1, row=RowFigures(4, 2, 29.5, None)),
+        PictureMeasured(1, row=RowFigures(3, 2, 31.5, 0.125)),
+        PictureMeasured(1, pair=PairFigures(3, 2, 2 / 255, 1 / 255, 0.5)),
+        PictureMeasured(1, row=RowFigures(4, 2, 29.5, None)),
         Trouble("The disk is odd."),
         Trouble("The disk is odd."),
     ]
@@ -153,10 +153,10 @@ def test_a_seam_is_provisional_and_a_clip_without_its_figure_until_all_cameras_a
     held_out = opened.opened.holdout[0]
     for camera in (held_out, *({0, 1, 2, 3} - {held_out})):
         for frame in range(6):
-            measurer.events.append(Measured(frame // 3, row=RowFigures(frame, camera, 30.0 + frame, 0.1)))
+            measurer.events.append(PictureMeasured(frame // 3, row=RowFigures(frame, camera, 30.0 + frame, 0.1)))
             if frame:
                 pair = PairFigures(frame, camera, 0.01, 0.004 if frame == 3 else 0.002, 0.02 if frame == 3 else 0.01)
-                measurer.events.append(Measured(frame // 3, pair=pair))
+                measurer.events.append(PictureMeasured(frame // 3, pair=pair))
         *most, last = measurer.events
         measurer.events = most
         status = poll(opened)
@@ -182,8 +182,8 @@ def test_a_forecast_waits_until_it_is_known_and_does_not_follow_a_camera_that_be
     told = []
     for frame, seconds in ((0, 30.0), (1, 10.0), (2, 30.0), (3, 10.0), (4, 30.0), (5, 10.0)):
         clock.now_s += seconds
-        measurer.events = [Measured(frame // 3, row=RowFigures(frame, 2, 30.0, 0.1))]
-        measurer.events += [Measured(frame // 3, pair=PairFigures(frame, 2, 0.01, 0.002, 0.01))] if frame else []
+        measurer.events = [PictureMeasured(frame // 3, row=RowFigures(frame, 2, 30.0, 0.1))]
+        measurer.events += [PictureMeasured(frame // 3, pair=PairFigures(frame, 2, 0.01, 0.002, 0.01))] if frame else []
         status = poll(opened)
         told.append(status.eta_s)
     assert told[:2] == [None, None]

@@ -12,30 +12,32 @@ from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.project.opening.project_access import open_project
 from app.residuals import measuring_worker
-from app.residuals.figures import ClipFigures, Figures
+from app.residuals.figures import ClipMeasurements, Figures
 from app.residuals.heat_map import LEVELS
 from app.residuals.kept_reading import read_kept
 from app.residuals.measuring_messages import (
     Command,
     Event,
     LookAt,
-    Measured,
     MeasureJob,
+    PictureMeasured,
     SetShare,
     Trouble,
 )
-from app.residuals.measuring_order import Look, first_item
+from app.residuals.measuring_order import MeasuringFocus, first_item
 from app.residuals.measuring_worker import Talk, measure
 from engine.children.messages import decoded, encoded
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.residuals.conftest import color
 
+FOCUS = MeasuringFocus()
+
 
 class Heard:
     """Takes down what is said; looks elsewhere after so many pictures."""
 
-    def __init__(self, look: Look = Look(), *, then: Look | None = None, after: int = 0) -> None:  # noqa: B008
-        self.look: Look = look
+    def __init__(self, look: MeasuringFocus = FOCUS, *, then: MeasuringFocus | None = None, after: int = 0) -> None:
+        self.look: MeasuringFocus = look
         self._then, self._after = then, after
         self.events: list[Event] = []
         self.n_rests = 0
@@ -52,8 +54,8 @@ class Heard:
             self.look = self._then
 
     @property
-    def measured(self) -> list[Measured]:
-        return [event for event in self.events if isinstance(event, Measured)]
+    def measured(self) -> list[PictureMeasured]:
+        return [event for event in self.events if isinstance(event, PictureMeasured)]
 
     @property
     def rows(self) -> list[tuple[int, int]]:
@@ -76,7 +78,7 @@ def job_of(project: Path, *, trained=(0, 1), is_kept: bool = True, rows=None, pa
         rows=everything if rows is None else rows,
         pairs=later if pairs is None else pairs,
         is_kept=is_kept,
-        look=Look(),
+        look=MeasuringFocus(),
     )
 
 
@@ -86,7 +88,7 @@ def figures_of(project: Path, heard: Heard) -> Figures:
     figures.set_trained([0, 1])
     for event in heard.measured:
         rows, pairs = () if event.row is None else (event.row,), () if event.pair is None else (event.pair,)
-        figures.take(ClipFigures(event.clip_index, rows, pairs))
+        figures.take(ClipMeasurements(event.clip_index, rows, pairs))
     while figures.has_stale_seams:
         figures.score_seams()
     return figures
@@ -146,7 +148,7 @@ def test_only_what_is_not_known_is_measured(project):
 
 
 def test_what_the_user_looks_at_comes_first_even_in_the_middle(project):
-    heard = Heard(Look(0, 2), then=Look(1, 3), after=2)
+    heard = Heard(MeasuringFocus(0, 2), then=MeasuringFocus(1, 3), after=2)
     measure(job_of(project), heard)
     order = list(dict.fromkeys((frame // 3, camera) for frame, camera in heard.rows))
     assert order[0] == (0, 2)
@@ -158,7 +160,7 @@ class Retraining(Heard):
     """A clip is trained again before its first picture is measured."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__(Look(1))
+        super().__init__(MeasuringFocus(1))
         self._path: Path | None = path
 
     def send(self, event) -> None:
@@ -222,7 +224,7 @@ def test_order():
     holdout = {5}
     items = {(clip, camera) for clip in range(4) for camera in range(6)}
     order = []
-    while (item := first_item(items, Look(1, 3), holdout)) is not None:
+    while (item := first_item(items, MeasuringFocus(1, 3), holdout)) is not None:
         order.append(item)
         items.discard(item)
     assert order[:2] == [(1, 3), (1, 5)]
@@ -265,9 +267,9 @@ def test_while_a_clip_trains_it_rests_nineteen_times_as_long_as_it_computes(proj
 
 
 def test_the_rest_ends_when_the_training_does_and_commands_are_heard_in_it(project, monkeypatch):
-    parent = FakeParent((100.0, SetShare(0.05)), (103.0, LookAt(Look(1, 2))), (110.0, SetShare(1.0)))
+    parent = FakeParent((100.0, SetShare(0.05)), (103.0, LookAt(MeasuringFocus(1, 2))), (110.0, SetShare(1.0)))
     talk = talk_of(project, monkeypatch, parent)
     parent.cpu_s += 2.0
     talk.rest()
     assert parent.now_s == pytest.approx(110.0)
-    assert talk.look == Look(1, 2)
+    assert talk.look == MeasuringFocus(1, 2)

@@ -7,7 +7,7 @@ import pytest
 
 from app.residuals import measuring
 from app.residuals.figures import RowFigures
-from app.residuals.measuring_messages import Measured
+from app.residuals.measuring_messages import PictureMeasured
 from app.session.commands import SetClipLength, TrainClip, TrainNextClip
 from app.training import run
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
@@ -50,7 +50,7 @@ def test_figures_follow_what_is_trained(open_session, launched):
     train(session, 0)
     poll_until(session, lambda: session.residuals.status.is_measuring, what="measuring")
     assert launched.all[-1].job.trained == (0,)
-    launched.all[-1].events = [Measured(0, row=RowFigures(2, 1, 30.0, 0.25))]
+    launched.all[-1].events = [PictureMeasured(0, row=RowFigures(2, 1, 30.0, 0.25))]
     poll_until(session, lambda: np.isfinite(session.residuals.status.cells["psnr"][2, 1]), what="the figure")
     first = launched.all[-1]
     session.residuals.look_at(session.timeline, 1)

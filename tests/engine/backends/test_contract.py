@@ -13,7 +13,7 @@ import torch
 
 from engine.backends.backend import Backend
 from engine.backends.reference.backend import ReferenceBackend
-from engine.backends.table import BACKENDS, Entry, backend_called
+from engine.backends.table import BACKENDS, BackendEntry, backend_called
 from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.joining import join_frozen
 from engine.raster import Gaussians, rasterize, tile_boxes
@@ -22,7 +22,10 @@ from engine.training.step.losses import photometric_loss
 from tests.decode_scenes import ODD, Scene, backward
 
 EXACT = ReferenceBackend(dtype=torch.float64)
-TABLE = {**BACKENDS, "counting": Entry("tests.engine.backends.counting.backend:CountingBackend", "counts its calls")}
+TABLE = {
+    **BACKENDS,
+    "counting": BackendEntry("tests.engine.backends.counting.backend:CountingBackend", "counts its calls"),
+}
 ROUNDING = 1e-4
 """Of values and gradients relative to their largest: float32 sums of some hundred terms, an exponential between."""
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from engine.calibration.matching.matching import KeyPoints, Pair, all_pairs
-from engine.calibration.solving.agreement import Agreement, agreement
+from engine.calibration.solving.agreement import MatchAgreement, agreement
 from engine.calibration.solving.cameras import Cameras, rotation_of
 from tests.engine.calibration.made_rigs import SIZE, make_seen
 
@@ -62,13 +62,13 @@ def test_matches_of_a_repeating_pattern_do_not_make_right_cameras_doubtful() -> 
     assert found.shares[0] < 0.95
 
 
-def counted(*pairs: tuple[int, int, int, int], n_cameras: int) -> Agreement:
+def counted(*pairs: tuple[int, int, int, int], n_cameras: int) -> MatchAgreement:
     """Of pairs of cameras with matches and how many of them are explained."""
     n_matches, n_explained = np.zeros((2, n_cameras, n_cameras), dtype=np.int64)
     for a, b, n, explained in pairs:
         n_matches[a, b] = n_matches[b, a] = n
         n_explained[a, b] = n_explained[b, a] = explained
-    return Agreement(n_matches, n_explained)
+    return MatchAgreement(n_matches, n_explained)
 
 
 def test_an_end_that_fits_a_room_alike_from_several_sides_is_found_out_and_its_neighbour_is_not() -> None:

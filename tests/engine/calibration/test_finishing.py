@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from engine.calibration.finishing import _doubts, _failure
-from engine.calibration.solving.agreement import Agreement
+from engine.calibration.solving.agreement import MatchAgreement
 
 NAMES = [f"cam{row}" for row in range(8)]
 
 
-def made_up(firm: list[tuple[int, int]], weak: list[tuple[int, int]]) -> Agreement:
+def made_up(firm: list[tuple[int, int]], weak: list[tuple[int, int]]) -> MatchAgreement:
     """Pairs that explain all of 200 matches, and pairs that explain 150 of 200."""
     n_matches, n_explained = np.zeros((2, len(NAMES), len(NAMES)), dtype=np.int64)
     for pairs, n in ((firm, 200), (weak, 150)):
         for a, b in pairs:
             n_matches[a, b] = n_matches[b, a] = 200
             n_explained[a, b] = n_explained[b, a] = n
-    return Agreement(n_matches, n_explained)
+    return MatchAgreement(n_matches, n_explained)
 
 
 def test_each_camera_that_something_speaks_against_has_a_reason() -> None:

@@ -99,7 +99,7 @@ def test_a_slow_camera_without_a_frame_in_the_shared_time():
         ([EVEN, np.zeros(0)], "no times"),
         ([EVEN, np.array([0, np.nan, 1])], "frame 1"),
         ([EVEN, np.array([0, 0.1, 0.1])], "not later"),
-        ([EVEN, EVEN + 60], "no moment"),
+        ([EVEN, EVEN + 60], "No moment"),
     ],
 )
 def test_unusable_times_are_refused(times, reason):

@@ -135,8 +135,8 @@ def test_views_in_radians_and_points_that_came_along(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("taken", "seen", "hint"),
     [
-        ("extri.yml", "there is intri.yml, but no extri.yml", "Put extri.yml beside it"),
-        ("intri.yml", "there is extri.yml, but no intri.yml", "Put intri.yml beside it"),
+        ("extri.yml", "there is intri.yml, but no extri.yml", "Put extri.yml next to it"),
+        ("intri.yml", "there is extri.yml, but no intri.yml", "Put intri.yml next to it"),
     ],
 )
 def test_half_a_layout_says_what_is_missing(tmp_path: Path, taken: str, seen: str, hint: str) -> None:

@@ -13,7 +13,7 @@ from engine.doctor.alignment import align
 from engine.doctor.checks.black import check_black
 from engine.doctor.checks.frozen import check_frozen
 from engine.doctor.checks.movement import check_movement
-from engine.doctor.looking import CameraLook, Look, frames_to_look_at, median_picture
+from engine.doctor.picture_survey import CameraLook, PictureSurvey, frames_to_look_at, median_picture
 from engine.synthetic.rigs import make_rig
 
 N_FRAMES = 24
@@ -39,7 +39,7 @@ def film(camera: int, n_frames: int = N_FRAMES) -> np.ndarray:
     return np.clip(frames + 0.5, 0, 255).astype(np.uint8)
 
 
-def look_of(films: list[np.ndarray]) -> Look:
+def look_of(films: list[np.ndarray]) -> PictureSurvey:
     n_frames = len(films[0])
     frames, spread = frames_to_look_at(n_frames, len(films))
     assert frames == tuple(range(n_frames))
@@ -47,7 +47,7 @@ def look_of(films: list[np.ndarray]) -> Look:
         CameraLook(one, one[list(spread)], np.ones((len(spread), 3)), np.repeat(one[0][:, :, None], 3, 2))
         for one in films
     )
-    return Look(_Capture(make_rig(len(films), (128, 96))), frames, spread, cameras, {})  # type: ignore[arg-type]
+    return PictureSurvey(_Capture(make_rig(len(films), (128, 96))), frames, spread, cameras, {})  # type: ignore[arg-type]
 
 
 def test_films_in_which_all_goes_well_raise_no_alarm() -> None:

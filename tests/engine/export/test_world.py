@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from engine.export.splats import Splats
-from engine.export.world import AXES, World, rotation_between, world
+from engine.export.world import AXES, FileWorld, rotation_between, world
 from tests.engine.export.scenes import angles_deg, chance_splats
 
 
@@ -41,7 +41,7 @@ def test_nothing_asked_for_changes_nothing():
     placement = world(np.array([0.1, -0.9, 0.0]))
     assert placement.placed(splats).means is splats.means
     assert placement.text == "axes as in the capture, scale as in the capture"
-    assert World().placed(splats).quats is splats.quats
+    assert FileWorld().placed(splats).quats is splats.quats
 
 
 def test_rub_reverses_y_and_z():
@@ -61,7 +61,7 @@ def test_gaussians_turn_with_the_world():
     a, b = (Rotation.from_quat(random.standard_normal(4)) for _ in range(2))
     (x, y, z, w), expected = b.as_quat(), (a * b).as_quat()[[3, 0, 1, 2]]
     splats = Splats.from_arrays(np.zeros(3), np.array([[w, x, y, z]]), np.ones((1, 3)), np.ones(1), np.zeros((1, 3)))
-    turned = World(rotation=a.as_matrix()).placed(splats).quats
+    turned = FileWorld(rotation=a.as_matrix()).placed(splats).quats
     assert turned.dtype == np.float32
     np.testing.assert_allclose(turned[0] * np.sign(turned[0] @ expected), expected, atol=1e-6)
 

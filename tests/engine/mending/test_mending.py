@@ -20,7 +20,7 @@ from engine.errors import ProjectError
 from engine.gate.regions import sphere_region
 from engine.mending.figures import MAX_PSNR_LOSS_DB
 from engine.mending.measuring import Threads
-from engine.mending.mend import Mended, Mending
+from engine.mending.mend import Mended, StretchMending
 from engine.mending.stretch import boundary_stretch, frames_stretch
 from engine.mending.targets import FadedPictures, Looks
 from engine.metrics.clips.trained_clip import TrainedClip
@@ -45,12 +45,12 @@ class Case:
         settings: dict[str, Any] = config.difference()
         return self.tiny.training(clip_index, **settings)
 
-    def mending(self, after: int = 1) -> Mending:
+    def mending(self, after: int = 1) -> StretchMending:
         return self.of(boundary_stretch(self.tiny.clips, after))
 
-    def of(self, stretch: Any) -> Mending:
+    def of(self, stretch: Any) -> StretchMending:
         tiny = self.tiny
-        return Mending(
+        return StretchMending(
             tiny.capture,
             stretch,
             tiny.clips,

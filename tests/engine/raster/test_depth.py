@@ -9,7 +9,7 @@ import torch
 from engine.backends.cpu.raster import rasterize as cpu_backend
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.synthetic.gaussian_scenes import Scene, gaussians_of, layered_scene, simple_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, gaussians_of, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradients
 
 BACKENDS = ("cpu", "reference")
@@ -49,7 +49,7 @@ def test_nothing_is_at_no_depth(backend):
     assert all(grad.isfinite().all() for grad in gradients(leaves))
 
 
-def outcome(scene: Scene, backend: str, dtype: torch.dtype) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
+def outcome(scene: GaussianScene, backend: str, dtype: torch.dtype) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
     """Image, depth and expected depth, and the gradients under a loss of all three."""
     leaves = Gaussians(*(tensor.to(dtype).clone().requires_grad_() for tensor in scene.gaussians.tensors()))
     rendering = rasterize(leaves, *scene.arguments, backend=backend_called(backend), want_depth=True)

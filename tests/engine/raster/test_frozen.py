@@ -10,13 +10,13 @@ import torch
 from engine.backends.cpu.raster import blend_backward
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.synthetic.gaussian_scenes import Scene, layered_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")
 
 
-def outcome(scene: Scene, is_frozen: torch.Tensor | None, backend: str) -> tuple[Rendering, list[torch.Tensor]]:
+def outcome(scene: GaussianScene, is_frozen: torch.Tensor | None, backend: str) -> tuple[Rendering, list[torch.Tensor]]:
     """The rendering and the gradients of the five parameters and the 2D centres."""
     tensors = (tensor.float().requires_grad_() for tensor in scene.gaussians.tensors())
     gaussians = Gaussians(*tensors, is_frozen=is_frozen)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, rasterize
-from engine.synthetic.gaussian_scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, camera, gaussians_of, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradients
 
 pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole
@@ -27,18 +27,18 @@ def _spread(n_rows: int, near: float = 2.0, far: float = 6.0, seed: int = 0) -> 
     return np.stack([rng.uniform(-1, 1, n_rows), rng.uniform(-0.8, 0.8, n_rows), rng.uniform(near, far, n_rows)], 1)
 
 
-def _needles() -> Scene:
+def _needles() -> GaussianScene:
     long = 10 ** np.random.default_rng(2).uniform(0, 1.2, 50)
     return simple_scene(gaussians_of(_spread(50), np.stack([long, np.full(50, 1e-3), np.full(50, 1e-3)], 1)))
 
 
-def _thin_needles() -> Scene:
+def _thin_needles() -> GaussianScene:
     """One axis ten thousand times the others, up to the length of the image."""
     long = 10 ** np.random.default_rng(5).uniform(-0.5, 0.5, 60)
     return simple_scene(gaussians_of(_spread(60), np.stack([long, long * 1e-4, long * 1e-4], 1)))
 
 
-def _at_the_plane() -> Scene:
+def _at_the_plane() -> GaussianScene:
     """Depths at the near plane: two neighbours of it in float32, itself, half and minus it, and the camera centre."""
     near = np.float32(0.5)
     depths = np.array([near, np.nextafter(near, np.float32(1)), np.nextafter(near, np.float32(0)), near / 2, -near, 0])
@@ -46,7 +46,7 @@ def _at_the_plane() -> Scene:
     return simple_scene(gaussians_of(means, np.full((6, 3), 0.05)), near_plane=0.5)
 
 
-def _odd_and_opaque() -> Scene:
+def _odd_and_opaque() -> GaussianScene:
     """Opacities of exactly one and the two sides of 1/255, in an image whose sides are multiples of nothing."""
     edge = np.float32(1 / 255)
     opacities = np.tile([1.0, np.nextafter(edge, np.float32(0)), np.nextafter(edge, np.float32(1))], 20)
@@ -54,59 +54,59 @@ def _odd_and_opaque() -> Scene:
     return simple_scene(scene, width=67, height=43, Ks=camera(67, 43))
 
 
-def _huge() -> Scene:
+def _huge() -> GaussianScene:
     opacities = np.random.default_rng(2).uniform(0.01, 0.3, 20)
     return simple_scene(gaussians_of(_spread(20), np.full((20, 3), 50.0), opacities=opacities))
 
 
-def _near_plane() -> Scene:
+def _near_plane() -> GaussianScene:
     means = np.concatenate([_spread(20), _spread(20, -5, -0.1), _spread(19, -0.02, 0.05), np.zeros((1, 3))])
     return simple_scene(gaussians_of(means, np.full((60, 3), 0.05)))
 
 
-def _opaque_stack() -> Scene:
+def _opaque_stack() -> GaussianScene:
     means = np.stack([np.zeros(200), np.zeros(200), np.linspace(2, 6, 200)], 1)
     return simple_scene(gaussians_of(means, np.full((200, 3), 0.5), opacities=np.full(200, 0.9995)))
 
 
-def _opacity_edges() -> Scene:
+def _opacity_edges() -> GaussianScene:
     opacities = np.repeat([0.0, 1 / 256, 1.0, 0.5], 10)
     return simple_scene(gaussians_of(_spread(40), np.full((40, 3), 0.1), opacities=opacities))
 
 
-def _sub_pixel() -> Scene:
+def _sub_pixel() -> GaussianScene:
     return simple_scene(gaussians_of(_spread(500), np.full((500, 3), 1e-6)))
 
 
-def _one_pixel() -> Scene:
+def _one_pixel() -> GaussianScene:
     means = np.stack([np.full(10_000, 0.01), np.full(10_000, 0.01), np.linspace(2, 2.5, 10_000)], 1)
     opacities = np.full(10_000, 0.01)
     scene = gaussians_of(means, np.full((10_000, 3), 1e-4), opacities=opacities)
     return simple_scene(scene, width=24, height=16)
 
 
-def _flat() -> Scene:
+def _flat() -> GaussianScene:
     scales = np.stack([np.full(50, 0.1), np.zeros(50), np.full(50, 0.1)], 1)
     scales[40:] = 0.0
     return simple_scene(gaussians_of(_spread(50), scales))
 
 
-def _off_screen() -> Scene:
+def _off_screen() -> GaussianScene:
     means = np.stack([np.full(10, 8.0), np.zeros(10), np.full(10, 2.0)], 1)
     return simple_scene(gaussians_of(means, np.full((10, 3), 3.0)))
 
 
-def _center_outside() -> Scene:
+def _center_outside() -> GaussianScene:
     scene = gaussians_of(_spread(60) + np.array([1.2, 1.0, 0.0]), np.full((60, 3), 0.1))
     return simple_scene(scene, Ks=camera(160, 120, center=(-90.0, -60.0)))
 
 
-def _scaled(factor: float) -> Scene:
+def _scaled(factor: float) -> GaussianScene:
     scene = gaussians_of(_spread(60) * factor, np.full((60, 3), 0.1) * factor * [1.0, 0.5, 0.2])
     return simple_scene(scene, near_plane=0.01 * factor)
 
 
-def _long_quats() -> Scene:
+def _long_quats() -> GaussianScene:
     quats = np.random.default_rng(4).normal(size=(40, 4)) * np.repeat([1e-6, 1e-3, 1e3, 1e6], 10)[:, None]
     return simple_scene(gaussians_of(_spread(40), np.full((40, 3), 0.1) * [1.0, 0.5, 0.2], quats=quats))
 
@@ -141,7 +141,7 @@ CASES = {
 
 
 def _outcome(
-    scene: Scene,
+    scene: GaussianScene,
     gaussians: Gaussians,
     backend: str,
     *,
@@ -271,7 +271,7 @@ def test_equal_depths_keep_their_order(backend):
     assert center[0] > 0.9 > center[1] > center[2], "the first of equals is in front"
 
 
-def _image(scene: Scene, gaussians: Gaussians) -> tuple[torch.Tensor, torch.Tensor]:
+def _image(scene: GaussianScene, gaussians: Gaussians) -> tuple[torch.Tensor, torch.Tensor]:
     rendering = rasterize(gaussians, *scene.arguments, backend=backend_called("cpu"))
     return rendering.image, rendering.alpha
 

@@ -13,7 +13,7 @@ import torch
 from engine.backends.cpu.raster import rasterize as cpu_backend
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.synthetic.gaussian_scenes import Scene, camera, layered_scene, simple_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, camera, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")
@@ -27,7 +27,7 @@ def leaves(gaussians: Gaussians, dtype: torch.dtype) -> Gaussians:
     return Gaussians(*(tensor.detach().to(dtype).clone().requires_grad_() for tensor in gaussians.tensors()))
 
 
-def render(scene: Scene, gaussians: Gaussians, backend: str, **options: Any) -> Rendering:
+def render(scene: GaussianScene, gaussians: Gaussians, backend: str, **options: Any) -> Rendering:
     background = scene.background.to(gaussians.means)
     return rasterize(
         gaussians,
@@ -55,7 +55,7 @@ def relative(actual: torch.Tensor, expected: torch.Tensor) -> float:
 
 
 @pytest.fixture(scope="module")
-def truth() -> tuple[Scene, Gaussians, Rendering]:
+def truth() -> tuple[GaussianScene, Gaussians, Rendering]:
     """2000 Gaussians at 160x120 with float64 gradients."""
     scene = layered_scene(2000, 160, 120, 3.5)
     gaussians = leaves(scene.gaussians, torch.float64)
@@ -196,7 +196,7 @@ def test_interleaved_forwards_keep_their_own_state():
 def test_calls_from_two_threads_do_not_disturb_each_other():
     scenes = [layered_scene(n, 64, 48, 3.0, seed=n) for n in (200, 250)]
 
-    def outcome(scene: Scene) -> list[torch.Tensor]:
+    def outcome(scene: GaussianScene) -> list[torch.Tensor]:
         gaussians = leaves(scene.gaussians, torch.float32)
         rendering = render(scene, gaussians, "cpu")
         loss_of(rendering).backward()

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, TileBoxes, rasterize, tile_boxes
 from engine.raster.pinhole_view import n_tiles
-from engine.synthetic.gaussian_scenes import Scene, layered_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 
 BACKENDS = ("cpu", "reference")
 
 
-def boxes_of(scene: Scene, gaussians: Gaussians, backend: str) -> TileBoxes:
+def boxes_of(scene: GaussianScene, gaussians: Gaussians, backend: str) -> TileBoxes:
     viewmats, Ks, width, height = scene.arguments
     return tile_boxes(
         gaussians, viewmats[0], Ks[0], width, height, near_plane=scene.near_plane, backend=backend_called(backend)

@@ -12,20 +12,20 @@ from hypothesis import strategies as st
 
 from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, Rendering, rasterize
-from engine.synthetic.gaussian_scenes import Scene, layered_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")
 
 
-def pixels_of(mask: torch.Tensor, scene: Scene) -> torch.Tensor:
+def pixels_of(mask: torch.Tensor, scene: GaussianScene) -> torch.Tensor:
     """[rows, columns] tiles as [H, W] pixels."""
     pixels = mask.repeat_interleave(TILE_PX, 0).repeat_interleave(TILE_PX, 1)
     return pixels[: scene.height, : scene.width]
 
 
 def outcome(
-    scene: Scene, backend: str, weights: torch.Tensor, dtype: torch.dtype = torch.float32, **options: Any
+    scene: GaussianScene, backend: str, weights: torch.Tensor, dtype: torch.dtype = torch.float32, **options: Any
 ) -> tuple[Rendering, list[torch.Tensor]]:
     """The rendering, and the gradients of five parameters, 2D centres and background under weights [C, H, W, 4]."""
     gaussians = Gaussians(
@@ -46,7 +46,7 @@ def outcome(
     return rendering, [*gradients(gaussians), gradient(rendering.means2d), gradient(background)]
 
 
-def weights_of(scene: Scene) -> torch.Tensor:
+def weights_of(scene: GaussianScene) -> torch.Tensor:
     return torch.randn(len(scene.Ks), scene.height, scene.width, 4, generator=torch.Generator().manual_seed(1))
 
 

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.playback.modes.coverage import Coverage
+from app.playback.modes.coverage import CoveredSpace
 from app.playback.modes.trails import Trails, trail_lines
 from tests.golden_images import assert_matches_golden
 from tests.ui.fake_session import FakeSession
@@ -36,12 +36,12 @@ class Explained(FakeSession):
         radii = np.linspace(0.1, 0.25, 7)
         distances = (np.linalg.norm(points[:, None] - centers, axis=2) - radii).min(axis=1)
         arrays = (values.astype(np.float32) for values in (centers, radii, points, 5 * distances))
-        self._coverage = Coverage(*arrays, key="coverage")
+        self._coverage = CoveredSpace(*arrays, key="coverage")
         angles = np.linspace(0, 1.2, 8)[:, None] + np.linspace(0, 2 * np.pi, 9)[None, :-1]
         paths = np.stack([np.cos(angles), np.linspace(-0.5, 0.5, 8) + 0 * angles, np.sin(angles)], -1)
         self._trails = Trails(*trail_lines(paths.astype(np.float32), np.ones(8)), key="trails")
 
-    def shown_coverage(self) -> Coverage:
+    def shown_coverage(self) -> CoveredSpace:
         return self._coverage
 
     def shown_trails(self) -> Trails:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.pixels import read_color
-from ui.gl.image import ImageTexture, Rect, fit_rect
+from ui.gl.image import ImageTexture, PixelRect, fit_rect
 from ui.gl.targets import Target
 
 sizes = st.tuples(st.integers(1, 4000), st.integers(1, 4000))
@@ -82,7 +82,7 @@ class TestImageTexture:
 def test_picture_fills_its_rectangle_and_nothing_else(ctx: moderngl.Context, keep: Keep) -> None:
     target, image = keep(Target(ctx, (40, 10), precision="f4")), keep(ImageTexture(ctx))
     image.set(np.full((6, 4, 3), 51, dtype=np.uint8))
-    target.draw_image(image, Rect(10, 0, 30, 10))
+    target.draw_image(image, PixelRect(10, 0, 30, 10))
     row = read_color(target)[5]
     np.testing.assert_allclose(row[10:30], np.tile([0.2, 0.2, 0.2, 1.0], (20, 1)), atol=1e-6)
     assert np.flatnonzero(row[:, 3] == 0).tolist() == [*range(10), *range(30, 40)]

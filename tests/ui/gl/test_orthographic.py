@@ -11,7 +11,7 @@ import torch
 
 from app.playback.frame_decoder import ShownFrame
 from app.playback.modes.arrays import BACKGROUND, AnchorArrays, GaussianArrays
-from app.playback.render import Look, RenderRequest, render
+from app.playback.render import RenderRequest, RenderView, render
 from app.playback.views.orbit_view import OrbitView
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, rasterize
@@ -72,7 +72,7 @@ def view() -> OrbitView:
 def test_the_rasterizer_s_picture_is_that_of_a_true_orthographic_camera(view: OrbitView) -> None:
     arrays = made_up(view)
     anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="none")
-    look = Look.of(view, WIDTH, HEIGHT)
+    look = RenderView.of(view, WIDTH, HEIGHT)
     image = render(
         RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(arrays, anchors)), backend_called("cpu")
     ).image

@@ -8,7 +8,7 @@ import pytest
 
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.pixels import read_color, read_resolved
-from ui.gl.image import ImageTexture, Rect
+from ui.gl.image import ImageTexture, PixelRect
 from ui.gl.targets import Precision, Target
 
 pytestmark = pytest.mark.gl
@@ -80,7 +80,7 @@ def test_picture_fills_only_its_rectangle(ctx: moderngl.Context, keep: Keep) -> 
     image = keep(ImageTexture(ctx))
     image.set(np.full((2, 2, 3), 255, dtype=np.uint8))
     target = keep(Target(ctx, (20, 16)))
-    target.draw_image(image, Rect(4, 2, 10, 12))
+    target.draw_image(image, PixelRect(4, 2, 10, 12))
     expected = np.zeros((16, 20))
     expected[2:12, 4:10] = 1
     np.testing.assert_array_equal(read_color(target)[..., 3], expected)

@@ -17,7 +17,7 @@ from app.status import ClipStatus
 from tests.ui.pilot import CTRL, Pilot
 from ui.panels.guard import logger
 from ui.panels.state import PANELS, TIMELINE, VIEWPORT
-from ui.viewport.scene import Scene, SceneView
+from ui.viewport.scene import SceneView, ViewportScene
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
@@ -197,15 +197,15 @@ def test_a_mode_that_fails_in_one_view_leaves_the_others(
     mode: str,
 ) -> None:
     _look_through_a_camera_in_four_views(pilot)
-    plain, composed = Scene.compose, []
+    plain, composed = ViewportScene.compose, []
 
-    def compose(scene: Scene, session: Any, view: SceneView, *rest: Any) -> Any:
+    def compose(scene: ViewportScene, session: Any, view: SceneView, *rest: Any) -> Any:
         if session.overlays.mode == mode and session.views.current_index == 1:
             raise RuntimeError("broken on purpose")
         composed.append(session.views.current_index)
         return plain(scene, session, view, *rest)
 
-    monkeypatch.setattr(Scene, "compose", compose)
+    monkeypatch.setattr(ViewportScene, "compose", compose)
     for look in pilot.session.views.shown:
         look.overlays.mode, look.overlays.compare = mode, "wipe"
     pilot.draw(3)
@@ -244,7 +244,7 @@ def test_a_fault_between_two_frames_ends_neither_the_loop_nor_what_it_draws(
     def fail(*_: object) -> bool:
         raise RuntimeError("broken on purpose")
 
-    monkeypatch.setattr(Scene, "has_news", fail)
+    monkeypatch.setattr(ViewportScene, "has_news", fail)
     pilot.draw(4)
     assert told(pilot) == ["An error occurred between two frames"]
     assert "viewport.canvas" in pilot.rects

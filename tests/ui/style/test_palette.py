@@ -11,7 +11,7 @@ import pytest
 
 from app.playback.modes.arrays import BACKGROUND
 from ui.style import theme
-from ui.style.palette import DARK, LIGHT, VOID, Palette, contrast
+from ui.style.palette import DARK, LIGHT, VOID, ThemeColors, contrast
 
 UI = Path(__file__).resolve().parents[3] / "ui"
 READABLE = 4.5
@@ -27,7 +27,7 @@ SIMULATED = {
 
 
 @pytest.mark.parametrize("palette", [DARK, LIGHT], ids=lambda palette: palette.name)
-def test_words_stand_out_from_what_is_behind_them(palette: Palette) -> None:
+def test_words_stand_out_from_what_is_behind_them(palette: ThemeColors) -> None:
     behind = {name: getattr(palette, name) for name in SURFACES}
     for word in ("text", "text_dim", *HUES):
         low = {name: contrast(getattr(palette, word), color) for name, color in behind.items()}
@@ -47,14 +47,14 @@ def test_words_over_a_picture_stand_out_from_their_plate() -> None:
 
 
 @pytest.mark.parametrize("palette", [DARK, LIGHT], ids=lambda palette: palette.name)
-def test_states_of_clips_can_be_read_on_the_panel(palette: Palette) -> None:
+def test_states_of_clips_can_be_read_on_the_panel(palette: ThemeColors) -> None:
     for state, color in palette.clip_colors.items():
         assert contrast(color, palette.panel) >= READABLE, state
 
 
 @pytest.mark.parametrize("eye", SIMULATED)
 @pytest.mark.parametrize("palette", [DARK, LIGHT], ids=lambda palette: palette.name)
-def test_what_is_done_what_runs_and_what_has_failed_differ_for_every_eye(palette: Palette, eye: str) -> None:
+def test_what_is_done_what_runs_and_what_has_failed_differ_for_every_eye(palette: ThemeColors, eye: str) -> None:
     matrix = np.array(SIMULATED[eye])
     seen = {name: _lab(matrix @ _linear(getattr(palette, name))) for name in ("sky", "green", "vermillion")}
     for first, second in combinations(seen, 2):

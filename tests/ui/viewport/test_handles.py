@@ -13,7 +13,7 @@ from engine.editing.actions import Transform
 from engine.editing.edit import Box, Sphere
 from ui.viewport.editing.handles import (
     Handle,
-    Lens,
+    HandleView,
     Thing,
     dragged,
     handle_under,
@@ -31,7 +31,7 @@ MOVEMENT = Transform((0.3, 0.0, 0.0), TURN, 1.5, (0.0, 0.1, 0.0))
 THINGS: tuple[Thing, ...] = (BOX, SPHERE, MOVEMENT)
 
 
-def lens(yaw: float = 0.4, pitch: float = 0.3, distance: float = 4.0) -> Lens:
+def lens(yaw: float = 0.4, pitch: float = 0.3, distance: float = 4.0) -> HandleView:
     """Looks at the origin; 800 x 600 px."""
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     about_y = np.array([[cy, 0.0, -sy], [0.0, 1.0, 0.0], [sy, 0.0, cy]])
@@ -39,10 +39,10 @@ def lens(yaw: float = 0.4, pitch: float = 0.3, distance: float = 4.0) -> Lens:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = about_x @ about_y, (0.0, 0.0, distance)
     K = np.array([[700.0, 0.0, 400.0], [0.0, 700.0, 300.0], [0.0, 0.0, 1.0]])
-    return Lens(matrix, K, 0.01)
+    return HandleView(matrix, K, 0.01)
 
 
-def at(view: Lens, place: np.ndarray) -> tuple[float, float]:
+def at(view: HandleView, place: np.ndarray) -> tuple[float, float]:
     """Where a place is seen, px."""
     x, y = view.pixels(np.asarray(place, np.float64)[None])[0][0]
     return float(x), float(y)
@@ -151,7 +151,7 @@ def test_a_ring_turns_about_its_axis_as_far_as_the_pointer_goes(axis: int, yaw: 
     assert angle == pytest.approx(wanted, abs=1e-6) if is_open else angle > 0.0
 
 
-def view_eye(view: Lens) -> np.ndarray:
+def view_eye(view: HandleView) -> np.ndarray:
     return -view.world_to_camera[:3, :3].T @ view.world_to_camera[:3, 3]
 
 

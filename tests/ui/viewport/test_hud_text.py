@@ -21,7 +21,7 @@ from ui.viewport.hud_text import (
     hud_text,
     loading_text,
     pane_text,
-    rate_text,
+    playing_text,
 )
 from ui.viewport.picture_rate import ShownRate
 
@@ -146,13 +146,13 @@ def test_while_playing_the_label_names_both_frames_and_the_rate_is_told():
 
 
 def test_rates():
-    assert rate_text(ShownRate(None)) == "– of 30 fps"
-    assert rate_text(ShownRate(29.5, wanted_per_s=29.97)) == "29.5 of 29.97 fps"
-    assert rate_text(ShownRate(4.0, is_every_frame=True)) == "4.0 of 30 fps, every frame"
+    assert playing_text(ShownRate(None)) == "– of 30 fps"
+    assert playing_text(ShownRate(29.5, wanted_per_s=29.97)) == "29.5 of 29.97 fps"
+    assert playing_text(ShownRate(4.0, is_every_frame=True)) == "4.0 of 30 fps, every frame"
     assert loading_text(5, 24) == "loading 5 of 24 frames"
-    assert rate_text(ShownRate(28.0, has_skipped=True)) == "28.0 of 30 fps, some frames skipped"
-    assert rate_text(ShownRate(5.0, has_skipped=True, every_nth=6)) == "5.0 of 30 fps, every 6th frame"
-    assert rate_text(ShownRate(10.0, has_skipped=True, every_nth=3)) == "10.0 of 30 fps, every 3rd frame"
+    assert playing_text(ShownRate(28.0, has_skipped=True)) == "28.0 of 30 fps, some frames skipped"
+    assert playing_text(ShownRate(5.0, has_skipped=True, every_nth=6)) == "5.0 of 30 fps, every 6th frame"
+    assert playing_text(ShownRate(10.0, has_skipped=True, every_nth=3)) == "10.0 of 30 fps, every 3rd frame"
 
 
 def test_compared_pictures_of_different_frames_never_share_a_label():

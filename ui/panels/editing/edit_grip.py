@@ -22,7 +22,7 @@ from ui.panels.editing.edit_subject import Subject, subject_of
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.viewport.editing.edit_tool import N_ASKED, EditTool
-from ui.viewport.editing.handles import Lens, dragged, handle_under, snap_step
+from ui.viewport.editing.handles import HandleView, dragged, handle_under, snap_step
 from ui.viewport.scene import SceneView
 
 DRAG = "edit"
@@ -81,7 +81,7 @@ class EditGrip:
         ui: UiState,
         pointer: Pointer,
         subject: Subject | None,
-        lens: Lens,
+        lens: HandleView,
         at: tuple[float, float],
     ) -> None:
         tool, io = ui.editing, imgui.get_io()
@@ -166,9 +166,9 @@ def select_drawn(dispatch: Dispatch, ui: UiState) -> None:
             dispatch(InvertSelection())
 
 
-def lens_of(view: SceneView, density: float) -> Lens:
+def lens_of(view: SceneView, density: float) -> HandleView:
     """A view of the window as handles know it."""
-    return Lens(view.world_to_camera, view.K, max(view.near, 1e-6), density)
+    return HandleView(view.world_to_camera, view.K, max(view.near, 1e-6), density)
 
 
 def _pointer() -> tuple[float, float]:

@@ -19,7 +19,7 @@ from ui.panels.state import Rect, UiState
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
 from ui.viewport.editing.edit_tool import N_ASKED, EditTool
-from ui.viewport.editing.handles import Handle, Lens, handles_of, middle_of, place_of, ring_of
+from ui.viewport.editing.handles import Handle, HandleView, handles_of, middle_of, place_of, ring_of
 from ui.viewport.scene import SceneView
 
 HALF, LARGE_HALF = 5.0, 7.0
@@ -83,7 +83,7 @@ def _draw_ring(
     ui: UiState,
     ring: np.ndarray,
     handle: Handle,
-    lens: Lens,
+    lens: HandleView,
     pane: Rect,
     *,
     is_pointed: bool,
@@ -133,7 +133,7 @@ def _line(
     draw.add_line(ImVec2(*start), ImVec2(*stop), theme.u32(color), width)
 
 
-def _on_screen(place: np.ndarray, lens: Lens, pane: Rect) -> tuple[float, float] | None:
+def _on_screen(place: np.ndarray, lens: HandleView, pane: Rect) -> tuple[float, float] | None:
     """Where a place is seen, window coordinates; None behind the eye."""
     pixels, is_seen = lens.pixels(np.asarray(place)[None])
     if not is_seen[0]:

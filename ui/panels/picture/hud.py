@@ -27,7 +27,7 @@ from ui.style.theme import ON_PICTURE, Icon
 from ui.viewport.hud_text import PARTS, RENDERED, HudText, count_text, hud_text
 from ui.viewport.picture_rate import PictureRate
 from ui.viewport.region_tool import REGION_WORDS
-from ui.viewport.scene import Scene
+from ui.viewport.scene import ViewportScene
 
 BUSY_REDRAW_S = 0.25
 """The mark of something on its way turns this often."""
@@ -70,7 +70,7 @@ class Hud:
         session: SessionView,
         ui: UiState,
         area: Rect,
-        scene: Scene,
+        scene: ViewportScene,
         *,
         value: float | None = None,
         legend_at: tuple[float, float],
@@ -93,7 +93,7 @@ class Hud:
         if not is_tool_used or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
             self._draw_legend(session, scene, free, *legend_at)
 
-    def _text(self, session: SessionView, scene: Scene) -> HudText | None:
+    def _text(self, session: SessionView, scene: ViewportScene) -> HudText | None:
         wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
         shown_frame = shown.source.frame_index
         if wanted is None:
@@ -165,7 +165,7 @@ class Hud:
         return free
 
     def _draw_color_bars(
-        self, session: SessionView, ui: UiState, scene: Scene, free: Rect, value: float | None
+        self, session: SessionView, ui: UiState, scene: ViewportScene, free: Rect, value: float | None
     ) -> None:
         """What the colours of the picture on screen mean, at its lower right above the plates, and at its lower left
         those of the picture that it is compared with."""
@@ -192,7 +192,7 @@ class Hud:
             draw_color_bar(imgui.get_window_draw_list(), plate, map_name, low, high, unit, pointed)
             ui.mark_rect(name, plate)
 
-    def _draw_legend(self, session: SessionView, scene: Scene, free: Rect, right: float, y: float) -> None:
+    def _draw_legend(self, session: SessionView, scene: ViewportScene, free: Rect, right: float, y: float) -> None:
         """From its upper right corner down, as far as there is room above the plates."""
         draw = imgui.get_window_draw_list()
         for shape, color, words in legend_rows(session, scene):
@@ -229,7 +229,7 @@ def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: Color) -> None:
     draw.path_stroke(theme.u32(color), 2.0)
 
 
-def legend_rows(session: SessionView, scene: Scene) -> list[tuple[str, Color, str]]:
+def legend_rows(session: SessionView, scene: ViewportScene) -> list[tuple[str, Color, str]]:
     """Shape, colour and words of what is marked."""
     counts = scene.counts
     rows = [("disc", (*hue, 1.0), words) for hue, words in MODES[scene.shown.source.shown_as.mode].legend]

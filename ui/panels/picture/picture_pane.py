@@ -34,7 +34,7 @@ from ui.style import theme
 from ui.style.theme import ON_PICTURE
 from ui.viewport.hud_text import RENDERED, captured_words, pane_text
 from ui.viewport.layers.region_layer import ShownRegions
-from ui.viewport.scene import Scene, SceneView
+from ui.viewport.scene import SceneView, ViewportScene
 
 TOOLTIP_AWAY = 22.0
 
@@ -42,7 +42,7 @@ TOOLTIP_AWAY = 22.0
 class PicturePane:
     """Owns the GL objects of one view and the drag in progress there."""
 
-    def __init__(self, scene: Scene, heat: HeatOverlay) -> None:
+    def __init__(self, scene: ViewportScene, heat: HeatOverlay) -> None:
         self.scene, self.heat = scene, heat
         self.pointer = Pointer()
         self.keys = KeyGrip()

@@ -18,7 +18,7 @@ from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.welcome.recent_rows import RecentRows
 from ui.panels.welcome.welcome import draw_welcome
 from ui.style import theme
-from ui.viewport.scene import Scene
+from ui.viewport.scene import ViewportScene
 
 SMALLEST_PICTURE = 32.0
 """With less room than this, there is nothing to draw."""
@@ -57,7 +57,7 @@ class ViewportPanel:
         return self._panes
 
     @property
-    def scene(self) -> Scene:
+    def scene(self) -> ViewportScene:
         """What the active view's picture is drawn with."""
         return self.active.scene
 

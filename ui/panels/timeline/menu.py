@@ -13,14 +13,14 @@ from ui.panels.editing.labels import draw_label_field
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title, state_words
 from ui.panels.timeline.rows.seam_lane import seam_at
-from ui.panels.timeline.rows.stage import Stage
+from ui.panels.timeline.rows.stage import TimelineStage
 from ui.panels.training.clip_training_menu import draw_clip_training
 from ui.style.theme import Icon
 
 POPUP = "clip menu"
 
 
-def draw_clip_menu(stage: Stage, session: SessionView, dispatch: Dispatch) -> None:
+def draw_clip_menu(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> None:
     """Opens after a click with the right button on the item drawn last, the track; draws the menu while it is open."""
     ui = stage.ui
     imgui.open_popup_on_item_click(POPUP, imgui.PopupFlags_.mouse_button_right)

@@ -30,7 +30,7 @@ from ui.panels.timeline.rows.rows import (
 from ui.panels.timeline.rows.ruler import draw_hover, draw_played, draw_playhead, draw_ruler
 from ui.panels.timeline.rows.seam_lane import draw_seam_lane
 from ui.panels.timeline.rows.small_lanes import draw_cache_lane, draw_marker_lane
-from ui.panels.timeline.rows.stage import Stage
+from ui.panels.timeline.rows.stage import TimelineStage
 from ui.panels.timeline.time_range import TimeScale
 from ui.panels.timeline.transport import draw_transport
 from ui.style import theme
@@ -80,13 +80,13 @@ def _stage(
     track: Rect,
     rows: dict[str, Rect],
     pointer: tuple[float, float] | None = None,
-) -> Stage:
+) -> TimelineStage:
     n_frames = session.timeline.n_frames
     scale = TimeScale(track.x0, track.x1, ui.timeline.range_of(n_frames), n_frames)
-    return Stage(imgui.get_window_draw_list(), scale, track, rows, pointer, ui)
+    return TimelineStage(imgui.get_window_draw_list(), scale, track, rows, pointer, ui)
 
 
-def _draw_track(stage: Stage, session: SessionView) -> None:
+def _draw_track(stage: TimelineStage, session: SessionView) -> None:
     draw, track, timeline = stage.draw, stage.track, session.timeline
     draw.add_rect_filled(track.low, track.high, theme.u32(theme.BACKDROP), 4)
     draw.push_clip_rect(track.low, track.high, True)

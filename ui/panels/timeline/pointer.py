@@ -14,21 +14,21 @@ from ui.panels.timeline.marker_box import edit_marker
 from ui.panels.timeline.rows.path_lane import DRAG_FROM, handle_keys_of_path
 from ui.panels.timeline.rows.seam_lane import seam_at
 from ui.panels.timeline.rows.small_lanes import marker_at
-from ui.panels.timeline.rows.stage import Stage
+from ui.panels.timeline.rows.stage import TimelineStage
 
 LEFT, MIDDLE = 0, 2
 EDGE_PAN_SHARE = 0.02
 """Share of what is shown by which the view moves on per drawn frame, while a scrub is held beyond its edge."""
 
 
-def handle_track(stage: Stage, session: SessionView, dispatch: Dispatch) -> None:
+def handle_track(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> None:
     """For the item drawn last, the invisible button of the track. Changes what is shown from the next frame on."""
     _handle_wheel(stage, session)
     _handle_middle_drag(stage, session)
     _handle_left(stage, session, dispatch)
 
 
-def _handle_wheel(stage: Stage, session: SessionView) -> None:
+def _handle_wheel(stage: TimelineStage, session: SessionView) -> None:
     """Ctrl and the wheel zoom at the pointer, as pinching does; the wheel alone moves through time, either way."""
     io, view, n_frames = imgui.get_io(), stage.ui.timeline, session.timeline.n_frames
     if stage.pointer is None or not (io.mouse_wheel or io.mouse_wheel_h):
@@ -40,7 +40,7 @@ def _handle_wheel(stage: Stage, session: SessionView) -> None:
     stage.ui.redraw_within(0.0)
 
 
-def _handle_middle_drag(stage: Stage, session: SessionView) -> None:
+def _handle_middle_drag(stage: TimelineStage, session: SessionView) -> None:
     view = stage.ui.timeline
     if stage.pointer is not None and imgui.is_mouse_clicked(MIDDLE):
         view.is_panning = True
@@ -49,7 +49,7 @@ def _handle_middle_drag(stage: Stage, session: SessionView) -> None:
         view.is_panning = imgui.is_mouse_down(MIDDLE)
 
 
-def _handle_left(stage: Stage, session: SessionView, dispatch: Dispatch) -> None:
+def _handle_left(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> None:
     view, timeline = stage.ui.timeline, session.timeline
     if handle_keys_of_path(stage, session, dispatch) or _drag_marker(stage, session, dispatch):
         return
@@ -73,7 +73,7 @@ def _handle_left(stage: Stage, session: SessionView, dispatch: Dispatch) -> None
             view.show_all()
 
 
-def _drag_marker(stage: Stage, session: SessionView, dispatch: Dispatch) -> bool:
+def _drag_marker(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> bool:
     """Whether the pointer moves a marker, and does nothing else. A press alone goes to its frame, as any other does."""
     view, timeline, x = stage.ui.timeline, session.timeline, imgui.get_io().mouse_pos.x
     if imgui.is_item_activated():
@@ -97,7 +97,7 @@ def _drag_marker(stage: Stage, session: SessionView, dispatch: Dispatch) -> bool
     return True
 
 
-def _scrub(stage: Stage, session: SessionView, dispatch: Dispatch) -> None:
+def _scrub(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> None:
     x, scale, timeline = imgui.get_io().mouse_pos.x, stage.scale, session.timeline
     marker = marker_at(stage, timeline) if imgui.is_item_activated() else None
     frame_index = scale.frame_at(x) if marker is None else marker.frame_index

@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.session.session_view import SessionView
 from ui.panels.pieces.widgets import elided
 from ui.panels.state import Dispatch, UiState
-from ui.shell.finding.palette_entries import Entry, Found, entries, found
+from ui.shell.finding.palette_entries import Found, PaletteEntry, entries, found
 from ui.style import theme
 from ui.style.theme import Icon
 
@@ -26,19 +26,19 @@ _FLAGS = (
 )
 
 
-class Palette:
+class ActionPalette:
     """Owns what is typed and which row is chosen, as long as it is open."""
 
     def __init__(self) -> None:
         self._typed = ""
         self._chosen = 0
-        self._offered: list[Entry] = []
+        self._offered: list[PaletteEntry] = []
         self._shown: list[Found] = []
         self._is_new = False
         self._is_scroll_wanted = False
 
     @property
-    def shown(self) -> list[Entry]:
+    def shown(self) -> list[PaletteEntry]:
         """What is listed, best first."""
         return [hit.entry for hit in self._shown]
 
@@ -74,7 +74,7 @@ class Palette:
         self._shown = found(self._typed, self._offered, ui.preferences.used_actions)
         self._chosen, self._is_scroll_wanted = 0, True
 
-    def _draw_inside(self, ui: UiState) -> Entry | None:
+    def _draw_inside(self, ui: UiState) -> PaletteEntry | None:
         """Returns what was chosen."""
         if self._is_new:
             self._is_new = False

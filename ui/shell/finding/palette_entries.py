@@ -25,7 +25,7 @@ Run = Callable[[SessionView, Dispatch, UiState], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class PaletteEntry:
     """One thing to choose.
 
     Attributes:
@@ -50,14 +50,14 @@ class Entry:
 class Found:
     """An entry that what was typed stands for, and which letters of its text were meant."""
 
-    entry: Entry
+    entry: PaletteEntry
     positions: tuple[int, ...] = ()
 
 
-def entries(session: SessionView, ui: UiState) -> list[Entry]:
+def entries(session: SessionView, ui: UiState) -> list[PaletteEntry]:
     """Everything there is to choose now: actions in the order of their table, then the rest."""
     actions = [
-        Entry(
+        PaletteEntry(
             action.id,
             action.text,
             action.group,
@@ -71,7 +71,7 @@ def entries(session: SessionView, ui: UiState) -> list[Entry]:
     return [*actions, *_layouts(ui), *_projects(session), *_cameras(session), *_clips(session)]
 
 
-def found(typed: str, offered: Sequence[Entry], used: Sequence[str]) -> list[Found]:
+def found(typed: str, offered: Sequence[PaletteEntry], used: Sequence[str]) -> list[Found]:
     """What was typed as entries, best first; without anything typed, those used lately come first.
 
     Args:
@@ -98,13 +98,13 @@ def found(typed: str, offered: Sequence[Entry], used: Sequence[str]) -> list[Fou
     return [hit[3] for hit in sorted(hits, key=lambda hit: hit[:3])[:MOST_SHOWN]]
 
 
-def _projects(session: SessionView) -> list[Entry]:
+def _projects(session: SessionView) -> list[PaletteEntry]:
     def opening(index: int) -> Run:
         recent = session.recent.entries[index]
         return lambda session, dispatch, ui: dispatch(open_recent(recent))
 
     return [
-        Entry(
+        PaletteEntry(
             f"open:{recent.folder}",
             f"Open {one_line(recent.name)}",
             "Recent projects",
@@ -115,31 +115,36 @@ def _projects(session: SessionView) -> list[Entry]:
     ]
 
 
-def _cameras(session: SessionView) -> list[Entry]:
+def _cameras(session: SessionView) -> list[PaletteEntry]:
     def looking(camera_index: int | None) -> Run:
         return lambda session, dispatch, ui: dispatch(LookThrough(camera_index))
 
     if session.capture is None:
         return []
-    free = Entry("camera:", "Free view", "Cameras", looking(None))
+    free = PaletteEntry("camera:", "Free view", "Cameras", looking(None))
     names = session.rig.names
     return [
         free,
-        *(Entry(f"camera:{n}", f"Go to camera {one_line(n)}", "Cameras", looking(i)) for i, n in enumerate(names)),
+        *(
+            PaletteEntry(f"camera:{n}", f"Go to camera {one_line(n)}", "Cameras", looking(i))
+            for i, n in enumerate(names)
+        ),
     ]
 
 
-def _clips(session: SessionView) -> list[Entry]:
+def _clips(session: SessionView) -> list[PaletteEntry]:
     def going(frame_index: int) -> Run:
         return lambda session, dispatch, ui: dispatch(SetFrame(frame_index))
 
     return [
-        Entry(f"clip:{clip.clip_index}", f"Go to clip {clip.clip_index}", "Clips", going(clip.start), is_numbered=True)
+        PaletteEntry(
+            f"clip:{clip.clip_index}", f"Go to clip {clip.clip_index}", "Clips", going(clip.start), is_numbered=True
+        )
         for clip in session.clips
     ]
 
 
-def _layouts(ui: UiState) -> list[Entry]:
+def _layouts(ui: UiState) -> list[PaletteEntry]:
     def showing(name: str) -> Run:
         def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
             ui.wishes.layout = name
@@ -153,9 +158,9 @@ def _layouts(ui: UiState) -> list[Entry]:
         return remove
 
     names = list(ui.preferences.layouts)
-    shown = [Entry(f"layout:{name}", f"Layout: {one_line(name)}", "Window", showing(name)) for name in names]
+    shown = [PaletteEntry(f"layout:{name}", f"Layout: {one_line(name)}", "Window", showing(name)) for name in names]
     removed = [
-        Entry(f"layout removed:{name}", f"Remove the layout {one_line(name)}", "Window", removing(name))
+        PaletteEntry(f"layout removed:{name}", f"Remove the layout {one_line(name)}", "Window", removing(name))
         for name in names
     ]
     return [*shown, *removed]

@@ -61,7 +61,7 @@ class Handle:
 
 
 @dataclass(frozen=True, slots=True)
-class Lens:
+class HandleView:
     """How a picture is seen.
 
     Attributes:
@@ -111,7 +111,7 @@ def handles_of(thing: Thing) -> list[Handle]:
     return [Handle("scale"), *(Handle("arrow", axis) for axis in range(3)), *center, *rings]
 
 
-def place_of(thing: Thing, handle: Handle, lens: Lens) -> np.ndarray:
+def place_of(thing: Thing, handle: Handle, lens: HandleView) -> np.ndarray:
     """Where a handle is, scene units; of a ring, its middle. [3]"""
     middle, axes = middle_of(thing), axes_of(thing)
     match handle.kind:
@@ -127,7 +127,7 @@ def place_of(thing: Thing, handle: Handle, lens: Lens) -> np.ndarray:
     return middle
 
 
-def ring_of(thing: Thing, handle: Handle, lens: Lens) -> np.ndarray:
+def ring_of(thing: Thing, handle: Handle, lens: HandleView) -> np.ndarray:
     """The circle of a ring, closed. [N, 3]"""
     middle, axes = middle_of(thing), axes_of(thing)
     first, second = (axes[:, (handle.axis + step) % 3] for step in (1, 2))
@@ -135,7 +135,7 @@ def ring_of(thing: Thing, handle: Handle, lens: Lens) -> np.ndarray:
     return middle + lens.length(RING_PX, middle) * (np.cos(angles) * first + np.sin(angles) * second)
 
 
-def handle_under(thing: Thing, lens: Lens, x: float, y: float, *, reach_px: float) -> Handle | None:
+def handle_under(thing: Thing, lens: HandleView, x: float, y: float, *, reach_px: float) -> Handle | None:
     """The handle under a pixel; None beside all of them. reach_px: How near the pointer has to be."""
     best: tuple[float, Handle] | None = None
     for handle in handles_of(thing):
@@ -153,7 +153,7 @@ def handle_under(thing: Thing, lens: Lens, x: float, y: float, *, reach_px: floa
 def dragged(
     thing: Thing,
     handle: Handle,
-    lens: Lens,
+    lens: HandleView,
     start: tuple[float, float],
     stop: tuple[float, float],
     *,
@@ -195,7 +195,7 @@ def snap_step(size: float) -> float:
 def _dragged_along(
     thing: Thing,
     handle: Handle,
-    lens: Lens,
+    lens: HandleView,
     start: tuple[float, float],
     stop: tuple[float, float],
     step: float,
@@ -224,7 +224,7 @@ def _dragged_along(
     return _moved(thing, (_to_multiple(along, step) if step else along) * direction)
 
 
-def _along(lens: Lens, place: np.ndarray, direction: np.ndarray, at: tuple[float, float]) -> float | None:
+def _along(lens: HandleView, place: np.ndarray, direction: np.ndarray, at: tuple[float, float]) -> float | None:
     """How far along a line the point is that is nearest to the ray of a pixel; None where one looks along the line."""
     origin, ray = pixel_ray(lens.world_to_camera, lens.K, *at)
     away, cosine = place - origin, float(direction @ ray)
@@ -237,7 +237,7 @@ def _along(lens: Lens, place: np.ndarray, direction: np.ndarray, at: tuple[float
 # ---------------------------------------------------------------- the rest
 
 
-def _beside(thing: Thing, lens: Lens, start: tuple[float, float], stop: tuple[float, float]) -> np.ndarray:
+def _beside(thing: Thing, lens: HandleView, start: tuple[float, float], stop: tuple[float, float]) -> np.ndarray:
     """The way of a drag in the plane of the picture, as deep as the middle of a thing. [3]"""
     middle = middle_of(thing)
     here, there = (point_beside(lens.world_to_camera, lens.K, *at, middle) for at in (start, stop))
@@ -251,7 +251,9 @@ def _snapped_place(thing: Thing, way: np.ndarray, step: float) -> np.ndarray:
     return np.array([_to_multiple(value, step) for value in offset + way]) - offset
 
 
-def _angle(thing: Thing, handle: Handle, lens: Lens, start: tuple[float, float], stop: tuple[float, float]) -> float:
+def _angle(
+    thing: Thing, handle: Handle, lens: HandleView, start: tuple[float, float], stop: tuple[float, float]
+) -> float:
     """By how much a drag of a ring turns, radians about the positive axis."""
     middle, axes = middle_of(thing), axes_of(thing)
     normal = axes[:, handle.axis]
@@ -274,7 +276,7 @@ def _angle(thing: Thing, handle: Handle, lens: Lens, start: tuple[float, float],
     return math.remainder(angles[1] - angles[0], 2.0 * math.pi)
 
 
-def _factor(thing: Thing, lens: Lens, start: tuple[float, float], stop: tuple[float, float]) -> float:
+def _factor(thing: Thing, lens: HandleView, start: tuple[float, float], stop: tuple[float, float]) -> float:
     center = lens.pixels(middle_of(thing)[None])[0][0]
     before, after = (math.hypot(at[0] - center[0], at[1] - center[1]) for at in (start, stop))
     return after / max(before, 1.0)

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from app.playback.modes.color_maps import SIGNED, mapped
-from app.playback.modes.coverage import Coverage
+from app.playback.modes.coverage import CoveredSpace
 from app.playback.modes.trails import Trails
 from app.session.session_view import SessionView
 from ui.gl import LineRenderer, PointRenderer, Target
@@ -40,7 +40,7 @@ class ExplainingLayer:
     """
 
     def __init__(self, ctx: moderngl.Context) -> None:
-        self.coverage: Coverage | None = None
+        self.coverage: CoveredSpace | None = None
         self._trails: Trails | None = None
         self._outlines, self._paths = LineRenderer(ctx), LineRenderer(ctx)
         self._distances = PointRenderer(ctx)

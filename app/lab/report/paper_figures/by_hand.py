@@ -18,7 +18,7 @@ _CROP = re.compile(
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class InsetWindow:
     """A window in one picture. x, y: its upper left corner, working pixels."""
 
     camera: str
@@ -35,7 +35,7 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class FigureOptions:
     """What the command line says; None and nothing where the figures choose by their rules.
 
     Attributes:
@@ -55,10 +55,10 @@ class Places:
 
     boundary: int | None = None
     camera: str | None = None
-    windows: Sequence[Window] = ()
+    windows: Sequence[InsetWindow] = ()
 
 
-def checked_places(wishes: Wishes, capture: Capture, projects: Sequence[ProjectFacts]) -> Places:
+def checked_places(wishes: FigureOptions, capture: Capture, projects: Sequence[ProjectFacts]) -> Places:
     """What is wished for, as places of a capture.
 
     Args:
@@ -93,7 +93,7 @@ def _camera(text: str, capture: Capture, option: str) -> str:
     return found[0]
 
 
-def _window(text: str, capture: Capture, own: ProjectFacts) -> Window:
+def _window(text: str, capture: Capture, own: ProjectFacts) -> InsetWindow:
     found = _CROP.fullmatch(text)
     if found is None:
         raise ProjectError(
@@ -111,7 +111,7 @@ def _window(text: str, capture: Capture, own: ProjectFacts) -> Window:
             f"--crop is '{text}', which is empty or reaches outside of the picture.",
             hint=f"Pictures of camera {camera} are {n_across} x {n_down} pixels.",
         )
-    return Window(camera, frame, x, y, width, height)
+    return InsetWindow(camera, frame, x, y, width, height)
 
 
 def _spans(facts: ProjectFacts) -> str:

@@ -10,7 +10,7 @@ from PIL import Image
 
 from app.lab.figures import DPI, new_figure, plain_texts, png_of
 from app.lab.report.charts import shortened
-from app.lab.report.paper_figures.by_hand import Window
+from app.lab.report.paper_figures.by_hand import InsetWindow
 
 SHEET_WIDTH_PX = 1080
 """As wide as the page shows without making it smaller."""
@@ -37,7 +37,7 @@ class Sheet:
     n_times: int
 
 
-def draw_crops(truth: np.ndarray, window: Window, tiles: Sequence[Tile]) -> Sheet:
+def draw_crops(truth: np.ndarray, window: InsetWindow, tiles: Sequence[Tile]) -> Sheet:
     """A small overview of the whole picture with a red box, and the windows in rows beside it.
 
     Args:
@@ -72,7 +72,7 @@ def draw_crops(truth: np.ndarray, window: Window, tiles: Sequence[Tile]) -> Shee
         return Sheet(png_of(figure), n_times)
 
 
-def _overview(truth: np.ndarray, window: Window) -> np.ndarray:
+def _overview(truth: np.ndarray, window: InsetWindow) -> np.ndarray:
     """The picture as wide as a tile and a half, with a red box on a white one, which is seen on every ground."""
     height, width = truth.shape[:2]
     scale = min(1.5 * TILE_PX / max(width, height), 1.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.lab.report.page.parts import Figure, Section
 from app.lab.report.page.tables import Table, TableColumn
-from app.lab.report.paper_figures.by_hand import Places, Window
+from app.lab.report.paper_figures.by_hand import InsetWindow, Places
 from app.lab.report.paper_figures.crop_sheet import Tile, draw_crops
 from app.lab.report.paper_figures.drawing import as_8bit
 from app.lab.report.paper_figures.pictured import Pictured, of_main_group, trained_on
@@ -87,7 +87,7 @@ def pictures_that_differ(projects: Sequence[Pictured]) -> list[tuple[str, int]]:
     return chosen
 
 
-def window_that_differs(renders: Sequence[np.ndarray], camera: str, frame: int) -> Window:
+def window_that_differs(renders: Sequence[np.ndarray], camera: str, frame: int) -> InsetWindow:
     """The square window in which pictures [H, W, 3] of one place differ most; the upper left one of several."""
     stacked = np.stack([np.clip(np.nan_to_num(render), 0.0, 1.0) for render in renders])
     difference = stacked.std(0, dtype=np.float64).mean(2)
@@ -95,7 +95,7 @@ def window_that_differs(renders: Sequence[np.ndarray], camera: str, frame: int) 
     sums = np.pad(difference, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
     means = (sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]) / side**2
     y, x = divmod(int(np.round(means, 12).argmax()), means.shape[1])
-    return Window(camera, frame, x, y, side, side)
+    return InsetWindow(camera, frame, x, y, side, side)
 
 
 def _clip_index(project: Pictured, frame: int) -> int:
@@ -108,16 +108,16 @@ def _pair(project: Pictured, frame: int, camera: str) -> tuple[np.ndarray, np.nd
     return project.pictures.pair(_clip_index(project, frame), frame, camera)
 
 
-def _cut(picture: np.ndarray, window: Window) -> np.ndarray:
+def _cut(picture: np.ndarray, window: InsetWindow) -> np.ndarray:
     return picture[window.y : window.y + window.height, window.x : window.x + window.width]
 
 
-def _psnr(truth: np.ndarray, render: np.ndarray, window: Window) -> float | None:
+def _psnr(truth: np.ndarray, render: np.ndarray, window: InsetWindow) -> float | None:
     value = psnr(_cut(render, window), _cut(truth, window) / 255.0)
     return value if np.isfinite(value) else None
 
 
-def _place(window: Window) -> dict[str, Any]:
+def _place(window: InsetWindow) -> dict[str, Any]:
     return {
         "camera": window.camera,
         "frame_index": window.frame_index,
@@ -127,7 +127,7 @@ def _place(window: Window) -> dict[str, Any]:
 
 def _figure(
     number: int,
-    window: Window,
+    window: InsetWindow,
     truth: np.ndarray,
     renders: Sequence[np.ndarray],
     found: Sequence[tuple[str, float | None]],

@@ -9,7 +9,7 @@ import numpy as np
 from engine.backends.cpu.decode import activation as act
 from engine.backends.cpu.decode import layout as lay
 from engine.backends.cpu.decode.forward import first_layer, load_inputs, second_layer
-from engine.backends.cpu.decode.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, Job
+from engine.backends.cpu.decode.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, DecodeJob
 from engine.backends.cpu.decode.products import ADD, PLAIN, WHERE_POSITIVE, multiply
 from engine.backends.cpu.decode.rows import threes_to_lanes, to_lanes, to_rows, transpose_block
 from engine.kernels.jobs import Counter, FloatsAt, IntsAt, ManyFloats, read
@@ -26,7 +26,7 @@ _VECTORS, _N_HEADS, _MAX_GROUPS = lay.BLOCK_VECTORS, lay.N_HEADS, lay.MAX_GROUPS
 @routine(ints(4))
 def _load_gradients(arguments, first, n_lanes, scratch):
     """Gradients of the Gaussians of one block to `d_values`, and the values that their derivatives need to `values`."""
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     k, ordinals = job.n_gaussians, job.ordinals
     start = 4 * k * (job.first_anchor + first)
     d_values, values = scratch + job.at_d_values, scratch + job.at_values
@@ -100,7 +100,7 @@ def _add_bias_gradient(n_outputs, d_outputs, sums):
 @routine(ints(4))
 def _heads_backward(arguments, is_dynamic, sums, scratch):
     """From `d_values` to `d_inputs`, and to sums of weight gradients if the heads learn."""
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     inputs, inputs_by_anchor = scratch + job.at_inputs, scratch + job.at_inputs_rows
     hidden, hidden_by_anchor = scratch + job.at_hidden, scratch + job.at_hidden_rows
     d_raw, d_hidden = scratch + job.at_d_raw, scratch + job.at_d_hidden
@@ -145,7 +145,7 @@ def _heads_backward(arguments, is_dynamic, sums, scratch):
 @routine(ints(6))
 def _field_backward(arguments, n_lanes, encoded, d_encoded, sums, scratch):
     """From the dynamic rows of `d_inputs` to the gradient of the grid values, and sums of weight gradients."""
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     hidden, d_hidden = scratch + job.at_field_hidden, scratch + job.at_d_field_hidden
     hidden_by_anchor = scratch + job.at_hidden_rows
     d_out = scratch + job.at_d_inputs + job.n_static * ROW_BYTES
@@ -171,14 +171,14 @@ def _field_backward(arguments, n_lanes, encoded, d_encoded, sums, scratch):
     to_rows(lanes, d_encoded, (n_encoded + 15) // 16 * 64, job.ordinals, n_lanes, n_encoded)
 
 
-@kernel(Job)
+@kernel(DecodeJob)
 def differentiate_blocks(worker, arguments):
-    """Gradients of the chosen rows of one set. Arguments: `Job`.
+    """Gradients of the chosen rows of one set. Arguments: `DecodeJob`.
 
     Blocks are worked on in a fixed number of runs, whose weight gradients are summed apart; which thread does a run
     does not change its result.
     """
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     n_blocks = (job.n_rows + BLOCK - 1) // BLOCK
     n_in_group = (n_blocks + _MAX_GROUPS - 1) // _MAX_GROUPS
     scratch = job.scratch + worker * job.scratch_bytes
@@ -211,7 +211,7 @@ class WeightSums(NamedTuple):
     """Arguments of `write_weight_gradients`; one value per weight.
 
     Attributes:
-        sums, sums_bytes, places: As in `Job`.
+        sums, sums_bytes, places: As in `DecodeJob`.
         gradients: To write, each laid out like its weight; None for those that are not wanted.
         n_outputs, n_inputs: Widths of each layer; no inputs for a bias. int64
         counter: The next weight.

@@ -19,8 +19,8 @@ from torch import Tensor
 from engine.backends.cpu.decode import layout as lay
 from engine.backends.cpu.decode.backward import WeightSums, differentiate_blocks, write_weight_gradients
 from engine.backends.cpu.decode.forward import decode_blocks
-from engine.backends.cpu.decode.grid_kernels import Spread, spread_gradient
-from engine.backends.cpu.decode.layout import BLOCK, Job, Sizes
+from engine.backends.cpu.decode.grid_kernels import SpreadJob, spread_gradient
+from engine.backends.cpu.decode.layout import BLOCK, DecodeJob, Sizes
 from engine.backends.cpu.decode.rows import Copy, copy_rows
 from engine.kernels.launch import launch
 from engine.kernels.memory import RecycledMemory
@@ -335,12 +335,12 @@ class _Kernels:
     def __exit__(self, *_: object) -> None:
         POOL.give_back(self.workspace)
 
-    def job(self, index: int, encoded: Tensor) -> Job:
+    def job(self, index: int, encoded: Tensor) -> DecodeJob:
         """Arguments for one set; no gradients yet."""
         part = self.plan.chosen[index]
         anchors, corners = part.anchors, part.corners
         features, log_offset_scales, log_base_scales = self.plan.own(index, self.tensors)
-        return Job(
+        return DecodeJob(
             **self._fixed,
             features=features,
             positions=anchors.positions,
@@ -364,10 +364,10 @@ class _Kernels:
             job = Copy(source, self._fixed[name], row_bytes, part.rows, len(part.rows), first)
             launch(copy_rows, job, self.n_workers)
 
-    def spread(self, job: Job, knot: int, d_table: Tensor | None, *, is_first: bool) -> None:
+    def spread(self, job: DecodeJob, knot: int, d_table: Tensor | None, *, is_first: bool) -> None:
         """Gradient of one knot's table from the job's `d_encoded`."""
         assert d_table is not None
-        arguments = Spread(
+        arguments = SpreadJob(
             rows=job.rows,
             n_rows=job.n_rows,
             corner_indices=job.corner_indices,

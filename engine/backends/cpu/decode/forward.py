@@ -7,7 +7,7 @@ import numpy as np
 from engine.backends.cpu.decode import activation as act
 from engine.backends.cpu.decode import layout as lay
 from engine.backends.cpu.decode.grid_kernels import interpolate, interpolate_any
-from engine.backends.cpu.decode.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, Job
+from engine.backends.cpu.decode.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, DecodeJob
 from engine.backends.cpu.decode.products import PLAIN, RELU, multiply
 from engine.backends.cpu.decode.rows import threes_to_lanes, to_lanes, to_rows
 from engine.kernels.jobs import read
@@ -24,7 +24,7 @@ _VECTORS, _N_HEADS = lay.BLOCK_VECTORS, lay.N_HEADS
 @routine(ints(4))
 def encode_block(arguments, first, n_lanes, encoded):
     """Interpolated grid values of one block, one row of padded width per anchor; zeros in rows without anchor."""
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     width = (job.n_encoded + 15) // 16 * 16
     for lane in range(n_lanes):
         corner = load_int(job.rows + 8 * (first + lane))
@@ -57,7 +57,7 @@ def load_inputs(arguments, first, n_lanes, encoded, scratch):
         encoded: What `encode_block` wrote; 0 for a set without dynamic feature, whose inputs are the static ones.
         scratch: The worker's scratch memory.
     """
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     inputs = scratch + job.at_inputs
     to_lanes(job.features, 4 * job.n_static, job.rows + 8 * first, n_lanes, job.n_static, inputs)
     if encoded == 0:
@@ -78,7 +78,7 @@ def load_inputs(arguments, first, n_lanes, encoded, scratch):
 @routine(ints(4))
 def first_layer(arguments, head, n_inputs, scratch):
     """Hidden layer of one head to region `hidden`."""
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     multiply(
         scratch + job.at_hidden, ROW_BYTES, scratch + job.at_inputs, ROW_BYTES,
         load_int(job.weights + 8 * (_FIRST + head)), 4, 4 * job.n_hidden,
@@ -89,7 +89,7 @@ def first_layer(arguments, head, n_inputs, scratch):
 @routine(ints(3))
 def second_layer(arguments, head, scratch):
     """Raw outputs of one head to region `raw`."""
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     n_outputs = HEAD_WIDTHS[head] * job.n_gaussians
     multiply(
         scratch + job.at_raw, ROW_BYTES, scratch + job.at_hidden, ROW_BYTES,
@@ -125,7 +125,7 @@ def _activate(head, k, raw, values, anchor):
 
 @routine(ints(5))
 def _decode_block(arguments, first, n_lanes, encoded, scratch):
-    job = read(Job, arguments)
+    job = read(DecodeJob, arguments)
     load_inputs(arguments, first, n_lanes, encoded, scratch)
     anchor = scratch + job.at_anchors
     threes_to_lanes(
@@ -149,10 +149,10 @@ def _decode_block(arguments, first, n_lanes, encoded, scratch):
     to_rows(values + 11 * k * ROW_BYTES, job.means + 3 * start, 12 * k, job.ordinals, n_lanes, 3 * k)
 
 
-@kernel(Job)
+@kernel(DecodeJob)
 def decode_blocks(worker, arguments):
-    """Decode the chosen rows of one set. Arguments: `Job`. Which thread decodes a block does not change its result."""
-    job = read(Job, arguments)
+    """Decode the chosen rows of one set; see `DecodeJob`. Which thread decodes a block does not change its result."""
+    job = read(DecodeJob, arguments)
     n_blocks = (job.n_rows + BLOCK - 1) // BLOCK
     scratch = job.scratch + worker * job.scratch_bytes
     block_bytes = (job.n_encoded + 15) // 16 * 64 * BLOCK

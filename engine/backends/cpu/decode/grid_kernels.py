@@ -90,7 +90,7 @@ def _spread_four(typing_context, indices, weights, key_address, gradient, scale,
     return signature, generate
 
 
-class Spread(NamedTuple):
+class SpreadJob(NamedTuple):
     """Arguments of `spread_gradient`.
 
     Attributes:
@@ -151,14 +151,14 @@ def interpolate_any(corner, indices, weights, keys, table, n_levels, n_entries, 
             store_float(address, before + scale * total)
 
 
-@kernel(Spread)
+@kernel(SpreadJob)
 def spread_gradient(worker, arguments):
-    """Gradient of one knot's table. Arguments: the fields of `Spread`.
+    """Gradient of one knot's table. Arguments: the fields of `SpreadJob`.
 
     Levels are taken in turn by whichever thread is free; each owns its part of the gradient, so there are no atomics
     on floats and one fixed order of additions.
     """
-    job = read(Spread, arguments)
+    job = read(SpreadJob, arguments)
     scale = load_float(job.scale)
     n_levels, n_channels = job.n_levels, job.n_channels
     level = take_next(job.counter)

@@ -107,7 +107,7 @@ def regions(sizes: Sizes, *, is_backward: bool) -> Regions:
     return Regions._make([*starts, starts[-1] + _ANCHOR_ROWS])
 
 
-class Job(NamedTuple):
+class DecodeJob(NamedTuple):
     """What the kernels that go through the blocks of one set are given; None stands for an array that is not there.
 
     Attributes:

@@ -16,7 +16,7 @@ EDGE_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Agreement:
+class DepthAgreement:
     """What the other cameras say about each pixel of one depth map.
 
     Attributes:
@@ -32,7 +32,7 @@ class Agreement:
 
 def check_depths(
     depth_maps: np.ndarray, rig: CameraRig, *, camera: int, others: list[int], tolerance: float
-) -> Agreement:
+) -> DepthAgreement:
     """Compare one depth map with those of other cameras.
 
     Args:
@@ -42,7 +42,7 @@ def check_depths(
         tolerance: Relative depth difference that still agrees.
     """
     size = depth_maps.shape[1:]
-    result = Agreement(np.zeros(size, np.int32), np.zeros(size, np.int32), np.zeros(size))
+    result = DepthAgreement(np.zeros(size, np.int32), np.zeros(size, np.int32), np.zeros(size))
     _check(
         depth_maps,
         np.linalg.inv(rig.Ks),

@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.camera.depth_range import MIN_POINTS, depth_ranges, focus_distances, near_plane
 from engine.camera.rig import CameraRig
-from engine.cloud.keeping import Arrays, Keep, do_now
+from engine.cloud.kept_results import Arrays, Keep, do_now
 from engine.cloud.stereo.depth.consistency import check_depths
 from engine.cloud.stereo.depth.depth_scene import (
     AGREE_TOLERANCE,

@@ -13,8 +13,8 @@ import numpy as np
 from engine.camera.depth_range import near_plane
 from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import gains_from_pictures
-from engine.cloud.keeping import Arrays, Keep, do_now
-from engine.cloud.stereo.depth.consistency import Agreement, check_depths
+from engine.cloud.kept_results import Arrays, Keep, do_now
+from engine.cloud.stereo.depth.consistency import DepthAgreement, check_depths
 from engine.cloud.stereo.depth.fill import fill_inverse_depth
 from engine.cloud.stereo.depth.slanted import N_SCANS, refine_slanted
 from engine.cloud.stereo.depth.smoothing import smooth_inverse_depth
@@ -60,7 +60,7 @@ class DepthScene:
     far: np.ndarray
     gains: np.ndarray
 
-    def checked(self, depths: np.ndarray, tolerance: float) -> list[Agreement]:
+    def checked(self, depths: np.ndarray, tolerance: float) -> list[DepthAgreement]:
         """What the neighbours say about each depth map [C, h, w]."""
         return map_ordered(
             lambda camera: check_depths(
@@ -160,7 +160,7 @@ class DepthMaps:
     measured: np.ndarray
     depths: np.ndarray
     is_agreed: np.ndarray
-    checks: list[Agreement]
+    checks: list[DepthAgreement]
 
     @classmethod
     def of(cls, scene: DepthScene, measured: np.ndarray) -> DepthMaps:

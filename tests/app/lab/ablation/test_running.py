@@ -11,7 +11,7 @@ import pytest
 
 from app.evaluation.headless import TrainedProject
 from app.evaluation.speed.frame_rates import FrameRates
-from app.evaluation.speed.laps import Rate
+from app.evaluation.speed.laps import RenderRate
 from app.lab.ablation.measuring import MEASURED_FILE
 from app.lab.ablation.running import RESULT_FILE, TABLE_FILE, project_folder
 from app.lab.ablation.table import as_text
@@ -183,7 +183,7 @@ def test_settings_that_a_variant_cannot_have_are_said_before_anything_is_trained
 def test_frame_rates_are_columns_and_change_no_kept_figure(runner):
     def rates_of(opened: TrainedProject) -> FrameRates:
         fps = 10.0 + len(opened.project.folder.name)
-        return FrameRates("0", 32, 24, Rate(fps, 30.0, 500, 3, "CPU rasterizer, 2 threads"), None, "no driver")
+        return FrameRates("0", 32, 24, RenderRate(fps, 30.0, 500, 3, "CPU rasterizer, 2 threads"), None, "no driver")
 
     without = runner.run([FULL])
     kept = project_folder(runner.folder, FULL, 0) / MEASURED_FILE

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from app.evaluation.evaluation import Frames, Scope
+from app.evaluation.evaluation import EvaluationScope, Frames
 from app.evaluation.headless import TrainedProject
 from app.lab.report.write import write_report
 from app.project.opening.project_access import create_project, default_settings
@@ -40,7 +40,7 @@ class Measure:
         self.n_rows = 0
 
     def __call__(
-        self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
+        self, opened: TrainedProject, scope: EvaluationScope, clip_index: int, unknown: Frames
     ) -> Iterator[EvalRow | PairRow]:
         self.asked.append((opened.project.folder.name, scope.metrics, clip_index))
         draw = random.Random(len(opened.project.folder.name) + clip_index).random

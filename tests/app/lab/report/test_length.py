@@ -11,7 +11,7 @@ from PIL import Image
 
 from app.background.kernels import COMPILING
 from app.lab.figures import PALETTE
-from app.lab.report.charts import Curve, CurvePanel, draw_over_time, draw_stacked, has_lone_value
+from app.lab.report.charts import ChartLine, CurvePanel, draw_over_time, draw_stacked, has_lone_value
 from app.lab.report.length import MIN_LATER_CLIPS, length_section
 from app.project.project_facts import ClipFacts
 from tests.app.lab.report.made_up import Page, change_header, report
@@ -138,7 +138,7 @@ def test_a_value_without_neighbours_is_seen():
     assert has_lone_value(np.array([1.0]))
     assert not has_lone_value(np.array([1.0, 2.0, np.nan, 3.0, 4.0]))
     assert not has_lone_value(np.array([np.nan, np.nan]))
-    png = draw_over_time([CurvePanel("dB", [Curve("a", [20.0, None, 21.0])])], [0, 5, 10], (), "clip")
+    png = draw_over_time([CurvePanel("dB", [ChartLine("a", [20.0, None, 21.0])])], [0, 5, 10], (), "clip")
     with Image.open(io.BytesIO(png)) as image:
         colors = np.asarray(image.convert("RGB")).astype(int)
     far = np.abs(colors - np.array(list(bytes.fromhex(PALETTE[0][1:]))))
@@ -151,7 +151,7 @@ def test_lines_end_where_frames_are_missing():
     values = [20.0, 20.5, 21.0, 21.5]
 
     def crossed(frames: list[int], unit: str) -> bool:
-        picture = picture_of(draw_over_time([CurvePanel("", [Curve("a", values, is_main=True)])], frames, (), unit))
+        picture = picture_of(draw_over_time([CurvePanel("", [ChartLine("a", values, is_main=True)])], frames, (), unit))
         middle = picture[20:-60, picture.shape[1] // 2 - 40]
         return bool((middle > 200).sum() > 1)
 

@@ -6,7 +6,7 @@ import json
 import shutil
 from dataclasses import replace
 
-from app.evaluation.evaluation import Scope, is_measured
+from app.evaluation.evaluation import EvaluationScope, is_measured
 from app.evaluation.headless import open_trained
 from app.lab.report.measured import N_PICTURES
 from app.lab.report.page.labels import FIGURE_LABELS
@@ -133,7 +133,7 @@ def test_of_a_clip_behind_one_that_changed_only_the_boundary_is_measured_again(p
     measure = Measure()
     report(project, measure)
     before = (project / "evaluations" / "0001-all-float.jsonl").read_bytes()
-    other = Scope([0, 1], range(4), "all", "float")
+    other = EvaluationScope([0, 1], range(4), "all", "float")
     opened = open_trained(open_project(project, is_writable=False))
     assert is_measured(opened, other)
     rows = [json.loads(line) for line in before.splitlines()]

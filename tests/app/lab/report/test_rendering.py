@@ -4,11 +4,11 @@ import json
 
 from app.evaluation.headless import TrainedProject
 from app.evaluation.speed.frame_rates import DEFINITION, FrameRates
-from app.evaluation.speed.laps import Rate
+from app.evaluation.speed.laps import RenderRate
 from tests.app.lab.report.made_up import Page, report, train
 
-CPU = Rate(21.57, 43.0, 70_645, 10, "CPU rasterizer, 2 threads")
-GL = Rate(2.89, 3.1, 121_141, 8, "OpenGL, a card <&>")
+CPU = RenderRate(21.57, 43.0, 70_645, 10, "CPU rasterizer, 2 threads")
+GL = RenderRate(2.89, 3.1, 121_141, 8, "OpenGL, a card <&>")
 
 
 def rates_of(opened: TrainedProject) -> FrameRates:

@@ -11,7 +11,7 @@ import numpy as np
 
 from app.playback.modes.arrays import GaussianArrays
 from app.session.editing.attributes import AnchorValues
-from app.session.editing.selecting import Selecting
+from app.session.editing.selecting import ProjectSelecting
 from engine.editing.gaussian_rows import GaussianRows, RowSet
 
 T = TypeVar("T")
@@ -67,7 +67,7 @@ class MadeShown:
         return K
 
 
-def settle(selecting: Selecting) -> None:
+def settle(selecting: ProjectSelecting) -> None:
     """Poll until nothing is looked for."""
     deadline_s = time.monotonic() + 120.0
     while selecting.status().is_busy:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.session.editing.attributes import ATTRIBUTES, AnchorValues, values_of
-from app.session.editing.selecting import Selecting
+from app.session.editing.selecting import ProjectSelecting
 from app.session.editing.selection_commands import (
     Brush,
     ClearSelection,
@@ -45,13 +45,13 @@ def shown() -> MadeShown:
 
 
 @pytest.fixture
-def selecting(shown: MadeShown) -> Iterator[Selecting]:
-    made = Selecting(shown)
+def selecting(shown: MadeShown) -> Iterator[ProjectSelecting]:
+    made = ProjectSelecting(shown)
     yield made
     made.close()
 
 
-def chosen(selecting: Selecting) -> list[int]:
+def chosen(selecting: ProjectSelecting) -> list[int]:
     """Rows of the shown frame that are selected once everything was found."""
     settle(selecting)
     gaussians = selecting._shown.selectable()
@@ -69,7 +69,7 @@ def from_above(x: float = 20.0) -> SeenFrom:
 BALL = Sphere((10.0, 0.0, 0.0), 2.5)
 
 
-def test_every_command_finds_what_it_says(selecting: Selecting) -> None:
+def test_every_command_finds_what_it_says(selecting: ProjectSelecting) -> None:
     everything = list(range(50))
     view = from_above()
     whole = How(is_whole_anchors=True)
@@ -100,7 +100,7 @@ def test_every_command_finds_what_it_says(selecting: Selecting) -> None:
         assert chosen(selecting) == rows, command
 
 
-def test_modes_act_on_what_was_selected_before(selecting: Selecting) -> None:
+def test_modes_act_on_what_was_selected_before(selecting: ProjectSelecting) -> None:
     selecting.apply(SelectVolume(BALL))
     steps: tuple[tuple[SelectMode, float, list[int]], ...] = (
         ("add", 14.0, list(range(8, 17))),
@@ -113,7 +113,7 @@ def test_modes_act_on_what_was_selected_before(selecting: Selecting) -> None:
         assert chosen(selecting) == rows, mode
 
 
-def test_commands_that_come_quickly_are_all_carried_out_in_order(selecting: Selecting) -> None:
+def test_commands_that_come_quickly_are_all_carried_out_in_order(selecting: ProjectSelecting) -> None:
     for center in range(0, 40, 4):
         selecting.apply(SelectVolume(Sphere((center, 0.0, 0.0), 0.5), How("add")))
     selecting.apply(InvertSelection())
@@ -124,7 +124,7 @@ def test_commands_that_come_quickly_are_all_carried_out_in_order(selecting: Sele
     assert chosen(selecting) == []
 
 
-def test_a_selection_outlives_the_frame_and_reaches_other_clips(selecting: Selecting, shown: MadeShown) -> None:
+def test_a_selection_outlives_the_frame_and_reaches_other_clips(selecting: ProjectSelecting, shown: MadeShown) -> None:
     selecting.apply(SelectVolume(BALL))
     shown.gaussians = frame(1, hidden=9)  # the command still acts on the frame that was shown when it came
     assert chosen(selecting) == [0, 1, 2, 3]  # 8 is hidden here
@@ -141,7 +141,7 @@ def test_a_selection_outlives_the_frame_and_reaches_other_clips(selecting: Selec
     assert selecting.status().n_gaussians == 45  # what is not shown here is not selected afterwards
 
 
-def test_growing_leaves_what_is_not_shown_selected(selecting: Selecting, shown: MadeShown) -> None:
+def test_growing_leaves_what_is_not_shown_selected(selecting: ProjectSelecting, shown: MadeShown) -> None:
     selecting.apply(SelectAll())
     settle(selecting)
     selecting.apply(SelectVolume(Sphere((105.0, 0.0, 0.0), 20.0)))
@@ -154,7 +154,7 @@ def test_growing_leaves_what_is_not_shown_selected(selecting: Selecting, shown: 
     assert chosen(selecting) == [*range(7, 14), *range(40, 50)]
 
 
-def test_there_has_to_be_something_to_select(selecting: Selecting, shown: MadeShown) -> None:
+def test_there_has_to_be_something_to_select(selecting: ProjectSelecting, shown: MadeShown) -> None:
     gaussians = shown.gaussians
     assert gaussians is not None
     for nothing in (None, replace(gaussians, rows=None)):
@@ -168,7 +168,7 @@ def test_there_has_to_be_something_to_select(selecting: Selecting, shown: MadeSh
         selecting.apply(SelectByAttribute("weight", 0.0, 1.0))
 
 
-def test_what_cannot_be_found_is_told_and_the_rest_goes_on(selecting: Selecting) -> None:
+def test_what_cannot_be_found_is_told_and_the_rest_goes_on(selecting: ProjectSelecting) -> None:
     broken = SelectInPicture("no shape", from_above())  # pyright: ignore[reportArgumentType]
     selecting.apply(broken)
     selecting.apply(SelectVolume(BALL))
@@ -177,7 +177,7 @@ def test_what_cannot_be_found_is_told_and_the_rest_goes_on(selecting: Selecting)
     assert selecting.take_error() is None
 
 
-def test_another_project_begins_with_nothing(selecting: Selecting) -> None:
+def test_another_project_begins_with_nothing(selecting: ProjectSelecting) -> None:
     selecting.apply(SelectAll())
     settle(selecting)
     selecting.apply(SelectVolume(BALL))
@@ -206,7 +206,7 @@ def test_attributes_of_every_kind(shown: MadeShown) -> None:
         values_of("weight", gaussians)
 
 
-def test_by_residual_and_how_it_is_spread(selecting: Selecting, shown: MadeShown) -> None:
+def test_by_residual_and_how_it_is_spread(selecting: ProjectSelecting, shown: MadeShown) -> None:
     selecting.apply(SelectByAttribute("error", 0.0, 100.0))
     assert chosen(selecting) == []  # not known yet
     shown.values = np.where(np.arange(25) < 5, np.nan, np.arange(25)).astype(np.float32)
@@ -220,7 +220,7 @@ def test_by_residual_and_how_it_is_spread(selecting: Selecting, shown: MadeShown
         selecting.spread("weight")
 
 
-def test_where_selected_ones_are_seen(selecting: Selecting, shown: MadeShown) -> None:
+def test_where_selected_ones_are_seen(selecting: ProjectSelecting, shown: MadeShown) -> None:
     gaussians, view = shown.gaussians, from_above(10.0)
     assert gaussians is not None
     assert selecting.share(gaussians, view, 0) is None  # nothing is selected

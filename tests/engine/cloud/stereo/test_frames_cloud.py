@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from engine.camera.rig import CameraRig
-from engine.cloud.keeping import Arrays, do_now
+from engine.cloud.kept_results import Arrays, do_now
 from engine.cloud.stereo.frames_cloud import FRAME_SPACING_PX, FramesCloud, build_frames_cloud, merged_frames
 from engine.errors import PreparationError
 

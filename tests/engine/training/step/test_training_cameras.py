@@ -10,7 +10,7 @@ from engine.camera.corrections import LOG_FOCAL, N_VALUES, corrected, corrected_
 from engine.camera.rig import CameraRig
 from engine.model.clip_view import View, render_gaussians
 from engine.raster.gaussians import Gaussians
-from engine.synthetic.gaussian_scenes import Scene, layered_scene
+from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from engine.synthetic.rigs import looking_at
 from engine.training.step.training_cameras import TrainingCameras, correction_gradient
 
@@ -18,17 +18,17 @@ WIDTH, HEIGHT = 48, 40
 VALUES = np.array([0.02, -0.03, 0.04, 0.05, -0.04, 0.03, 0.02])
 
 
-def small_scene(seed: int) -> Scene:
+def small_scene(seed: int) -> GaussianScene:
     return layered_scene(30, WIDTH, HEIGHT, 4.0, faint=True, seed=seed)
 
 
-def loss_of(scene: Scene, gaussians: Gaussians, values: np.ndarray, weights: Tensor) -> Tensor:
+def loss_of(scene: GaussianScene, gaussians: Gaussians, values: np.ndarray, weights: Tensor) -> Tensor:
     pose, K = corrected_camera(scene.viewmats[0].numpy(), scene.Ks[0].numpy(), values)
     view = View(torch.from_numpy(pose), torch.from_numpy(K), WIDTH, HEIGHT, 0.01)
     return (render_gaussians(gaussians, view, backend=backend_called("reference")).image[0] * weights).sum()
 
 
-def derivatives(scene: Scene, weights: Tensor) -> tuple[np.ndarray, np.ndarray]:
+def derivatives(scene: GaussianScene, weights: Tensor) -> tuple[np.ndarray, np.ndarray]:
     """As the cameras learn by, and by central differences. [7] each"""
     gaussians = Gaussians(*(tensor.clone().requires_grad_() for tensor in scene.gaussians.tensors()))
     loss_of(scene, gaussians, VALUES, weights).backward()

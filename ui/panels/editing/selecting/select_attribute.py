@@ -8,7 +8,7 @@ from imgui_bundle import ImVec2, imgui
 from app.session.editing.attributes import ATTRIBUTES, Attribute
 from app.session.editing.selection_commands import SelectByAttribute
 from app.session.session_view import SessionView
-from engine.editing.selection.ranges import Spread
+from engine.editing.selection.ranges import ValueSpread
 from ui.panels.pieces.widgets import primary_button, text_wrapped_dim
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.style import theme
@@ -65,7 +65,7 @@ def _draw_choices(chosen: Attribute, dispatch: Dispatch, ui: UiState) -> None:
         ui.mark(f"selection.choice.{chosen.name}.{value:g}")
 
 
-def _draw_histogram(spread: Spread, tool: SelectTool, ui: UiState) -> None:
+def _draw_histogram(spread: ValueSpread, tool: SelectTool, ui: UiState) -> None:
     """Bars as high as the logarithm of their count, so that rare values show; the handle nearer to a press follows the
     pointer."""
     start, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
@@ -105,7 +105,9 @@ def _draw_histogram(spread: Spread, tool: SelectTool, ui: UiState) -> None:
         )
 
 
-def _draw_numbers(spread: Spread, chosen: Attribute, tool: SelectTool, ui: UiState, low: float, high: float) -> None:
+def _draw_numbers(
+    spread: ValueSpread, chosen: Attribute, tool: SelectTool, ui: UiState, low: float, high: float
+) -> None:
     unit = f"  {chosen.unit}" if chosen.unit else ""
     room = (imgui.get_content_region_avail().x - imgui.calc_text_size(unit).x - 8) / 2
     changed = []

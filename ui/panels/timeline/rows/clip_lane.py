@@ -13,7 +13,7 @@ from ui.panels.state import Rect
 from ui.panels.timeline.clip_words import clip_title, state_note, state_words
 from ui.panels.timeline.rows.columns import MIN_GROUP_WIDTH, STATES, group_size, largest_of_groups, runs_of
 from ui.panels.timeline.rows.rows import CLIPS
-from ui.panels.timeline.rows.stage import Stage, hatch
+from ui.panels.timeline.rows.stage import TimelineStage, hatch
 from ui.panels.timeline.time_range import TimeScale
 from ui.style import theme
 from ui.style.progress_words import band_words
@@ -37,7 +37,7 @@ def clips_in_sight(session: SessionView, scale: TimeScale) -> tuple[int, int]:
     return first, min(max(spans.index_of(int(scale.shown.stop) - 1), first) + 2, n_clips)
 
 
-def draw_clip_lane(stage: Stage, session: SessionView) -> None:
+def draw_clip_lane(stage: TimelineStage, session: SessionView) -> None:
     """Bands or runs of what is in sight, and the note of the clip under the pointer."""
     first, stop = clips_in_sight(session, stage.scale)
     if first == stop:
@@ -54,7 +54,7 @@ def draw_clip_lane(stage: Stage, session: SessionView) -> None:
         _draw_note(session, stage.scale.frame_at(stage.pointer[0]))
 
 
-def _draw_runs(stage: Stage, session: SessionView, in_sight: tuple[int, int]) -> None:
+def _draw_runs(stage: TimelineStage, session: SessionView, in_sight: tuple[int, int]) -> None:
     """Runs of one state. There may be hundreds of them, hardly wider than a line: those are drawn with one call."""
     row, scale, draw, rects = stage.rows[CLIPS], stage.scale, stage.draw, stage.ui.rects
     y0, y1 = row.y0, row.y1
@@ -72,7 +72,7 @@ def _draw_runs(stage: Stage, session: SessionView, in_sight: tuple[int, int]) ->
 
 
 def state_runs(
-    session: SessionView, stage: Stage, in_sight: tuple[int, int], smallest: float
+    session: SessionView, stage: TimelineStage, in_sight: tuple[int, int], smallest: float
 ) -> list[tuple[int, int, str]]:
     """First clip, last clip and state of every run. Clips that are narrower than `smallest` count together, as the one
     among them that matters most."""
@@ -86,7 +86,7 @@ def state_runs(
     ]
 
 
-def _band(stage: Stage, session: SessionView, first: int, last: int) -> Rect:
+def _band(stage: TimelineStage, session: SessionView, first: int, last: int) -> Rect:
     """What is in sight of a band, so that its words are, too."""
     row, scale = stage.rows[CLIPS], stage.scale
     x0 = max(scale.left_of(session.clips[first].start) + 1, scale.x0)

@@ -10,7 +10,7 @@ from app.playback.timeline import Timeline
 from app.session.session_view import SessionView
 from ui.panels.state import Rect
 from ui.panels.timeline.rows.clip_lane import state_runs
-from ui.panels.timeline.rows.stage import Stage
+from ui.panels.timeline.rows.stage import TimelineStage
 from ui.panels.timeline.time_range import TimeRange, TimeScale, whole_range
 from ui.panels.timeline.view_state import TimelineView
 from ui.style import theme
@@ -20,7 +20,7 @@ MIN_WINDOW_WIDTH = 8.0
 """The part that is shown is drawn no narrower, so that it can be taken hold of."""
 
 
-def draw_overview(stage: Stage, row: Rect, session: SessionView) -> None:
+def draw_overview(stage: TimelineStage, row: Rect, session: SessionView) -> None:
     """States of all clips, the part that is shown, and the playhead; dragging moves that part."""
     timeline, draw = session.timeline, stage.draw
     whole = TimeScale(row.x0, row.x1, whole_range(timeline.n_frames), timeline.n_frames)

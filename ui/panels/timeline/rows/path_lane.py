@@ -13,7 +13,7 @@ from engine.camera.camera_path import CameraPath
 from ui.panels.pieces.key_words import key_words
 from ui.panels.state import Dispatch, Rect
 from ui.panels.timeline.rows.rows import CAMERA
-from ui.panels.timeline.rows.stage import Stage
+from ui.panels.timeline.rows.stage import TimelineStage
 from ui.style import theme
 
 HALF, CHOSEN_HALF = 5.0, 6.5
@@ -25,7 +25,7 @@ EASY = 2.0
 """By how much a diamond is easier to hit than it looks."""
 
 
-def draw_path_lane(stage: Stage, session: SessionView) -> None:
+def draw_path_lane(stage: TimelineStage, session: SessionView) -> None:
     """A line from the first to the last key, a diamond per key; a loop goes on, fainter, till it is back."""
     status, row, scale = session.paths, stage.rows[CAMERA], stage.scale
     path = status.path
@@ -54,7 +54,7 @@ def draw_path_lane(stage: Stage, session: SessionView) -> None:
         imgui.end_tooltip()
 
 
-def _draw_key(stage: Stage, index: int, x: float, y: float, *, is_chosen: bool) -> None:
+def _draw_key(stage: TimelineStage, index: int, x: float, y: float, *, is_chosen: bool) -> None:
     half = CHOSEN_HALF if is_chosen else HALF
     corners = ImVec2(x, y - half), ImVec2(x + half, y), ImVec2(x, y + half), ImVec2(x - half, y)
     stage.draw.add_quad_filled(*corners, theme.u32(theme.YELLOW if is_chosen else theme.GREEN))
@@ -63,7 +63,7 @@ def _draw_key(stage: Stage, index: int, x: float, y: float, *, is_chosen: bool) 
     stage.ui.mark_rect(f"timeline.key{index}", Rect(x - half, y - half, x + half, y + half))
 
 
-def keys_in_sight(stage: Stage, path: CameraPath) -> range:
+def keys_in_sight(stage: TimelineStage, path: CameraPath) -> range:
     """Numbers of the keys between the ends of what is shown."""
     frames = np.array([key.frame for key in path.keys])
     shown = stage.scale.shown
@@ -71,7 +71,7 @@ def keys_in_sight(stage: Stage, path: CameraPath) -> range:
     return range(int(first), int(stop))
 
 
-def key_at(stage: Stage, session: SessionView) -> int | None:
+def key_at(stage: TimelineStage, session: SessionView) -> int | None:
     """Number of the key under the pointer."""
     path = session.paths.path
     if path is None or stage.pointer is None or not stage.is_pointed_at(CAMERA):
@@ -82,7 +82,7 @@ def key_at(stage: Stage, session: SessionView) -> int | None:
     return nearest if distance <= CHOSEN_HALF + EASY else None
 
 
-def handle_keys_of_path(stage: Stage, session: SessionView, dispatch: Dispatch) -> bool:
+def handle_keys_of_path(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> bool:
     """For the item drawn last, the track: whether the pointer has to do with a key, and with nothing else."""
     tool, status = stage.ui.paths, session.paths
     if imgui.is_item_activated():

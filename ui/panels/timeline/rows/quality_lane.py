@@ -14,7 +14,7 @@ from app.session.session_view import SessionView
 from ui.panels.timeline.rows.clip_lane import clips_in_sight
 from ui.panels.timeline.rows.columns import MIN_GROUP_WIDTH, group_size, means_of_groups, runs_of
 from ui.panels.timeline.rows.rows import QUALITY
-from ui.panels.timeline.rows.stage import Stage
+from ui.panels.timeline.rows.stage import TimelineStage
 from ui.style import theme
 
 LOWEST_DB, HIGHEST_DB = 20.0, 40.0
@@ -23,7 +23,7 @@ MIN_FRAME_GROUP_WIDTH = 4.0
 """Frames narrower than this count together, units of the screen."""
 
 
-def draw_quality_lane(stage: Stage, session: SessionView) -> None:
+def draw_quality_lane(stage: TimelineStage, session: SessionView) -> None:
     """The steps in sight, and the figures under the pointer."""
     scale = stage.scale
     stage.draw.add_line_h(scale.x0, scale.x1, _height(stage, MIDDLE_DB), theme.u32(theme.faded(theme.TEXT, 0.12)))
@@ -48,7 +48,7 @@ def _starts(session: SessionView, places: np.ndarray) -> np.ndarray:
 
 
 def _draw_steps(
-    stage: Stage,
+    stage: TimelineStage,
     values: np.ndarray,
     in_sight: tuple[int, int],
     starts_of: Callable[[np.ndarray], np.ndarray],
@@ -92,7 +92,7 @@ def _shares(decibels: np.ndarray | float) -> np.ndarray:
     return np.clip((np.asarray(decibels) - LOWEST_DB) / (HIGHEST_DB - LOWEST_DB), 0.0, 1.0)
 
 
-def _height(stage: Stage, decibels: float) -> float:
+def _height(stage: TimelineStage, decibels: float) -> float:
     row = stage.rows[QUALITY]
     return row.y1 - 2 - (row.height - 4) * float(_shares(decibels))
 

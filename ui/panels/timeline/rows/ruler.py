@@ -7,7 +7,7 @@ from imgui_bundle import ImVec2, imgui
 from app.playback.timeline import Timeline
 from ui.panels.state import Rect
 from ui.panels.timeline.rows.rows import RULER
-from ui.panels.timeline.rows.stage import Stage
+from ui.panels.timeline.rows.stage import TimelineStage
 from ui.panels.timeline.units import format_time, ruler_ticks
 from ui.style import theme
 
@@ -17,7 +17,7 @@ FLAG_HEIGHT = 18.0
 BRACKET = 5.0
 
 
-def draw_ruler(stage: Stage, timeline: Timeline) -> None:
+def draw_ruler(stage: TimelineStage, timeline: Timeline) -> None:
     """Ticks and labels."""
     row, scale, draw = stage.rows[RULER], stage.scale, stage.draw
     flag = flag_rect(stage, timeline)
@@ -34,7 +34,7 @@ def draw_ruler(stage: Stage, timeline: Timeline) -> None:
             draw.add_text(ImVec2(x + 4, row.y0 + 2), theme.u32(theme.TEXT_DIM), label)
 
 
-def draw_played(stage: Stage, timeline: Timeline) -> None:
+def draw_played(stage: TimelineStage, timeline: Timeline) -> None:
     """What is played, where that is not everything: a bar with an end on either side, and the rest dimmed."""
     if timeline.around is None and timeline.in_frame is None and timeline.out_frame is None:
         return
@@ -51,7 +51,7 @@ def draw_played(stage: Stage, timeline: Timeline) -> None:
         draw.add_line_h(min(x, x + toward * BRACKET), max(x, x + toward * BRACKET), row.y0 + 3, color, 2)
 
 
-def draw_hover(stage: Stage, timeline: Timeline) -> None:
+def draw_hover(stage: TimelineStage, timeline: Timeline) -> None:
     """A line through the frame under the pointer."""
     if stage.pointer is None:
         return
@@ -61,7 +61,7 @@ def draw_hover(stage: Stage, timeline: Timeline) -> None:
         stage.draw.add_line_v(x, stage.track.y0, stage.track.y1, theme.u32(theme.faded(theme.TEXT, 0.25)))
 
 
-def draw_playhead(stage: Stage, timeline: Timeline) -> None:
+def draw_playhead(stage: TimelineStage, timeline: Timeline) -> None:
     """The frame that is shown, as a line with a flag; nothing where it is out of sight."""
     scale, track = stage.scale, stage.track
     left, right = scale.left_of(timeline.frame_index), scale.left_of(timeline.frame_index + 1)
@@ -80,7 +80,7 @@ def draw_playhead(stage: Stage, timeline: Timeline) -> None:
     stage.ui.mark_rect("timeline.playhead", flag)
 
 
-def flag_rect(stage: Stage, timeline: Timeline) -> Rect:
+def flag_rect(stage: TimelineStage, timeline: Timeline) -> Rect:
     """Where the playhead's number stands; held inside the track."""
     track = stage.track
     half = imgui.calc_text_size(_flag_text(stage, timeline)).x / 2 + 6
@@ -88,5 +88,5 @@ def flag_rect(stage: Stage, timeline: Timeline) -> Rect:
     return Rect(middle - half, track.y0, middle + half, track.y0 + FLAG_HEIGHT)
 
 
-def _flag_text(stage: Stage, timeline: Timeline) -> str:
+def _flag_text(stage: TimelineStage, timeline: Timeline) -> str:
     return format_time(timeline.frame_index, timeline.fps, stage.ui.timeline.unit)

@@ -18,7 +18,7 @@ from ui.panels.state import Rect
 from ui.panels.timeline.rows.clip_lane import clips_in_sight
 from ui.panels.timeline.rows.columns import group_size, largest_of_groups, provisional_text
 from ui.panels.timeline.rows.rows import SEAMS
-from ui.panels.timeline.rows.stage import Stage, small_text
+from ui.panels.timeline.rows.stage import TimelineStage, small_text
 from ui.style import theme
 from ui.style.colors import Color, rgb
 
@@ -51,7 +51,7 @@ def ratio_text(ratio: float) -> str:
     return f"{ratio:.1f}!" if ratio > SEAM_RATIO_FLAGGED else f"{ratio:.1f}"
 
 
-def seams_in_sight(stage: Stage, session: SessionView) -> list[tuple[int, float]]:
+def seams_in_sight(stage: TimelineStage, session: SessionView) -> list[tuple[int, float]]:
     """Clip behind the seam and ratio (NaN where not all of it is measured) of every mark, from left to right."""
     first, stop = clips_in_sight(session, stage.scale)
     n_clips = min(len(session.clips), len(session.clip_states))
@@ -70,7 +70,7 @@ def seams_in_sight(stage: Stage, session: SessionView) -> list[tuple[int, float]
     return list(zip((first + worst).tolist(), largest.tolist(), strict=True))
 
 
-def draw_seam_lane(stage: Stage, session: SessionView) -> None:
+def draw_seam_lane(stage: TimelineStage, session: SessionView) -> None:
     """The marks in sight, and what is known of the one under the pointer."""
     row = stage.rows[SEAMS]
     marks = seams_in_sight(stage, session)
@@ -94,7 +94,7 @@ def _provisional(session: SessionView, clip_index: int) -> str:
     return "".join(provisional_text(seam) for seam in seams if seam.clip_index == clip_index)
 
 
-def _draw_mark(stage: Stage, mark: Rect, ratio: float, text: str, room: float) -> None:
+def _draw_mark(stage: TimelineStage, mark: Rect, ratio: float, text: str, room: float) -> None:
     draw = stage.draw
     if np.isnan(ratio):
         top = mark.y1 - mark.height / 2
@@ -112,7 +112,7 @@ def _draw_mark(stage: Stage, mark: Rect, ratio: float, text: str, room: float) -
         small_text(draw, mark.x1 + 3, mark.y0 + 1, text, color)
 
 
-def seam_at(stage: Stage, session: SessionView) -> tuple[int, float] | None:
+def seam_at(stage: TimelineStage, session: SessionView) -> tuple[int, float] | None:
     """The mark under the pointer: the clip behind it and its ratio."""
     if not stage.is_pointed_at(SEAMS) or stage.pointer is None:
         return None

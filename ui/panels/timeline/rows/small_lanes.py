@@ -12,7 +12,7 @@ from ui.panels.pieces.widgets import elided
 from ui.panels.state import Rect
 from ui.panels.timeline.rows.columns import merged_spans
 from ui.panels.timeline.rows.rows import CACHE, MARKERS
-from ui.panels.timeline.rows.stage import SMALL_TEXT, Stage, small_text, small_width
+from ui.panels.timeline.rows.stage import SMALL_TEXT, TimelineStage, small_text, small_width
 from ui.style import theme
 
 STRIP_HEIGHT = 5.0
@@ -22,7 +22,7 @@ MIN_MARKER_DISTANCE = 3.0
 MAX_NAME_WIDTH = 220.0
 
 
-def draw_cache_lane(stage: Stage, session: SessionView) -> None:
+def draw_cache_lane(stage: TimelineStage, session: SessionView) -> None:
     """A strip under every frame that can be shown at once."""
     row, scale = stage.rows[CACHE], stage.scale
     middle = (row.y0 + row.y1) / 2
@@ -39,7 +39,7 @@ def draw_cache_lane(stage: Stage, session: SessionView) -> None:
         stage.draw.add_rect_filled(low, ImVec2(min(max(x1, x0 + 1), scale.x1), strip.y1), color, 2)
 
 
-def draw_marker_lane(stage: Stage, timeline: Timeline) -> None:
+def draw_marker_lane(stage: TimelineStage, timeline: Timeline) -> None:
     """A diamond per marker, with its name where there is room."""
     scale = stage.scale
     markers = timeline.markers.between(scale.shown.start, scale.shown.stop)
@@ -58,7 +58,7 @@ def draw_marker_lane(stage: Stage, timeline: Timeline) -> None:
         imgui.end_tooltip()
 
 
-def _draw_marker(stage: Stage, marker: Marker, x: float, room: float) -> None:
+def _draw_marker(stage: TimelineStage, marker: Marker, x: float, room: float) -> None:
     row = stage.rows[MARKERS]
     y = (row.y0 + row.y1) / 2
     half = MARKER_HALF
@@ -73,7 +73,7 @@ def _draw_marker(stage: Stage, marker: Marker, x: float, room: float) -> None:
         small_text(stage.draw, x + half + 4, y - 7, name, theme.TEXT)
 
 
-def marker_at(stage: Stage, timeline: Timeline) -> Marker | None:
+def marker_at(stage: TimelineStage, timeline: Timeline) -> Marker | None:
     """The marker under the pointer."""
     if not stage.is_pointed_at(MARKERS) or stage.pointer is None:
         return None

@@ -15,7 +15,7 @@ SMALL_TEXT = 13.0
 
 
 @dataclass(frozen=True)
-class Stage:
+class TimelineStage:
     """One frame's drawing of the timeline.
 
     Attributes:

@@ -7,7 +7,7 @@ import io
 import numpy as np
 from PIL import Image
 
-from app.lab.report.paper_figures.by_hand import Window
+from app.lab.report.paper_figures.by_hand import InsetWindow
 from app.lab.report.paper_figures.crop_sheet import SHEET_WIDTH_PX, Tile, draw_crops
 from app.lab.report.paper_figures.drawing import ChangeColumn, draw_change_maps, draw_picture_rows
 from app.lab.report.paper_figures.length_chart import LengthPanel, Series, draw_over_length
@@ -20,7 +20,7 @@ def pixels_of(png: bytes) -> np.ndarray:
 
 def test_pixels_of_a_window_are_enlarged_by_a_whole_number(rng):
     truth = rng.integers(0, 255, (240, 320, 3), dtype=np.uint8)
-    window = Window("cam", 3, 100, 50, 40, 30)
+    window = InsetWindow("cam", 3, 100, 50, 40, 30)
     tiles = [Tile(f"$n$ {i}", "20 dB", rng.integers(0, 255, (30, 40, 3), dtype=np.uint8)) for i in range(7)]
     sheet = draw_crops(truth, window, tiles)
     picture = pixels_of(sheet.png)
@@ -43,7 +43,7 @@ def test_pixels_of_a_window_are_enlarged_by_a_whole_number(rng):
 
 def test_a_window_as_large_as_the_picture_is_shown_as_it_is(rng):
     truth = rng.integers(0, 255, (300, 1300, 3), dtype=np.uint8)
-    sheet = draw_crops(truth, Window("cam", 3, 0, 0, 1300, 300), [Tile("truth", "", truth)] * 2)
+    sheet = draw_crops(truth, InsetWindow("cam", 3, 0, 0, 1300, 300), [Tile("truth", "", truth)] * 2)
     assert sheet.n_times == 1
     picture = pixels_of(sheet.png)
     assert (picture == truth[0, 0]).all(2).any()

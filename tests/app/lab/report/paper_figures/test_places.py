@@ -7,7 +7,7 @@ import json
 import pytest
 
 from app.cli.cli import main
-from app.lab.report.paper_figures.by_hand import Window, Wishes, checked_places
+from app.lab.report.paper_figures.by_hand import FigureOptions, InsetWindow, checked_places
 from app.project.project_facts import read_facts
 from engine.capture.capture import open_capture
 from tests.app.fakes import write_capture
@@ -20,7 +20,7 @@ def other(tmp_path, capture_folder):
 
 
 def test_chosen_places_are_shown(project, other):
-    wishes = Wishes(3, "2", ["1:4:3,2,8,6", "0:0:0,0,32,24"])
+    wishes = FigureOptions(3, "2", ["1:4:3,2,8,6", "0:0:0,0,32,24"])
     path = report(project, compare=[other], wishes=wishes)
     page = Page(path.read_text(encoding="utf-8"))
     assert [row[:2] for row in page.tables["change_maps"]] == [["capture (G)", ""], ["p", "0 to 1"], ["q", "0 to 1"]]
@@ -49,7 +49,7 @@ def test_a_project_alone_shows_maps_and_windows_only_by_hand(project):
     page = Page(report(project).read_text(encoding="utf-8"))
     assert "features_apart" in page.tables
     assert not {"change_maps", "crops", "over_sequence_length"} & page.tables.keys()
-    page = Page(report(project, wishes=Wishes(camera="0", crops=["0:1:0,0,4,4"])).read_text(encoding="utf-8"))
+    page = Page(report(project, wishes=FigureOptions(camera="0", crops=["0:1:0,0,4,4"])).read_text(encoding="utf-8"))
     assert [row[0] for row in page.tables["change_maps"]] == ["capture (G)", "p"]
     assert [row[4] for row in page.tables["crops"]] == ["p"]
 
@@ -110,8 +110,8 @@ def test_places_that_do_not_exist_end_with_2_before_anything_is_measured(project
 
 def test_cameras_may_be_numbers_and_names_may_have_colons(project, tmp_path, capture_folder):
     capture, facts = open_capture(capture_folder), read_facts(project, "p")
-    places = checked_places(Wishes(3, "1", ["2:5:0,0,32,24"]), capture, [facts])
+    places = checked_places(FigureOptions(3, "1", ["2:5:0,0,32,24"]), capture, [facts])
     assert places.camera == "1"
-    assert places.windows == [Window("2", 5, 0, 0, 32, 24)]
+    assert places.windows == [InsetWindow("2", 5, 0, 0, 32, 24)]
     assert places.windows[0].as_argument == "2:5:0,0,32,24"
-    assert checked_places(Wishes(), capture, [facts]).windows == []
+    assert checked_places(FigureOptions(), capture, [facts]).windows == []

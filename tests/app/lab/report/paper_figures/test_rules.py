@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.lab.report.paper_figures.by_hand import Places, Window
+from app.lab.report.paper_figures.by_hand import InsetWindow, Places
 from app.lab.report.paper_figures.change_maps import chosen_boundary
 from app.lab.report.paper_figures.crops import pictures_that_differ, window_that_differs
 from app.lab.report.paper_figures.features import chosen_pictures
@@ -68,10 +68,10 @@ def test_the_window_is_where_the_renders_differ_most(rng):
         (x, y): difference[y : y + 6, x : x + 6].mean() for y in range(24 - 6 + 1) for x in range(32 - 6 + 1)
     }  # a quarter of the shorter side
     x, y = max(means, key=lambda place: means[place])
-    assert window == Window("a", 4, x, y, 6, 6)
+    assert window == InsetWindow("a", 4, x, y, 6, 6)
     renders[0][0, 0] = np.nan
     assert window_that_differs(renders, "a", 4) == window
-    assert window_that_differs([renders[1]] * 2, "a", 4) == Window("a", 4, 0, 0, 6, 6)
+    assert window_that_differs([renders[1]] * 2, "a", 4) == InsetWindow("a", 4, 0, 0, 6, 6)
 
 
 def test_features_are_shown_where_most_moves():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.calibration.matching import looking
+from engine.calibration.matching import feature_processes
 from engine.calibration.matching.matching import KeyPoints
 from engine.calibration.matching.pictures import CameraPictures, MovingPart
 from engine.errors import PreparationError
@@ -23,7 +23,7 @@ def pictures() -> CameraPictures:
 
 def test_a_process_finds_key_points_of_background_and_moments() -> None:
     shares: list[float] = []
-    found = looking.key_points(pictures(), "cam0", shares.append)
+    found = feature_processes.key_points(pictures(), "cam0", shares.append)
     assert isinstance(found, KeyPoints)
     assert set(found.moments.tolist()) == {0, 3}
     assert found.descriptors.shape == (len(found), 128)
@@ -31,7 +31,7 @@ def test_a_process_finds_key_points_of_background_and_moments() -> None:
     assert ((moving >= (38, 28)) & (moving <= (102, 92))).all()
     assert len(shares) >= 2
     assert sum(shares) == pytest.approx(1.0)
-    again = looking.key_points(pictures(), "cam0")
+    again = feature_processes.key_points(pictures(), "cam0")
     assert np.array_equal(found.pixels, again.pixels)
     assert np.array_equal(found.descriptors, again.descriptors)
 
@@ -40,6 +40,6 @@ def test_a_process_that_fails_names_the_camera(monkeypatch: pytest.MonkeyPatch) 
     def failing(module: str, arrays: object, **others: object) -> dict[str, np.ndarray]:
         raise ChildFailed("the process that finds key points was killed", is_final=False)
 
-    monkeypatch.setattr(looking, "work_on_arrays", failing)
+    monkeypatch.setattr(feature_processes, "work_on_arrays", failing)
     with pytest.raises(PreparationError, match="Key points of cam0 could not be found: the process"):
-        looking.key_points(pictures(), "cam0")
+        feature_processes.key_points(pictures(), "cam0")

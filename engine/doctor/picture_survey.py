@@ -51,7 +51,7 @@ class CameraLook:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class PictureSurvey:
     """What was looked at.
 
     Attributes:
@@ -101,7 +101,7 @@ def frames_to_look_at(n_frames: int, n_cameras: int) -> tuple[tuple[int, ...], t
     return tuple(frames), tuple(frames[row] for row in rows)
 
 
-def look_at(capture: Capture, report: ReportProgress = lambda progress: None) -> Look:
+def look_at(capture: Capture, report: ReportProgress = lambda progress: None) -> PictureSurvey:
     """Decode what the checks need.
 
     Args:
@@ -138,7 +138,7 @@ def look_at(capture: Capture, report: ReportProgress = lambda progress: None) ->
             return None
         return CameraLook(np.stack(gray), np.stack(steady), np.stack(gains), median_picture(colors))
 
-    return Look(capture, frames, spread, tuple(map_ordered(look, range(len(capture.rig)))), unreadable)
+    return PictureSurvey(capture, frames, spread, tuple(map_ordered(look, range(len(capture.rig)))), unreadable)
 
 
 def median_picture(pictures: Sequence[np.ndarray]) -> np.ndarray:

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from app.document.storing.document_file import PROJECT_FILE
-from app.training.keeping import (
+from app.training.disk_retries import (
     PATIENCE_S,
     PATIENCE_UNKEPT_S,
     RETRY_AFTER_S,

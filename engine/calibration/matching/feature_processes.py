@@ -19,7 +19,7 @@ MAX_PROCESSES = 4
 USUAL_S = 5.0
 """For progress: a process tells none, since its interpreter is busy."""
 LOOKING = arrays_kind(
-    "engine.calibration.matching.looking:LOOKING",
+    "engine.calibration.matching.feature_processes:LOOKING",
     "engine.calibration.matching.features_child:main",
     "the process that finds key points",
 )

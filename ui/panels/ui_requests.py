@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 @dataclass
-class Wishes:
+class UiRequests:
     """What is asked for.
 
     Attributes:
