@@ -6,7 +6,8 @@ Each rule is shown to fail on a seeded sample, so that a green run means somethi
 import ast
 import re
 import subprocess
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,14 @@ BYTES_ONLY = (
     "app/training/worker.py",
 )
 """Modules whose processes are of multiprocessing still; they send bytes that they encode themselves."""
+
+MAX_FILES = 15
+LARGE_FOLDERS = {
+    "app/export": "",
+    "app/training": "",
+    "engine/capture/formats": "a reader per format: whoever adds one looks for the others in one place",
+}
+"""Folders that may hold more Python files, and why."""
 
 # Home folders of people, the temporary folder, drive letters: text that works on one machine only.
 MACHINE_PATH = re.compile(r"(?<![\w./~*-])(?:/(?:home|Users|root|tmp|work|mnt|media|scratch)/[\w.]|[A-Z]:\\\w)")
@@ -213,3 +222,20 @@ def test_english_rule_refuses_seeded_text(seeded: str) -> None:
 @pytest.mark.parametrize("innocent", ["There is no such folder.", "It is no longer there.", "is not a capture folder"])
 def test_english_rule_accepts_plain_text(innocent: str) -> None:
     assert not odd_english(innocent)
+
+
+def crowded(files: Iterable[str]) -> dict[str, int]:
+    """Folders with too many of these files, and how many."""
+    counts = Counter(Path(name).parent.as_posix() for name in files)
+    return {folder: n for folder, n in counts.items() if n > MAX_FILES}
+
+
+def test_folders_are_small_enough_to_be_looked_through() -> None:
+    found = crowded(path.relative_to(ROOT).as_posix() for path in python_files())
+    assert sorted(found) == sorted(LARGE_FOLDERS), "split a folder by idea, under names that say the ideas"
+
+
+def test_crowded_folder_is_seen() -> None:
+    names = [f"app/a/{i}.py" for i in range(MAX_FILES)]
+    assert crowded([*names, "app/a/b/1.py"]) == {}
+    assert crowded([*names, "app/a/one_more.py"]) == {"app/a": MAX_FILES + 1}
