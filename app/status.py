@@ -353,7 +353,7 @@ class PlanStatus:
 
     Attributes:
         summary: Steps, time, memory and disk in one line; empty until they are known.
-        lines: Name, value and reason of everything that is known.
+        lines: Name and value of everything that is known.
         presets: Names to choose from.
         preset: The one that the settings begin with.
         settings: The main ones.
@@ -363,7 +363,7 @@ class PlanStatus:
 
     clip_index: int
     summary: str = ""
-    lines: tuple[tuple[str, str, str], ...] = ()
+    lines: tuple[tuple[str, str], ...] = ()
     presets: tuple[str, ...] = ()
     preset: str = ""
     settings: tuple[SettingStatus, ...] = ()

@@ -63,7 +63,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     command.add_argument(
-        "--plan", action="store_true", help="show what would be trained, why, and what it costs; train nothing"
+        "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
     command.add_argument(
         "--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output"

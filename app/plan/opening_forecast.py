@@ -48,7 +48,7 @@ def forecast_opening(capture: Capture, answers: OpeningAnswers, *, step_time: St
         total_s = None if total_s is None or seconds is None else total_s + seconds
     n_static, n_moving = expected_anchors(footage, config, None)
     disk_mb = len(clips) * (_FIELD_MB + n_moving * _ANCHOR_BYTES / 1e6) + n_static * _ANCHOR_BYTES / 1e6
-    memory = [plan.memory_mb.value for plan in plans.values() if plan.memory_mb.value is not None]
+    memory = [plan.memory_mb for plan in plans.values()]
     return OpeningForecast(
         n_clips=len(clips),
         size=(width, height),

@@ -15,10 +15,10 @@ from engine.capture.clip import Clip
 from engine.text import duration_text, figure_text
 from engine.training.config import SETTINGS, TrainConfig
 from engine.training.plan.forecast import MeasuredClip, measured_clip
-from engine.training.plan.plan import StepTime, TrainingPlan, footage_of, make_plan, resumed_plan
+from engine.training.plan.plan import PlanLine, StepTime, TrainingPlan, footage_of, make_plan, resumed_plan
 from engine.training.presets import PRESETS, closest_preset
 
-PLAN_SCHEMA = 2
+PLAN_SCHEMA = 3
 
 
 def clip_history(project: Project, n_clips: int) -> list[MeasuredClip]:
@@ -95,6 +95,12 @@ def _exposure_span(project: Project, capture: Capture, clip: Clip, config: Train
     return exposure_span(capture, clip, capture.training_cameras(held_out), config, project.prep_dir)
 
 
+def sum_known(values: Sequence[float | None]) -> float | None:
+    """Of all values; None where one is not known."""
+    known = [value for value in values if value is not None]
+    return sum(known) if len(known) == len(values) else None
+
+
 def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
     found = project.headers.read(project.clip_path(clip_index))
     if found is None or found.header is None:
@@ -130,7 +136,7 @@ def plan_status(
     return PlanStatus(
         clip_index=clip.clip_index,
         summary="" if plan is None else short_text(plan),
-        lines=tuple((line.name, line.text, line.reason) for line in lines),
+        lines=tuple((line.name, line.text) for line in lines),
         presets=tuple(PRESETS),
         preset=closest_preset(settings.overrides),
         settings=tuple(
@@ -159,17 +165,14 @@ def memory_text(memory_mb: float | None) -> str:
 
 def short_text(plan: TrainingPlan) -> str:
     """The forecast as one line."""
-    stored = "" if plan.disk_mb.value is None else f", {plan.disk_mb.text} stored"
+    stored = "" if plan.disk_mb is None else f", {PlanLine('', plan.disk_mb, 'MB').text} stored"
     steps = f"{plan.n_steps:,} steps" if plan.n_steps else "no steps"
-    times = time_words(plan.seconds)
-    if plan.preparation_s.value is not None:
-        times += f" (preparation {duration_text(plan.preparation_s.value)})"
+    times = f"{time_words(plan.seconds)} (preparation {duration_text(plan.preparation_s)})"
     if plan.steps_done:
-        steps = (
-            f"goes on at step {plan.steps_done:,}, {plan.n_steps - plan.steps_done:,} of {plan.n_steps:,} steps left"
-        )
+        left = plan.n_steps - plan.steps_done
+        steps = f"resumes at step {plan.steps_done:,}, {left:,} of {plan.n_steps:,} steps left"
         times = time_words(plan.seconds)
-    return f"{steps}, {times}, {memory_text(plan.memory_mb.value)}{stored}"
+    return f"{steps}, {times}, {memory_text(plan.memory_mb)}{stored}"
 
 
 def time_words(seconds: float | None) -> str:
@@ -178,17 +181,15 @@ def time_words(seconds: float | None) -> str:
 
 
 def plan_text(plan: TrainingPlan) -> list[str]:
-    """Every line of a plan, reasons included."""
+    """Every line of a plan."""
     head = f"Clip {plan.clip_index}, frames {plan.start} to {plan.start + plan.n_frames - 1}, {plan.role}"
-    rows = [f"  {line.name:<21} {line.text:>11}  {line.reason}" for line in plan.lines]
-    rows += [f"  {line.name:<21} {line.text:>11}  forecast: {line.reason}" for line in plan.forecast]
-    return [head, *rows]
+    return [head, *(f"  {line.name:<21} {line.text:>11}" for line in (*plan.lines, *plan.forecast))]
 
 
 def begin_text(plan: TrainingPlan) -> list[str]:
-    """The few lines that a training begins with."""
+    """The two lines that a training begins with."""
     counts = ", ".join(f"{line.text} {line.name}" for line in plan.lines if line.name.endswith(("steps", "anchors")))
-    return [f"Clip {plan.clip_index}: {short_text(plan)}", f"  {counts}", f"  Times: {plan.training_s.reason}"]
+    return [f"Clip {plan.clip_index}: {short_text(plan)}", f"  {counts}"]
 
 
 def compared_text(plan: TrainingPlan, project: Project) -> str:
@@ -203,9 +204,9 @@ def compared_text(plan: TrainingPlan, project: Project) -> str:
         ("stored", plan.disk_mb, taken.disk_mb, "MB"),
     )
     parts = [
-        f"{name} {figure_text(line.value)} against {figure_text(measured)} {unit}"
-        for name, line, measured, unit in pairs
-        if measured is not None and line.value is not None
+        f"{name} {figure_text(expected)} against {figure_text(measured)} {unit}"
+        for name, expected, measured, unit in pairs
+        if measured is not None and expected is not None
     ]
     return f"  Forecast against measured: {', '.join(parts)}" if parts else ""
 
@@ -242,13 +243,13 @@ def plan_document(
 def totals(plans: Sequence[TrainingPlan]) -> dict[str, float | None]:
     """Of all planned clips: seconds and bytes add up, memory is that of the largest. None where one is not known."""
     return {
-        "preparation_s": _sum([plan.preparation_s.value for plan in plans], 1),
-        "training_s": _sum([plan.training_s.value for plan in plans], 1),
-        "memory_mb": max((plan.memory_mb.value or 0.0 for plan in plans), default=0.0),
-        "disk_mb": _sum([plan.disk_mb.value for plan in plans], 3),
+        "preparation_s": _sum([plan.preparation_s for plan in plans], 1),
+        "training_s": _sum([plan.training_s for plan in plans], 1),
+        "memory_mb": max((plan.memory_mb for plan in plans), default=0.0),
+        "disk_mb": _sum([plan.disk_mb for plan in plans], 3),
     }
 
 
 def _sum(values: Sequence[float | None], digits: int) -> float | None:
-    known = [value for value in values if value is not None]
-    return round(sum(known), digits) if len(known) == len(values) else None
+    total = sum_known(values)
+    return None if total is None else round(total, digits)

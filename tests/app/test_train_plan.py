@@ -13,11 +13,9 @@ def test_a_plan_is_printed_and_nothing_is_made(run, capture_folder, tmp_path):
     code, out, err = run(*arguments, "--set", "source_steps=7")
     assert code == 0, err
     assert not (tmp_path / "p").exists()
-    assert re.search(
-        r"Clip 0, frames 0 to 2, reference\n  pictures +9  3 cameras \(1 held out\) x 3 frames, 32x24", out
-    )
-    assert re.search(r"source steps +7  as set", out)
-    assert "forecast: a step of about this size takes 12.3 ms here" in out
+    assert re.search(r"Clip 0, frames 0 to 2, reference\n  pictures +9\n", out)
+    assert re.search(r"source steps +7\n", out)
+    assert re.search(r"  training +\S+ s\n", out)
     assert re.search(r"All 2 clips: about \d+:\d\d, at most 0\.\d GB of memory", out)
 
 
@@ -36,7 +34,7 @@ def test_a_plan_as_json(run, capture_folder, tmp_path):
         "discards",
         "forecast",
     }
-    assert (document["schema"], document["holdout"]) == (2, ["0"])
+    assert (document["schema"], document["holdout"]) == (3, ["0"])
     assert document["settings"]["passes"] == 4
     assert [(clip["clip_index"], clip["state"], clip["role"]) for clip in document["clips"]] == [
         (0, "planned", "reference"),
@@ -99,7 +97,6 @@ def test_training_says_its_plan_and_how_right_it_was(run, capture_folder, tmp_pa
     arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3)
     _, _, err = run(*arguments)
     assert re.search(r"Clip 0: 1,500 steps, about \d+:\d\d \(preparation \d+:\d\d\), 0\.\d GB of memory", err)
-    assert len(re.findall(r"Times: a step of about this size takes 12\.3 ms", err)) == 2  # one of each kind
     figures = r"preparation \S+ against \S+ s, training \S+ against \S+ s, memory \S+ against \S+ MB"
     assert len(re.findall(f"Forecast against measured: {figures}", err)) == 2
     assert "Forecast" not in run(*arguments)[2]  # trained already
@@ -113,7 +110,7 @@ def test_a_later_clip_in_which_nothing_moves_takes_no_steps(run, capture_folder,
     looks.clear()
     code, out, err = run(*arguments, "--plan")
     assert code == 0, err
-    assert re.search(r"source steps +0  nothing moves in the sampled pictures", out)
+    assert re.search(r"source steps +0\n", out)
     ((_, clip, camera_indices, _, prep_dir),) = looks
     assert (clip.clip_index, camera_indices, prep_dir) == (1, [1, 2, 3], tmp_path / "p" / "prep")
     assert run("gate", tmp_path / "p", "--dynamic-sphere", 0, 0, 0, 1)[0] == 0

@@ -230,7 +230,7 @@ class FakeSession:
         self.plan: PlanStatus | None = PlanStatus(
             clip_index=0,
             summary="4,140 steps, about 1:20, 0.8 GB of memory, 1.2 MB stored",
-            lines=(("pictures", "180", "18 cameras x 10 frames"), ("training", "64 s", "as measured")),
+            lines=(("pictures", "180"), ("training", "64 s")),
             presets=("toy", "small"),
             preset="small",
             settings=(SettingStatus("joint_steps", "Joint steps", 3600),),

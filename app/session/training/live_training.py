@@ -8,8 +8,7 @@ import logging
 from collections.abc import Sequence
 
 from app.background.jobs import JobContext, Jobs
-from app.plan.next_plan import NextPlan
-from app.plan.sequence import SequencePlan
+from app.plan.forecasts import Forecasts
 from app.playback.modes.arrays import AnchorArrays
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
@@ -47,7 +46,7 @@ class LiveTraining:
         self.service: TrainingService | None = None
         self._opened: OpenedProject | None = None
         self._jobs, self._notices, self._launch, self._can_measure = jobs, notices, launch, can_measure
-        self._plans, self._sequence, self._curves = NextPlan(), SequencePlan(), CurveReader()
+        self._forecasts, self._curves = Forecasts(), CurveReader()
         self._live_view = live_view
         self._unread: SnapshotWritten | None = None
         self._live_counts: tuple[int, int] | None = None
@@ -85,8 +84,7 @@ class LiveTraining:
         self.service.live_view = self._live_view
 
     def _retire(self, service: TrainingService, opened: OpenedProject) -> None:
-        self._plans.forget()
-        self._sequence.forget()
+        self._forecasts.forget()
         self._unread = self._live_counts = None
         if service.worker is None:
             service.close()
@@ -298,16 +296,15 @@ class LiveTraining:
         """What training the next clip would take; None while something trains or nothing is left to train."""
         if self.service is None or self._opened is None:
             return None
-        can_measure = self._can_measure and not self._jobs.statuses
-        return self._plans.status(self.service, self._opened.project, self._opened.capture, can_measure=can_measure)
+        opened, can_measure = self._opened, self._can_measure and not self._jobs.statuses
+        return self._forecasts.next_clip(self.service, opened.project, opened.capture, can_measure=can_measure)
 
     def queue(self) -> QueueStatus:
         """What waits, and what all of it takes."""
         if self.service is None or self._opened is None:
             return QueueStatus(live_view=self._live_view)
-        opened = self._opened
-        can_measure = self._can_measure and not self._jobs.statuses and not self._plans.is_busy
-        return self._sequence.status(self.service, opened.project, opened.capture, can_measure=can_measure)
+        opened, can_measure = self._opened, self._can_measure and not self._jobs.statuses
+        return self._forecasts.queue(self.service, opened.project, opened.capture, can_measure=can_measure)
 
     def curves(self, clip_index: int) -> Curves | None:
         """Loss and PSNR over the steps of a clip; None until they were read."""
@@ -316,7 +313,7 @@ class LiveTraining:
     @property
     def finished(self) -> tuple[object, ...]:
         """Identities of the newest plans and curves. Another value means that there is something new to see."""
-        newest = (self._plans.newest, self._sequence.newest, self._curves.worker.newest)
+        newest = (self._forecasts.newest, self._curves.worker.newest)
         return tuple(None if found is None else found[0] for found in newest)
 
     def close(self) -> None:
@@ -324,5 +321,4 @@ class LiveTraining:
         if self.service is not None:
             self.service.close()
         self._curves.close()
-        self._plans.close()
-        self._sequence.close()
+        self._forecasts.close()

@@ -1,20 +1,16 @@
-"""Forecast of a clip: seconds of a step times their number, and what trained clips of the project took.
+"""Forecast figures of a clip: what trained clips of the project took, else timed steps and rough sizes.
 
-Trained clips of the same kind count first. Without one, a few steps are timed on this machine
-(engine.training.plan.measured_steps), preparation and memory are rough, and bytes on disk are not known.
 No torch, no clock, no files.
 """
 
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from engine.clip_files.clip_header import ClipHeader
 
-_KEEPING_SHARE = 0.03
-"""Of the steps' time: held-out figures, snapshots and checkpoints between them."""
 _START_S, _CAMERA_S, _PICTURE_S = {True: 2.5, False: 3.5}, 0.45, 5e-3
 """Rough preparation: of a source clip or not; of a camera whose depths are found; of a picture."""
 _DEPTHS_S = 0.15
@@ -74,54 +70,10 @@ def _positive(value: float | None) -> float | None:
     return value if value is not None and value > 0 else None
 
 
-@dataclass(frozen=True, slots=True)
-class Expected:
-    """A forecast number; None where nobody can know it yet. And where it comes from."""
-
-    value: float | None
-    reason: str
-
-
-def expected_from(history: Sequence[MeasuredClip], name: str) -> Expected | None:
-    """The middle of what clips took.
-
-    Args:
-        history: Clips of the same kind.
-        name: An attribute of MeasuredClip.
-    Returns:
-        None where none of them says.
-    """
-    known = [(clip.clip_index, value) for clip in history if (value := getattr(clip, name)) is not None]
-    if not known:
-        return None
-    value = statistics.median(value for _, value in known)
-    return Expected(value, f"as measured on {_listed([clip_index for clip_index, _ in known])}")
-
-
-def expected_training(
-    history: Sequence[MeasuredClip], steps: Mapping[str, int], step_s: Callable[[str], float | None]
-) -> Expected:
-    """Seconds of all steps.
-
-    Args:
-        history: Clips of the same kind.
-        steps: Number of steps by phase.
-        step_s: Seconds of a step of a phase, timed; None where that cannot be done.
-    """
-    n_steps = sum(steps.values())
-    if not n_steps:
-        return Expected(0.0, "no steps")
-    past = expected_from(history, "step_s")
-    if past is not None and past.value is not None:
-        return Expected(past.value * n_steps, f"{past.value * 1e3:.1f} ms a step, {past.reason}")
-    timed = {phase: step_s(phase) for phase, n in steps.items() if n}
-    total_s = 0.0
-    for phase, seconds in timed.items():
-        if seconds is None:
-            return Expected(None, "not known before steps can be timed on this machine")
-        total_s += steps[phase] * seconds * (1 + _KEEPING_SHARE)
-    listed = " and ".join(f"{1e3 * (seconds or 0):.1f} ms" for seconds in timed.values())
-    return Expected(total_s, f"a step of about this size takes {listed} here")
+def median_of(values: Sequence[float | None]) -> float | None:
+    """The middle of the known ones; None without any."""
+    known = [value for value in values if value is not None]
+    return statistics.median(known) if known else None
 
 
 def rough_preparation_s(*, n_cameras: int, n_pictures: int, is_source: bool, is_by_frame: bool = False) -> float:
@@ -145,10 +97,3 @@ def rough_memory_mb(*, n_pixels: int, n_pictures: int, n_read: int) -> float:
         n_read: Pictures read at one time, backgrounds included.
     """
     return _PROGRAM_MB + 3e-6 * n_pixels * n_pictures + min(3e-6 * n_pixels * n_read, _CACHE_MB)
-
-
-def _listed(clip_indices: Sequence[int]) -> str:
-    shown = sorted(clip_indices)
-    if len(shown) == 1:
-        return f"clip {shown[0]}"
-    return f"{len(shown)} clips" if len(shown) > 3 else f"clips {', '.join(str(i) for i in shown[:-1])} and {shown[-1]}"

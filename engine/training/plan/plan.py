@@ -1,7 +1,8 @@
-"""TrainingPlan: what is known of a clip's training before it begins, each number with its reason, and a forecast.
+"""TrainingPlan: what is known of a clip's training before it begins, and a forecast of what it takes.
 
 Numbers of steps and pictures are exact. Of anchors, which follow from the pictures, a plan knows limits. The forecast
-is that of engine.training.plan.forecast. No clock, no files.
+is the median of the project's own clips of the same kind; without one, timed steps times their number, rough
+preparation and memory, and unknown bytes on disk. No clock, no files.
 """
 
 from __future__ import annotations
@@ -14,21 +15,16 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
-from engine.training.config import JOINT_RULE, SOURCE_RULE, STATIC_RULE, StepRule, TrainConfig
+from engine.training.config import TrainConfig
 from engine.training.phases import phases_of
-from engine.training.plan.forecast import (
-    Expected,
-    MeasuredClip,
-    expected_from,
-    expected_training,
-    rough_memory_mb,
-    rough_preparation_s,
-)
+from engine.training.plan.forecast import MeasuredClip, median_of, rough_memory_mb, rough_preparation_s
 
 Value = int | float | str | None
 
 _STATIC_PER_PIXEL, _ALIVE_PER_PIXEL = 0.19, 0.035
 """Anchors per pixel of one picture where nothing better is known: static ones, and moving ones alive in a frame."""
+_KEEPING_SHARE = 0.03
+"""Of the steps' time: held-out figures, snapshots and checkpoints between them."""
 SEEN_SHARE = 0.6
 """Of the static anchors, those that one camera sees."""
 
@@ -58,13 +54,11 @@ class PlanLine:
         name: As shown to the user.
         value: Number or words; None where nobody can know yet.
         unit: "" where there is none.
-        reason: Where the value comes from, one clause.
     """
 
     name: str
     value: Value
-    unit: str
-    reason: str
+    unit: str = ""
 
     @property
     def text(self) -> str:
@@ -80,13 +74,6 @@ class PlanLine:
 
 
 @dataclass(frozen=True, slots=True)
-class ForecastLine(PlanLine):
-    """A line of the forecast: its value is a number, or None."""
-
-    value: float | None
-
-
-@dataclass(frozen=True, slots=True)
 class TrainingPlan:
     """What a training is going to do and what it is expected to take. A value.
 
@@ -94,11 +81,11 @@ class TrainingPlan:
         clip_index, start, n_frames: The clip.
         role: "reference" or "source".
         n_steps: Of all phases.
-        lines: Everything that is known, in the order in which it comes about.
+        lines: What it is going to do.
         preparation_s, training_s: Forecast; together the wall time, compiling of kernels left out.
         memory_mb: Most that the training process will hold, 10^6 bytes.
         disk_mb: The finished clip, 10^6 bytes.
-        steps_done: Of n_steps, where a training that was stopped goes on; the times are of what is left.
+        steps_done: Of n_steps, where a stopped training resumes; the times are of what is left.
     """
 
     clip_index: int
@@ -107,27 +94,26 @@ class TrainingPlan:
     role: str
     n_steps: int
     lines: tuple[PlanLine, ...]
-    preparation_s: ForecastLine
-    training_s: ForecastLine
-    memory_mb: ForecastLine
-    disk_mb: ForecastLine
+    preparation_s: float
+    training_s: float | None
+    memory_mb: float
+    disk_mb: float | None
     steps_done: int = 0
 
     @property
-    def forecast(self) -> tuple[ForecastLine, ...]:
-        """The four forecast lines."""
-        return self.preparation_s, self.training_s, self.memory_mb, self.disk_mb
+    def forecast(self) -> tuple[PlanLine, ...]:
+        """The four forecast figures."""
+        return (
+            PlanLine("preparation", self.preparation_s, "s"),
+            PlanLine("training", self.training_s, "s"),
+            PlanLine("memory", self.memory_mb, "MB"),
+            PlanLine("stored clip", self.disk_mb, "MB"),
+        )
 
     @property
     def seconds(self) -> float | None:
         """Forecast of the wall time; None where it is not known."""
-        if self.preparation_s.value is None or self.training_s.value is None:
-            return None
-        return self.preparation_s.value + self.training_s.value
-
-    def line(self, name: str) -> PlanLine | None:
-        """A line by its name, also one of the forecast; None where the plan has none."""
-        return next((line for line in (*self.lines, *self.forecast) if line.name == name), None)
+        return None if self.training_s is None else self.preparation_s + self.training_s
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-able."""
@@ -139,31 +125,21 @@ class TrainingPlan:
             "role": self.role,
             "n_steps": self.n_steps,
             "steps_done": self.steps_done,
-            "forecast": {name: line.value for name, line in zip(names, self.forecast, strict=True)},
+            "forecast": {name: getattr(self, name) for name in names},
             "lines": [asdict(line) for line in (*self.lines, *self.forecast)],
         }
 
 
 def resumed_plan(plan: TrainingPlan, steps_done: int, n_steps: int) -> TrainingPlan:
-    """The plan of a training that goes on after a stop.
+    """The plan of a training that resumes after a stop.
 
     Args:
         plan: Of the whole training.
         steps_done, n_steps: As the checkpoint says; steps of the whole are not forecast any more.
     """
     left = 1.0 - steps_done / n_steps if n_steps else 0.0
-    training_s, done = plan.training_s, f"{steps_done:,} of {n_steps:,} steps are done"
-    return replace(
-        plan,
-        n_steps=n_steps,
-        steps_done=steps_done,
-        preparation_s=replace(plan.preparation_s, value=0.0, reason="done before the training was stopped"),
-        training_s=replace(
-            training_s,
-            value=None if training_s.value is None else training_s.value * left,
-            reason=f"{training_s.reason}; {done}",
-        ),
-    )
+    training_s = None if plan.training_s is None else plan.training_s * left
+    return replace(plan, n_steps=n_steps, steps_done=steps_done, preparation_s=0.0, training_s=training_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,57 +211,64 @@ def make_plan(
         is_still: Whether nothing moves in this clip, by `engine.training.plan.stillness.looks_still`.
         exposure: Against the reference clip's, see `engine.training.plan.exposure_span`; None where it is not known.
     """
-    same = [known for known in history if known.clip_index != clip.clip_index and known.is_source == is_source]
-    same = [known for known in same if not known.is_still]
-    phases = _phase_lines(footage, clip, config, is_source=is_source)
-    if is_still and is_source:
-        nothing = "nothing moves in the sampled pictures, so there is nothing to learn"
-        phases = [replace(line, value=0, reason=nothing) for line in phases]
-    steps = {line.name.removesuffix(" steps"): int(line.value or 0) for line in phases}
-    n_static, n_moving = expected_anchors(footage, config, reference)
-    sizes = StepSizes(footage.width, footage.height, round(SEEN_SHARE * n_static), n_moving, config)
+    same = [
+        known
+        for known in history
+        if known.clip_index != clip.clip_index and known.is_source == is_source and not known.is_still
+    ]
+    phases = phases_of(config, n_cameras=footage.n_cameras, n_frames=clip.n_frames, is_source=is_source)
+    stays_still = is_still and is_source
+    if stays_still:
+        phases = [(name, 0) for name, _ in phases]
+    n_steps = sum(n for _, n in phases)
     n_pictures = footage.n_cameras * clip.n_frames
     n_read = n_pictures
     if not is_source and config.needs_backgrounds and config.backgrounds == "capture":
         n_read = footage.n_cameras * min(footage.n_frames, config.background_frames)
-    preparation = expected_from(same, "preparation_s") or Expected(
-        rough_preparation_s(
-            n_cameras=footage.n_cameras,
-            n_pictures=n_pictures,
-            is_source=is_source,
-            is_by_frame=config.cloud == "frames",
-        ),
-        "rough",
+    n_static, n_moving = expected_anchors(footage, config, reference)
+    sizes = StepSizes(footage.width, footage.height, round(SEEN_SHARE * n_static), n_moving, config)
+    step_s = median_of([known.step_s for known in same])
+    timed_s = _timed_s(phases, lambda phase: step_time(sizes, phase)) if step_s is None else step_s * n_steps
+    preparation_s = median_of([known.preparation_s for known in same]) or rough_preparation_s(
+        n_cameras=footage.n_cameras,
+        n_pictures=n_pictures,
+        is_source=is_source,
+        is_by_frame=config.cloud == "frames",
     )
-    training = expected_training(same, steps, lambda phase: step_time(sizes, phase))
-    memory = expected_from(same, "memory_mb") or Expected(
-        rough_memory_mb(n_pixels=footage.n_pixels, n_pictures=n_pictures, n_read=n_read), "the program and its pictures"
+    memory_mb = median_of([known.memory_mb for known in same]) or rough_memory_mb(
+        n_pixels=footage.n_pixels, n_pictures=n_pictures, n_read=n_read
     )
-    disk = expected_from(same, "disk_mb") or Expected(None, "not known before a clip of this kind is trained")
-    if is_still and is_source:
-        disk = Expected(None, "negligible")
+    disk_mb = None if stays_still else median_of([known.disk_mb for known in same])
     return TrainingPlan(
         clip_index=clip.clip_index,
         start=clip.start,
         n_frames=clip.n_frames,
         role="source" if is_source else "reference",
-        n_steps=sum(steps.values()),
+        n_steps=n_steps,
         lines=(
             *_picture_lines(footage, clip, config, is_source=is_source),
-            *phases,
+            *(PlanLine(f"{name} steps", n) for name, n in phases),
             *_anchor_lines(config, reference, is_source=is_source),
             *_distance_lines(clip, reference, exposure),
-            PlanLine("Gaussians per anchor", config.gaussians_per_anchor, "", "as in every clip of the project"),
+            PlanLine("Gaussians per anchor", config.gaussians_per_anchor),
         ),
-        preparation_s=_forecast_line("preparation", "s", preparation),
-        training_s=_forecast_line("training", "s", training),
-        memory_mb=_forecast_line("memory", "MB", memory),
-        disk_mb=_forecast_line("stored clip", "MB", disk),
+        preparation_s=round(preparation_s, 3),
+        training_s=None if timed_s is None else round(timed_s, 3),
+        memory_mb=round(memory_mb, 3),
+        disk_mb=None if disk_mb is None else round(disk_mb, 3),
     )
 
 
-def _forecast_line(name: str, unit: str, expected: Expected) -> ForecastLine:
-    return ForecastLine(name, None if expected.value is None else round(expected.value, 3), unit, expected.reason)
+def _timed_s(phases: Sequence[tuple[str, int]], step_s: Callable[[str], float | None]) -> float | None:
+    """Seconds of all steps, by what a step of each phase was timed to take; None where one could not be timed."""
+    total_s = 0.0
+    for phase, n_steps in phases:
+        if n_steps:
+            timed_s = step_s(phase)
+            if timed_s is None:
+                return None
+            total_s += n_steps * timed_s * (1 + _KEEPING_SHARE)
+    return total_s
 
 
 def expected_anchors(footage: Footage, config: TrainConfig, reference: ClipHeader | None) -> tuple[int, int]:
@@ -297,69 +280,25 @@ def expected_anchors(footage: Footage, config: TrainConfig, reference: ClipHeade
     return reference.n_anchors.get("static", n_static), n_alive if reference.n_alive is None else reference.n_alive
 
 
-# ---------------------------------------------------------------- lines
-
-
 def _picture_lines(footage: Footage, clip: Clip, config: TrainConfig, *, is_source: bool) -> list[PlanLine]:
-    left_out = f"{footage.n_held_out} held out" if footage.n_held_out else "none held out"
-    n_pictures = footage.n_cameras * clip.n_frames
-    counted = f"{footage.n_cameras} cameras ({left_out}) x {_plural(clip.n_frames, 'frame')}"
-    lines = [PlanLine("pictures", n_pictures, "", f"{counted}, {footage.width}x{footage.height}")]
+    lines = [PlanLine("pictures", footage.n_cameras * clip.n_frames)]
     if not is_source and config.needs_backgrounds:
-        whose, n_all = "the clip", clip.n_frames
-        if config.backgrounds == "capture":
-            whose, n_all = "the capture", footage.n_frames
-        n_frames = min(n_all, config.background_frames)
-        spread = f"all of {whose}" if n_frames == n_all else f"spread over {whose}"
-        lines.append(PlanLine("background frames", n_frames, "", f"of every camera, {spread}"))
+        n_all = footage.n_frames if config.backgrounds == "capture" else clip.n_frames
+        lines.append(PlanLine("background frames", min(n_all, config.background_frames)))
     return lines
-
-
-def _phase_lines(footage: Footage, clip: Clip, config: TrainConfig, *, is_source: bool) -> list[PlanLine]:
-    """One line per phase; its value is the number of steps."""
-    n_cameras, n_pictures = footage.n_cameras, footage.n_cameras * clip.n_frames
-    if is_source:
-        n_steps = config.n_source_steps(n_pictures)
-        reason = _step_reason(config.source_steps, config.passes, SOURCE_RULE, n_pictures, "picture")
-        return [PlanLine("source steps", n_steps, "", reason)]
-    reasons = {
-        "static": _step_reason(config.static_steps, 0.0, STATIC_RULE, n_cameras, "background"),
-        "joint": _step_reason(config.joint_steps, config.passes, JOINT_RULE, n_pictures, "picture"),
-    }
-    phases = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=False)
-    return [PlanLine(f"{name} steps", n_steps, "", reasons[name]) for name, n_steps in phases]
-
-
-def _step_reason(given: int, passes: float, rule: StepRule, n_items: int, item: str) -> str:
-    if given:
-        return "as set"
-    if passes:
-        return f"{passes:g} passes over {_plural(n_items, item)}, as set"
-    asked = rule.per_item * n_items
-    bound = ""
-    if asked < rule.lowest:
-        bound = f", at least {rule.lowest:,}"
-    elif asked > rule.highest:
-        bound = f", at most {rule.highest:,}"
-    return f"{rule.per_item} for each of {_plural(n_items, item)}{bound}"
 
 
 def _anchor_lines(config: TrainConfig, reference: ClipHeader | None, *, is_source: bool) -> list[PlanLine]:
     """Limits, and what a trained reference clip has; how many anchors a clip gets its pictures decide."""
     n_static, n_moving = f"<= {config.max_static_points:,}", f"<= {config.max_moving_points:,}"
     if config.cloud == "frames" and not is_source:
-        n_most = f"<= {config.max_static_points + config.max_moving_points:,}"
-        return [PlanLine("anchors", n_most, "", "of all frames; the voxel grows until there are no more")]
+        return [PlanLine("anchors", f"<= {config.max_static_points + config.max_moving_points:,}")]
     if not is_source:
-        grows = "the voxel grows until there are no more"
-        return [PlanLine("static anchors", n_static, "", grows), PlanLine("moving anchors", n_moving, "", grows)]
+        return [PlanLine("static anchors", n_static), PlanLine("moving anchors", n_moving)]
     known = None if reference is None else reference.n_anchors.get("static")
-    inherited = PlanLine("static anchors", n_static, "", "inherited; the reference clip is not trained yet")
-    if known is not None:
-        inherited = PlanLine("static anchors", known, "", "inherited, counted in the reference clip")
-    if config.cloud == "frames":  # the limit is not below what a frame has: all of them
-        return [inherited, PlanLine("residual anchors", None, "", "all points that inherited anchors do not cover")]
-    return [inherited, PlanLine("residual anchors", n_moving, "", "together with the inherited moving ones in use")]
+    inherited = PlanLine("static anchors", n_static if known is None else known)
+    # with a cloud of frames, all points that inherited anchors do not cover
+    return [inherited, PlanLine("residual anchors", None if config.cloud == "frames" else n_moving)]
 
 
 def _distance_lines(clip: Clip, reference: ClipHeader | None, exposure: tuple[float, float] | None) -> list[PlanLine]:
@@ -367,14 +306,8 @@ def _distance_lines(clip: Clip, reference: ClipHeader | None, exposure: tuple[fl
     lines = []
     if reference is not None:
         distance = abs(clip.clip_index - reference.clip_index)
-        reason = f"from clip {reference.clip_index}, which it inherits from"
-        lines.append(PlanLine("distance", distance, "clip" if distance == 1 else "clips", reason))
+        lines.append(PlanLine("distance", distance, "clip" if distance == 1 else "clips"))
     if exposure is not None:
         low, high = (round(100 * share, 1) + 0.0 for share in exposure)
-        shown = "unchanged" if low == high == 0 else f"{low:+.1f} to {high:+.1f} %"
-        lines.append(PlanLine("exposure", shown, "", "against the reference clip, in the middle frame; removed"))
+        lines.append(PlanLine("exposure", "unchanged" if low == high == 0 else f"{low:+.1f} to {high:+.1f} %"))
     return lines
-
-
-def _plural(n: int, word: str) -> str:
-    return f"{n:,} {word}{'' if n == 1 else 's'}"

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.plan.sequence import ClipForecast, clip_forecast, sequence_forecast, together
+from app.plan.forecasts import clip_forecast, together
 from app.project.clips.clip_catalog import ClipRecord
 from app.project.clips.clip_versions import version_path
 from app.project.project import Project
@@ -18,6 +18,7 @@ from app.session.session import Session
 from app.status import SequenceForecast
 from app.training.service import TrainingService
 from engine.clip_files.clip_state import read_clip_state
+from engine.training.plan.plan import TrainingPlan
 from tests.app.conftest import poll_until
 from tests.app.fakes import N_STEPS, make_fake, make_slow
 
@@ -95,23 +96,16 @@ def test_the_forecast_goes_by_what_trained_clips_took(session: Session) -> None:
 
 
 def test_a_stopped_clip_counts_with_what_is_left_of_it() -> None:
-    from engine.training.plan.forecast import Expected
-    from engine.training.plan.plan import TrainingPlan, _forecast_line
-
-    def line(value: float | None):
-        return _forecast_line("x", "s", Expected(value, ""))
-
-    plan = TrainingPlan(1, 0, 1, "source", 100, (), line(5.0), line(40.0), line(1.0), line(2.0))
-    assert clip_forecast(plan, ClipRecord()) == ClipForecast(100, 45.0, 2.0)
+    plan = TrainingPlan(1, 0, 1, "source", 100, (), 5.0, 40.0, 1.0, 2.0)
+    assert clip_forecast(plan, ClipRecord()) == SequenceForecast(1, 100, 45.0, 2.0)
     stopped = ClipRecord("stopped", resume_step=150, resume_n_steps=200)
-    assert clip_forecast(plan, stopped) == ClipForecast(50, 10.0, 2.0)
-    assert clip_forecast(plan, stopped, begins_afresh=True) == ClipForecast(100, 45.0, 2.0)
-    unknown = clip_forecast(replace(plan, training_s=line(None)), ClipRecord())
-    assert unknown == ClipForecast(100, None, 2.0)
-    going, later = [ClipForecast(100, 45.0, 2.0)], together([unknown, ClipForecast(50, 5.0, 1.0)])
-    assert sequence_forecast(going, later) == SequenceForecast(3, 250, None, 5.0)
-    assert sequence_forecast(going, together([])) == SequenceForecast(1, 100, 45.0, 2.0)
-    assert sequence_forecast([], together([])) is None
+    assert clip_forecast(plan, stopped) == SequenceForecast(1, 50, 10.0, 2.0)
+    assert clip_forecast(plan, stopped, begins_afresh=True) == SequenceForecast(1, 100, 45.0, 2.0)
+    unknown = clip_forecast(replace(plan, training_s=None), ClipRecord())
+    assert unknown == SequenceForecast(1, 100, None, 2.0)
+    parts = [SequenceForecast(1, 100, 45.0, 2.0), unknown, SequenceForecast(1, 50, 5.0, 1.0)]
+    assert together(parts) == SequenceForecast(3, 250, None, 5.0)
+    assert together([together([]), parts[0]]) == parts[0]
 
 
 def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> None:

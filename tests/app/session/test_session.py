@@ -147,7 +147,7 @@ def test_stopping_keeps_what_was_learned_and_training_goes_on_there(make_session
     assert (session.clip_states[0].state, session.clip_states[0].resume_step) == ("stopped", step)
     assert (session.training.next_clip_index, session.training.resume_step) == (0, step)
     n_left = 10_000_000 - step
-    assert planned(session).summary.startswith(f"goes on at step {step:,}, {n_left:,} of 10,000,000 steps left, ")
+    assert planned(session).summary.startswith(f"resumes at step {step:,}, {n_left:,} of 10,000,000 steps left, ")
 
     folder = session.project.folder
     session.close()

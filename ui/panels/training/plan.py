@@ -1,4 +1,4 @@
-"""The plan of the next clip in the training panel: what it takes, why, and the main settings while they may change."""
+"""The plan of the next clip in the training panel: what it takes, and the main settings while they may change."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FIELD_WIDTH = 110.0
 
 
 def draw_plan(plan: PlanStatus, dispatch: Dispatch, ui: UiState) -> None:
-    """The forecast in one sentence, and below a header that folds out: settings, then every line with its reason.
+    """The forecast in one sentence, and below a header that folds out: settings, then every line.
 
     Args:
         plan: app.status.PlanStatus.
@@ -74,12 +74,10 @@ def _draw_lines(plan: PlanStatus) -> None:
         return
     imgui.table_setup_column("name", imgui.TableColumnFlags_.width_stretch)
     imgui.table_setup_column("value")
-    for name, text, reason in plan.lines:
+    for name, text in plan.lines:
         imgui.table_next_row()
         imgui.table_next_column()
         imgui.text(name)
-        imgui.set_item_tooltip(reason)
         imgui.table_next_column()
         imgui.text(text)
-        imgui.set_item_tooltip(reason)
     imgui.end_table()

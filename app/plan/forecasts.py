@@ -1,0 +1,296 @@
+"""Forecasts: what training the next clip takes, and what all takes that waits or is left, made on a thread.
+
+One plan per kind and length of clip stands for all of them; clips trained before say most. The next clip is planned by
+itself, while nothing trains.
+"""
+
+from __future__ import annotations
+
+import logging
+import shutil
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.background.latest import LatestWorker
+from app.plan.planning import clip_history, plan_clip, plan_status, sum_known
+from app.plan.speed import known_step_time, step_time
+from app.project.clips.clip_catalog import ClipCatalog, ClipRecord
+from app.project.disk.discarding import progress_of
+from app.project.project import Project
+from app.status import PlanStatus, QueuedClip, QueueStatus, SequenceForecast
+from app.training.own_settings import is_source
+from app.training.service import TrainingService
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
+from engine.errors import EngineError
+from engine.training.plan.forecast import MeasuredClip
+from engine.training.plan.plan import StepSizes, StepTime, TrainingPlan, footage_of, make_plan, resumed_plan
+
+logger = logging.getLogger(__name__)
+
+Kind = tuple[bool, int]
+"""Whether a clip begins with what another one has learned, and its number of frames."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForecastRequest:
+    """What to plan.
+
+    Attributes:
+        basis: What plans depend on: settings, exclusions, and the revision of the catalog of clips.
+        next_clip: None while something trains or nothing is left.
+        can_measure: Whether nothing else computes, so that the machine may be timed.
+    """
+
+    basis: tuple[str, int]
+    next_clip: Clip | None
+    can_measure: bool
+    project: Project = field(compare=False)
+    capture: Capture = field(compare=False)
+    clips: Sequence[Clip] = field(compare=False)
+    catalog: ClipCatalog = field(compare=False)
+
+    def is_answered_by(self, earlier: ForecastRequest) -> bool:
+        """Whether what another request found says as much."""
+        is_timed = earlier.can_measure or not self.can_measure
+        return self.basis == earlier.basis and is_timed and self.next_clip in (None, earlier.next_clip)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plans:
+    """The plan of the next clip, and one for every kind of clip.
+
+    Attributes:
+        free_mb: Room on the disk, 10^6 bytes; None where not known.
+    """
+
+    next: TrainingPlan | None
+    kinds: Mapping[Kind, TrainingPlan]
+    free_mb: float | None = None
+
+
+NO_PLANS, NOTHING = Plans(None, {}), SequenceForecast(0)
+
+
+def clip_forecast(plan: TrainingPlan | None, record: ClipRecord, *, begins_afresh: bool = False) -> SequenceForecast:
+    """Of one clip that does not train.
+
+    Args:
+        plan: Of its kind; None until it was made.
+        record: What lies on disk of it.
+        begins_afresh: Whether it does not resume where it was stopped.
+    """
+    if plan is None:
+        return SequenceForecast(1)
+    if record.resume_step is not None and record.resume_n_steps and not begins_afresh:
+        plan = resumed_plan(plan, record.resume_step, record.resume_n_steps)
+    return SequenceForecast(1, plan.n_steps - plan.steps_done, plan.seconds, plan.disk_mb)
+
+
+def together(parts: Sequence[SequenceForecast]) -> SequenceForecast:
+    """All of them, one after the other."""
+    return SequenceForecast(
+        sum(part.n_clips for part in parts),
+        sum(part.n_steps for part in parts),
+        sum_known([part.seconds for part in parts]),
+        sum_known([part.disk_mb for part in parts]),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """What waits and what is left, without the clip that trains."""
+
+    clips: tuple[QueuedClip, ...] = ()
+    queued: SequenceForecast = NOTHING
+    everything: SequenceForecast = NOTHING
+    stale: SequenceForecast = NOTHING
+
+
+class Forecasts:
+    """Forecasts of the open project. Methods are for one thread and do not wait."""
+
+    def __init__(self) -> None:
+        self._worker: LatestWorker[ForecastRequest, Plans] = LatestWorker("forecasts", self._compute)
+        self._parts: list[SequenceForecast] = []
+        self._kept = Waiting()
+        self._waiting_of: tuple[object, ...] = ()
+        self._progress, self._progress_of = "", (Path(), -1)
+
+    @property
+    def newest(self) -> tuple[ForecastRequest, Plans] | None:
+        """The plans made last."""
+        return self._worker.newest
+
+    def _ask(
+        self, service: TrainingService, project: Project, capture: Capture, *, can_measure: bool
+    ) -> tuple[ForecastRequest, tuple[ForecastRequest, Plans] | None]:
+        """What is to be planned now, and what was planned last of this project; asks for it where that says less."""
+        basis = (f"{project.settings!r} {id(project.document.exclusions)}", service.catalog.revision)
+        is_idle, index = service.worker is None, service.next_clip_index
+        next_clip = service.clips[index] if is_idle and index is not None else None
+        request = ForecastRequest(
+            basis, next_clip, can_measure and is_idle, project, capture, service.clips, service.catalog
+        )
+        newest = self._worker.newest
+        if newest is None or not request.is_answered_by(newest[0]):
+            self._worker.request(request)
+        return request, None if newest is None or newest[0].project is not project else newest
+
+    def next_clip(
+        self, service: TrainingService, project: Project, capture: Capture, *, can_measure: bool
+    ) -> PlanStatus | None:
+        """The plan of the next clip as it is shown, its figures a moment later; None while something trains or nothing
+        is left.
+
+        Args:
+            can_measure: Whether nothing else computes, so that the machine may be timed.
+        """
+        request, newest = self._ask(service, project, capture, can_measure=can_measure)
+        if request.next_clip is None:
+            return None
+        plan = None
+        if newest is not None and (newest[0].next_clip, newest[0].basis) == (request.next_clip, request.basis):
+            plan = newest[1].next  # until the machine is timed
+        can_edit = project.is_writable and not service.catalog.has_finished_clips
+        if self._progress_of != (key := (project.folder, service.catalog.revision)):
+            self._progress_of, self._progress = key, progress_of(project).progress_words
+        return plan_status(project, capture, request.next_clip, plan, can_edit=can_edit, discards=self._progress)
+
+    def queue(self, service: TrainingService, project: Project, capture: Capture, *, can_measure: bool) -> QueueStatus:
+        """The queue as it is shown, its figures a moment later."""
+        _, newest = self._ask(service, project, capture, can_measure=can_measure)
+        plans = NO_PLANS if newest is None else newest[1]
+        running, steps = service.running_clip, service.steps_of_run
+        waiting = self._waiting(service, project, plans.kinds)
+        going = () if running is None else (_running_part(service, self._parts[running]),)
+        queued, everything = together([*going, waiting.queued]), together([*going, waiting.everything])
+        n_done = service.queue.steps_done + steps[0]
+        return QueueStatus(
+            waiting=waiting.clips,
+            failed=tuple(sorted(service.queue.failed.items())),
+            is_held=service.queue.is_held and bool(waiting.clips),
+            is_ending_after=service.is_ending_after,
+            queued=queued if queued.n_clips else None,
+            everything=everything if everything.n_clips else None,
+            stale=waiting.stale if waiting.stale.n_clips else None,
+            progress=n_done / max(n_done + queued.n_steps, 1),
+            n_done=service.queue.n_done,
+            free_mb=plans.free_mb,
+            live_view=service.live_view,
+        )
+
+    def _waiting(self, service: TrainingService, project: Project, kinds: Mapping[Kind, TrainingPlan]) -> Waiting:
+        """What does not depend on the clip that trains; made anew only when something has changed, since clips may be
+        thousands and this is asked for at every change of the picture."""
+        queue, running = service.queue, service.running_clip
+        clips = tuple(queue)
+        own = tuple(index for index in clips if queue.own_settings(index) is not None)
+        waiting_of = (id(service), service.catalog.revision, kinds, running, clips, own)
+        if waiting_of == self._waiting_of:
+            return self._kept
+        self._waiting_of = waiting_of
+        parts = self._parts = _clip_parts(service, project, kinds, own)
+        due = {*service.unfinished, *clips} - {running}
+        self._kept = Waiting(
+            tuple(QueuedClip(index, parts[index].n_steps, parts[index].seconds, index in own) for index in clips),
+            together([parts[index] for index in clips]),
+            together([parts[index] for index in sorted(due)]),
+            together([parts[index] for index in service.stale if index not in queue and index != running]),
+        )
+        return self._kept
+
+    def forget(self) -> None:
+        """Another capture was opened."""
+        self._worker.forget()
+        self._waiting_of = ()
+
+    def close(self) -> None:
+        """End the thread, and the process in which it times the machine."""
+        self._worker.close()
+
+    def _compute(self, request: ForecastRequest) -> Plans:
+        def timed(sizes: StepSizes, phase: str) -> float | None:
+            return step_time(sizes, phase, lambda: not self._worker.is_closed)
+
+        return _plans(request, timed if request.can_measure else known_step_time)
+
+
+def _clip_parts(
+    service: TrainingService, project: Project, kinds: Mapping[Kind, TrainingPlan], own: Sequence[int]
+) -> list[SequenceForecast]:
+    """One per clip, as if none trained. own: Those that begin afresh, with settings of their own."""
+    settings, config = project.settings, project.settings.config()
+    return [
+        clip_forecast(
+            kinds.get((is_source(settings, config, clip.clip_index), clip.n_frames)),
+            service.catalog[clip.clip_index],
+            begins_afresh=clip.clip_index in own,
+        )
+        for clip in service.clips
+    ]
+
+
+def _running_part(service: TrainingService, whole: SequenceForecast) -> SequenceForecast:
+    """What is left of the clip that trains: by its own speed once it has one, else by its plan."""
+    step, n_steps = service.steps_of_run
+    eta_s = service.eta_s
+    if not n_steps:
+        return whole
+    left_s = None if whole.seconds is None else whole.seconds * (1.0 - step / n_steps)
+    return SequenceForecast(1, n_steps - step, left_s if eta_s is None else eta_s, whole.disk_mb)
+
+
+# ---------------------------------------------------------------- on the thread
+
+
+def _plans(request: ForecastRequest, timed: StepTime) -> Plans:
+    free_mb, history = None, clip_history(request.project, len(request.clips))
+    with suppress(OSError):
+        free_mb = shutil.disk_usage(request.project.folder).free / 1e6
+    kinds, next_plan = {}, None
+    try:
+        if request.next_clip is not None:
+            next_plan = plan_clip(
+                request.project,
+                request.capture,
+                request.next_clip,
+                step_time=timed,
+                history=history,
+                catalog=request.catalog,
+            )
+        kinds = _plans_of_kinds(request, timed, history)
+    except EngineError as error:  # training will say the same
+        logger.info("clips cannot be planned: %s", error)
+    return Plans(next_plan, kinds, free_mb)
+
+
+def _plans_of_kinds(
+    request: ForecastRequest, timed: StepTime, history: Sequence[MeasuredClip]
+) -> dict[Kind, TrainingPlan]:
+    project, capture = request.project, request.capture.without(request.project.document.exclusions)
+    config = project.settings.config()
+    footage = footage_of(capture, capture.camera_indices(project.settings.holdout))
+    found = project.headers.read(project.reference_path)
+    reference: ClipHeader | None = None if found is None else found.header
+    plans: dict[Kind, TrainingPlan] = {}
+    # a clip says nothing of itself: one that is not finished can stand for those that are
+    for clip in sorted(request.clips, key=lambda clip: request.catalog[clip.clip_index].state == "trained"):
+        begins_with_other = is_source(project.settings, config, clip.clip_index)
+        kind = (begins_with_other, clip.n_frames)
+        if kind in plans:
+            continue
+        goes_on = begins_with_other and config.independent
+        plans[kind] = make_plan(
+            footage,
+            clip,
+            config.going_on() if goes_on else config,
+            is_source=begins_with_other,
+            reference=reference if begins_with_other else None,
+            history=history,
+            step_time=timed,
+        )
+    return plans
