@@ -355,7 +355,7 @@ def test_what_was_learned_fixes_the_training_settings(make_session):
     poll_until(session, lambda: session.clip_states[0].state == "trained", what="the clip")
     found = planned(session)
     assert (found.clip_index, found.can_edit) == (1, False)
-    assert any("inherited" in reason for _, _, reason in found.lines)
+    assert any(name == "source steps" for name, _ in found.lines)
     session.dispatch(c.SetPreset("toy"))
     assert "fixed" in session.notices[-1].detail
     assert session.project.settings.overrides == {}
