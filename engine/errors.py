@@ -15,7 +15,6 @@ Programming mistakes are assertions or ValueError/TypeError, not these.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from engine.text import printable
 
@@ -52,19 +51,6 @@ class EngineError(Exception):
             return self.message, f"{self.hint} - {self._place}"
         return str(EngineError(self.message, path=self.path)), self.hint
 
-    def __reduce__(self) -> tuple[Any, ...]:  # keeps keyword-only arguments through a process boundary
-        return (_rebuild, (type(self), self.message, self.hint, self.path))
-
-
-def _rebuild(kind: type["EngineError"], message: str, hint: str, path: Path | None) -> "EngineError":
-    return kind(message, hint=hint, path=path)
-
-
-def _rebuild_capture_error(
-    kind: type["CaptureError"], message: str, hint: str, path: Path | None, problems: tuple[EngineError, ...]
-) -> "CaptureError":
-    return kind(message, hint=hint, path=path, problems=problems)
-
 
 class CaptureError(EngineError):
     """A capture folder cannot be used. `problems` lists everything that is wrong, not only the first thing."""
@@ -74,9 +60,6 @@ class CaptureError(EngineError):
     ) -> None:
         self.problems = tuple(problems)
         super().__init__(message, hint=hint, path=path)
-
-    def __reduce__(self) -> tuple[Any, ...]:  # the listed problems cross a process boundary too
-        return (_rebuild_capture_error, (type(self), self.message, self.hint, self.path, self.problems))
 
     def __str__(self) -> str:
         listed = [f"  {problem}" for problem in self.problems[:MAX_LISTED_PROBLEMS]]

@@ -125,7 +125,7 @@ def check_given(options: argparse.Namespace, jobs: Sequence[type[ExportJob]], jo
         raise ProjectError(f"{flag} does not apply to {options.format or job.kind}.", hint="Leave it out.")
 
 
-def chosen_frames(options: argparse.Namespace, opened: TrainedProject) -> range | PickedFrames | None:
+def chosen_frames(options: argparse.Namespace, opened: TrainedProject) -> PickedFrames | None:
     """The frames of --frames, --clip and --step; None for all that are trained. Raises ProjectError where there are no
     such frames."""
     if options.step < 1:
@@ -147,10 +147,10 @@ def chosen_frames(options: argparse.Namespace, opened: TrainedProject) -> range 
                 "--step is given without --frames, and clips between those that are trained are not.",
                 hint="Say which frames: --frames A:B.",
             )
-    return range(chosen.start, chosen.stop, options.step)
+    return PickedFrames.of(range(chosen.start, chosen.stop, options.step))
 
 
-def _frame_ranges(options: argparse.Namespace, n_frames: int) -> range | PickedFrames:
+def _frame_ranges(options: argparse.Namespace, n_frames: int) -> PickedFrames:
     """One range, or several that rise. Raises ProjectError."""
     spans: list[tuple[int, int]] = []
     for part in options.frames.split(","):

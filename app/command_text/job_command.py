@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from msgspec import Struct
-
 from app.command_text.command_text import CommandText
 from app.command_text.quoting import option
 from app.document.project_settings import ProjectSettings
@@ -92,7 +90,8 @@ def export_command(folder: Path, job: ExportJob) -> CommandText:
     for name, value in values.items():
         arguments += _frames_arguments(value) if name == "frames" else _arguments(declared[name], value)
     said = [repr(out), f"format={job.format_name!r}", *(f"{name}={value!r}" for name, value in values.items())]
-    names = tuple(type(value).__name__ for value in values.values() if isinstance(value, PickedFrames | Struct))
+    kinds = {type(value).__name__: repr(value) for value in values.values()}
+    names = tuple(name for name, written in kinds.items() if written.startswith(name))
     return CommandText(tuple(arguments), f"project.{job.command}({', '.join(said)})", folder, names, reads_only=True)
 
 
@@ -105,6 +104,6 @@ def _arguments(setting: Setting, value: Any) -> list[str]:
     return [flag.name, *text.split()] if isinstance(value, tuple) else list(option(flag.name, text))
 
 
-def _frames_arguments(frames: range | PickedFrames) -> list[str]:
+def _frames_arguments(frames: PickedFrames) -> list[str]:
     step = ["--step", str(frames.step)] if frames.step != 1 else []
     return ["--frames", frames_text(frames), *step]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import msgspec
@@ -87,19 +88,19 @@ class ExportContext(msgspec.Struct, frozen=True):
     has_videos: bool = False
     has_edits: bool = False
 
-    def frames(self, choice: FramesChoice, step: int) -> range | PickedFrames:
+    def frames(self, choice: FramesChoice, step: int) -> PickedFrames:
         """The frames of a choice; none where there are none. Those of "all" are trained and may have gaps."""
         if choice == "range":
-            return range(self.in_frame, self.out_frame + 1, step)
+            return PickedFrames.of(range(self.in_frame, self.out_frame + 1, step))
         if choice == "frame":
-            return range(self.frame_index, self.frame_index + 1)
+            return PickedFrames.of(range(self.frame_index, self.frame_index + 1))
         if choice == "clip":
             found = [span for span in self.clips if span[0] <= self.frame_index < span[1]]
         else:
             found = [self.clips[index] for index in sorted(self.trained)]
         return picked_frames(found, step)
 
-    def untrained(self, frames: range | PickedFrames) -> list[tuple[int, int]]:
+    def untrained(self, frames: Sequence[int]) -> list[tuple[int, int]]:
         """First and last frames of the runs of clips that are not trained and that some of the frames lie in."""
         runs: list[tuple[int, int]] = []
         for index, (start, stop) in enumerate(self.clips):

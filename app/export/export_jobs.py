@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Union
 
 from app.export.export_progress import ExportResult, Report
 from app.export.jobs.job import ExportJob
+from app.export.jobs.table import KINDS
 from engine.backends.table import chosen_name
+
+if TYPE_CHECKING:
+    AnyJob = ExportJob
+else:  # one of the kinds, which another process knows by its name
+    AnyJob = Union[tuple(KINDS.values())]  # noqa: UP007
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +29,7 @@ class ExportTask:
         backend: Name of what is computed with.
     """
 
-    job: ExportJob
+    job: AnyJob
     project: str
     capture: str
     scale: float

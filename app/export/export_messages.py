@@ -1,31 +1,33 @@
-"""Messages between the window's process and the one that exports: small typed values, sent as JSON."""
+"""What the window hears of an export."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import msgspec
+from dataclasses import dataclass
 
 from app.export.export_progress import ExportProgress, ExportResult
 
 
-class ExportGoesOn(msgspec.Struct, frozen=True, tag=True):
+@dataclass(frozen=True, slots=True)
+class ExportGoesOn:
     """How far it is."""
 
     progress: ExportProgress
 
 
-class ExportDone(msgspec.Struct, frozen=True, tag=True):
+@dataclass(frozen=True, slots=True)
+class ExportDone:
     """Everything is written."""
 
     result: ExportResult
 
 
-class ExportStopped(msgspec.Struct, frozen=True, tag=True):
+@dataclass(frozen=True, slots=True)
+class ExportStopped:
     """It was cancelled; nothing is left of it."""
 
 
-class ExportFailed(msgspec.Struct, frozen=True, tag=True):
+@dataclass(frozen=True, slots=True)
+class ExportFailed:
     """It could not be done; nothing is left of it."""
 
     message: str
@@ -34,18 +36,3 @@ class ExportFailed(msgspec.Struct, frozen=True, tag=True):
 
 Ending = ExportDone | ExportStopped | ExportFailed
 Event = ExportGoesOn | Ending
-
-CANCEL = b"cancel"
-"""The only command there is."""
-
-_EVENTS = msgspec.json.Decoder(Event, dec_hook=lambda kind, text: Path(text) if kind is Path else text)
-
-
-def encode(event: Event) -> bytes:
-    """One message as JSON."""
-    return msgspec.json.encode(event, enc_hook=str)
-
-
-def decode_event(data: bytes) -> Event:
-    """Inverse of `encode`. Raises msgspec.DecodeError."""
-    return _EVENTS.decode(data)

@@ -24,11 +24,7 @@ class ExportProgress:
 
 
 Report = Callable[[ExportProgress], None]
-"""Told how far an export is. May raise ExportCancelled, which has to pass through."""
-
-
-class ExportCancelled(Exception):
-    """The export is not wanted any more: leave nothing behind."""
+"""Told how far an export is. What it raises ends the export, which then leaves nothing behind."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""PickedFrames: frames with gaps between them, every so many of them, told without listing each."""
+"""PickedFrames: frames of an export, perhaps with gaps between them, without listing each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import overload
 
 @dataclass(frozen=True, slots=True)
 class PickedFrames(Sequence[int]):
-    """Rising frames; a value that can be pickled and compared.
+    """Rising frames; a value that can be compared, and sent to another process.
 
     Attributes:
         runs: Frames without gaps but for the step, none of them empty.
@@ -19,6 +19,15 @@ class PickedFrames(Sequence[int]):
 
     runs: tuple[range, ...]
     step: int = 1
+
+    @staticmethod
+    def of(frames: range) -> PickedFrames:
+        """The same frames."""
+        return PickedFrames((frames,) if frames else (), frames.step)
+
+    def __repr__(self) -> str:
+        """As a script would write it."""
+        return repr(self.runs[0]) if len(self.runs) == 1 else f"PickedFrames({self.runs!r}, {self.step!r})"
 
     def __len__(self) -> int:
         return sum(len(run) for run in self.runs)
@@ -39,8 +48,8 @@ class PickedFrames(Sequence[int]):
         return list(self)[index]
 
 
-def picked_frames(spans: Iterable[tuple[int, int]], step: int) -> range | PickedFrames:
-    """Every so many of the frames from the first one on that lie in one of the spans; a range where there is no gap.
+def picked_frames(spans: Iterable[tuple[int, int]], step: int) -> PickedFrames:
+    """Every so many of the frames from the first one on that lie in one of the spans.
 
     Args:
         spans: First frame and the one after the last, rising.
@@ -52,13 +61,12 @@ def picked_frames(spans: Iterable[tuple[int, int]], step: int) -> range | Picked
         else:
             joined.append((start, stop))
     if not joined:
-        return range(0)
+        return PickedFrames(())
     first = joined[0][0]
     runs = tuple(run for start, stop in joined if (run := range(start + (first - start) % step, stop, step)))
-    return runs[0] if len(runs) == 1 else PickedFrames(runs, step)
+    return PickedFrames(runs, step)
 
 
-def frames_text(frames: range | PickedFrames) -> str:
+def frames_text(frames: PickedFrames) -> str:
     """Frames as the command line takes them, without their step: "A:B,C:D"."""
-    runs = frames.runs if isinstance(frames, PickedFrames) else (frames,)
-    return ",".join(f"{run.start}:{run.stop}" for run in runs)
+    return ",".join(f"{run.start}:{run.stop}" for run in frames.runs)

@@ -61,7 +61,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     Raises:
         ProjectError: What `estimate` raises.
         DiskError: The disk refused; nothing is left behind.
-        ExportCancelled: From `report`; nothing is left behind.
+        Unwanted: From `report`; nothing is left behind.
     """
     report(ExportProgress(0, 0, message="Reading clips"))
     expected = estimate(opened, job)

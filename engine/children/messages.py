@@ -1,6 +1,6 @@
 """What crosses between processes: values of declared types as MessagePack, so that receiving one never runs code.
 
-Besides what msgspec knows, paths and small arrays may be part of them. Large arrays cross as files.
+Besides what msgspec knows, paths, ranges and small arrays may be part of them. Large arrays cross as files.
 """
 
 from __future__ import annotations
@@ -120,6 +120,8 @@ def _plain(value: object) -> object:
         return value.item()
     if isinstance(value, Path):
         return str(value)
+    if isinstance(value, range):
+        return value.start, value.stop, value.step
     raise NotImplementedError(f"{type(value)} cannot cross between processes")
 
 
@@ -129,4 +131,6 @@ def _special(kind: type, value: Any) -> object:
         return np.frombuffer(bytearray(data), dtype).reshape(shape)
     if issubclass(kind, Path):
         return Path(value)
+    if kind is range:
+        return range(*msgspec.convert(value, tuple[int, int, int]))
     raise NotImplementedError(f"{kind} cannot cross between processes")

@@ -47,10 +47,20 @@ class ChildProcess(Generic[Job, Event, Result]):
         kind: What it does.
         job: What it is asked.
         folder: What the child removes where this process has died before it.
+        sweep: Called with the child's number once it has died without an answer; removes what it would have removed
+            itself.
     """
 
-    def __init__(self, kind: ChildKind[Job, Event, Result], job: Job, *, folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        kind: ChildKind[Job, Event, Result],
+        job: Job,
+        *,
+        folder: Path | None = None,
+        sweep: Callable[[int], None] = lambda pid: None,
+    ) -> None:
         self.kind = kind
+        self._sweep = sweep
         self.still_s = 0.0
         """For how long it has done no work."""
         self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
@@ -162,6 +172,7 @@ class ChildProcess(Generic[Job, Event, Result]):
                 process.kill()
         code = process.wait()
         if not self.is_over:
+            self._sweep(process.pid)
             self._end_with(self._death(code))
         process.stdout.close()
         self._said.close()

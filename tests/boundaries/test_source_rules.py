@@ -41,15 +41,6 @@ BANNED_MODULES = {
 BANNED_CALLS = {"eval", "exec", "compile", "__import__"}
 BANNED_ATTRIBUTES = {("torch", "save"), ("torch", "load"), ("os", "system"), ("os", "fork")}
 
-BYTES_ONLY = (
-    "app/background/children.py",
-    "app/export/export_process.py",
-    "app/export/export_worker.py",
-    "app/training/process.py",
-    "app/training/worker.py",
-)
-"""Modules whose processes are of multiprocessing still; they send bytes that they encode themselves."""
-
 MAX_FILES = 15
 LARGE_FOLDERS = {
     "app/export": "",
@@ -120,7 +111,6 @@ def test_our_code_uses_no_pickle_eval_or_network() -> None:
     files = python_files()
     assert len(files) > 20, "the packages were not found"
     found = [f"{path.relative_to(ROOT)}:{use}" for path in files for use in banned_uses(path.read_text("utf-8"))]
-    found = [use for use in found if not (use.startswith(BYTES_ONLY) and "multiprocessing" in use)]
     assert not found, "\n".join(found)
 
 

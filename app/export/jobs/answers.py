@@ -76,12 +76,12 @@ class Answers:
         return kind(**{name: setting.parse(text) for name, setting in declared.items() if (text := self[name])})
 
     @property
-    def frames(self) -> range | PickedFrames:
+    def frames(self) -> PickedFrames:
         """The chosen frames."""
         return self.context.frames(self.choices.frames, self._step)
 
     @property
-    def _job_frames(self) -> range | PickedFrames | None:
+    def _job_frames(self) -> PickedFrames | None:
         """The same as jobs take them: None for all that are trained."""
         return None if self.choices.frames == "all" and self._step == 1 else self.frames
 

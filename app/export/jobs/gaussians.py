@@ -40,7 +40,7 @@ class GaussiansJob(ExportJob, frozen=True):
     format: Annotated[
         str, option("What is written", "Format", answers={name: (row.title, row.use) for name, row in FORMATS.items()})
     ] = "ply"
-    frames: Annotated[range | PickedFrames | None, FRAMES] = None
+    frames: Annotated[PickedFrames | None, FRAMES] = None
     part: Annotated[
         WrittenPart,
         option(

@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast
 
 from msgspec import Meta
+from msgspec.structs import force_setattr
 
 from app.export.export_progress import ExportEstimate, ExportResult, Report
 from app.export.jobs.question import Question
+from app.export.picked_frames import PickedFrames
 from engine.setting import Declared, Flag, setting, settings_of
 
 if TYPE_CHECKING:
@@ -61,7 +63,7 @@ class JobModule(Protocol):
         ...
 
 
-class ExportJob(Declared, frozen=True):
+class ExportJob(Declared, frozen=True, tag=True):
     """What is asked for. Raises ProjectError for a value that an option may not have.
 
     Attributes:
@@ -86,6 +88,11 @@ class ExportJob(Declared, frozen=True):
     is_prefixed: ClassVar[bool] = False
     needs_trained: ClassVar[bool] = False
     has_step: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if isinstance(frames := getattr(self, "frames", None), range):  # as scripts usually have them
+            force_setattr(self, "frames", PickedFrames.of(frames))
+        super().__post_init__()
 
     @property
     def applies_edits(self) -> bool:

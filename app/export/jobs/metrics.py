@@ -28,7 +28,7 @@ class MetricsJob(ExportJob, frozen=True):
             },
         ),
     ] = "csv"
-    frames: Annotated[range | PickedFrames | None, FRAMES] = None
+    frames: Annotated[PickedFrames | None, FRAMES] = None
 
     @classmethod
     def suffix(cls, format_name: str) -> str:

@@ -19,7 +19,7 @@ class PlayerJob(ExportJob, frozen=True):
     work: ClassVar[str] = "app.export.player_job"
     needs_trained: ClassVar[bool] = True
 
-    frames: Annotated[range | PickedFrames | None, FRAMES] = None
+    frames: Annotated[PickedFrames | None, FRAMES] = None
     has_folder: Annotated[
         bool | None,
         option(

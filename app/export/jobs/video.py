@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from app.export.jobs.job import EDITS, FRAMES, ExportJob, option
 from app.export.jobs.question import Question
+from app.export.picked_frames import PickedFrames
 from app.export.video.formats import FORMATS
 from engine.errors import ProjectError
 from engine.setting import Declared, Flag, Writing
@@ -129,7 +130,7 @@ class VideoJob(ExportJob, frozen=True):
             one_of=VIEW,
         ),
     ] = None
-    frames: Annotated[range | None, FRAMES] = None
+    frames: Annotated[PickedFrames | None, FRAMES] = None
     shows: Annotated[
         PassName,
         option(
@@ -282,7 +283,7 @@ class VideoJob(ExportJob, frozen=True):
         # of time, which gaps between trained clips do not matter to
         has_own_frames = answers.choices.frames == "all" and (kind == "path" or not is_still)
         frames = answers.frames
-        entries["frames"] = None if has_own_frames or not frames else range(frames[0], frames[-1] + 1)
+        entries["frames"] = None if has_own_frames or not frames else PickedFrames.of(range(frames[0], frames[-1] + 1))
         is_clear = answers["background"] == CLEAR
         return entries | ({"background": (0, 0, 0), "is_transparent": True} if is_clear else {})
 
@@ -297,7 +298,7 @@ class VideoJob(ExportJob, frozen=True):
             raise ProjectError(
                 "Pictures are taken from a camera, along a path or on a turntable: give one of these three."
             )
-        if self.frames is not None and (self.frames.step != 1 or not self.frames):
+        if self.frames is not None and (self.frames.step != 1 or len(self.frames.runs) != 1):
             raise ProjectError("A video has frames without gaps, at least one.", hint="Give a range without step.")
         if self.turntable is not None and not self.turntable.n_turns:
             raise ProjectError("A turntable of 0 turns does not move.", hint="Give a number of turns, such as 1.")

@@ -129,13 +129,14 @@ def _runs(job: VideoJob, scene: SceneFrames, path: CameraPath | None) -> list[ra
         if path is not None and len(path.keys) > 1:
             return [_frames_of(path, None if job.hold is not None else n_frames)]
         return runs_of(range(n_frames) if job.hold is not None else scene.trained_frames)
-    first, stop = job.frames.start, job.frames.stop
+    (chosen,) = job.frames.runs
+    first, stop = chosen.start, chosen.stop
     if not 0 <= first < stop <= n_frames:
         raise ProjectError(
             f"Frames {first}:{stop} were asked for, not all of which are in the capture.",
             hint=f"It has frames 0 to {n_frames - 1}.",
         )
-    return [job.frames]
+    return [chosen]
 
 
 def _frames_of(path: CameraPath, n_frames: int | None) -> range:

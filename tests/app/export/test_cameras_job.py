@@ -11,9 +11,10 @@ import pytest
 
 from app.evaluation.headless import TrainedProject
 from app.export.cameras_job import WORLD, CamerasJob, estimate, run
-from app.export.export_progress import ExportCancelled, ExportProgress
+from app.export.export_progress import ExportProgress
 from engine.camera.corrections import N_VALUES, corrected
 from engine.capture.colmap.model_cameras import read_rig
+from engine.children.kind import Unwanted
 from engine.clip_files.array_names import CORRECTIONS
 from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
@@ -79,9 +80,9 @@ def test_a_folder_that_is_taken_and_a_cancelled_export(opened: TrainedProject, t
         run(opened, CamerasJob(taken), nothing)
 
     def cancel(progress: ExportProgress) -> None:
-        raise ExportCancelled
+        raise Unwanted
 
     (tmp_path / "out").mkdir()
-    with pytest.raises(ExportCancelled):
+    with pytest.raises(Unwanted):
         run(opened, CamerasJob(tmp_path / "out" / "new"), cancel)
     assert list((tmp_path / "out").iterdir()) == []

@@ -22,6 +22,7 @@ from app.export.export_progress import ExportProgress
 from app.export.gaussians_job import GaussiansJob
 from app.export.gaussians_job import run as export_gaussians
 from app.export.jobs.video import VideoJob
+from app.export.picked_frames import PickedFrames
 from app.export.player_job import PlayerJob
 from app.export.player_job import run as export_player
 from app.export.video.render import render_video
@@ -216,7 +217,7 @@ def test_players_hold_it_in_its_frames_alone(name: str, opened: TrainedProject, 
     pages = []
     for has_edits in (False, True):
         out = tmp_path / f"scene{has_edits}.html"
-        export_player(opened, PlayerJob(out, range(6), has_edits=has_edits), ignore)
+        export_player(opened, PlayerJob(out, PickedFrames.of(range(6)), has_edits=has_edits), ignore)
         pages.append(READER["Page"](out))
     plain, edited = pages
     assert plain.n_frames == edited.n_frames == 6
@@ -237,7 +238,9 @@ def test_renders_show_it_in_its_frames_alone(name: str, opened: TrainedProject, 
     for has_edits in (False, True):
         out = tmp_path / f"pictures{has_edits}"
         camera = opened.capture.rig.names[2]
-        render_video(VideoJob(out, "png", camera=camera, frames=range(0, 6), has_edits=has_edits), opened)
+        render_video(
+            VideoJob(out, "png", camera=camera, frames=PickedFrames.of(range(0, 6)), has_edits=has_edits), opened
+        )
         pictures.append(contents(out))
     assert in_scope([one != other for one, other in zip(*pictures, strict=True)], name)
 
@@ -246,7 +249,9 @@ def test_renders_show_it_in_its_frames_alone(name: str, opened: TrainedProject, 
 def test_videos_show_it_in_its_frames_alone(format_name: str, opened: TrainedProject, tmp_path: Path) -> None:
     give(opened, Edit(1, "", Everything(), Delete(), SCOPE))
     out = tmp_path / f"film.{format_name}"
-    render_video(VideoJob(out, format_name, camera=opened.capture.rig.names[2], frames=range(0, 6)), opened)
+    render_video(
+        VideoJob(out, format_name, camera=opened.capture.rig.names[2], frames=PickedFrames.of(range(0, 6))), opened
+    )
     with av.open(str(out)) as container:
         brightness = [float(frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)]
     assert in_scope([value < 20.0 for value in brightness])
@@ -255,7 +260,9 @@ def test_videos_show_it_in_its_frames_alone(format_name: str, opened: TrainedPro
 def test_a_moment_between_two_frames_belongs_to_the_one_before(opened: TrainedProject, tmp_path: Path) -> None:
     """At the seam between two clips, too, where the pictures of both are mixed."""
     give(opened, Edit(1, "", Everything(), Delete(), Scope(2, 3)))
-    job = VideoJob(tmp_path / "slow", "png", camera=opened.capture.rig.names[2], frames=range(0, 6), speed=0.5)
+    job = VideoJob(
+        tmp_path / "slow", "png", camera=opened.capture.rig.names[2], frames=PickedFrames.of(range(0, 6)), speed=0.5
+    )
     render_video(job, opened)
     sizes = [len(data) for data in contents(tmp_path / "slow")]
     assert [size < 0.2 * max(sizes) for size in sizes] == [number in (4, 5) for number in range(len(sizes))]

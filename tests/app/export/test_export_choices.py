@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import pickle
-
 import msgspec
 import pytest
 
 from app.export.export_choices import ExportChoices, ExportContext
+from app.export.picked_frames import PickedFrames
+from engine.children.messages import decoded, encoded
 
 CONTEXT = ExportContext(
     name="p",
@@ -54,13 +54,13 @@ def test_frames_that_are_left_out_belong_to_a_kind_too():
 def test_frames_of_a_choice(choice, step, frames):
     found = CONTEXT.frames(choice, step)
     assert list(found) == frames
-    assert pickle.loads(pickle.dumps(found)) == found
+    assert decoded(encoded(found), PickedFrames) == found
     assert (len(found), found.step, [frame for frame in range(12) if frame in found]) == (len(frames), step, frames)
 
 
-def test_frames_without_gaps_are_a_range():
-    assert msgspec.structs.replace(CONTEXT, trained=(0, 1)).frames("all", 3) == range(0, 8, 3)
-    assert msgspec.structs.replace(CONTEXT, trained=(1,)).frames("all", 1) == range(4, 8)
+def test_frames_without_gaps_are_written_as_a_range():
+    assert repr(msgspec.structs.replace(CONTEXT, trained=(0, 1)).frames("all", 3)) == "range(0, 8, 3)"
+    assert repr(msgspec.structs.replace(CONTEXT, trained=(1,)).frames("all", 1)) == "range(4, 8)"
     assert isinstance(hash(CONTEXT.frames("all", 1)), int)
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,9 +13,18 @@ from app.export.export_jobs import ExportTask
 from app.export.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn, ExportStopped
 from app.export.export_process import ExportProcess
 from app.export.export_progress import ExportProgress
-from app.export.export_worker import Wanted
-from app.export.metrics_job import MetricsJob
+from app.export.export_worker import reporting
+from app.export.jobs.cameras import CamerasJob
+from app.export.jobs.gaussians import GaussiansJob
+from app.export.jobs.job import ExportJob
+from app.export.jobs.metrics import MetricsJob
+from app.export.jobs.player import PlayerJob
+from app.export.jobs.table import KINDS
+from app.export.jobs.video import Turntable, VideoJob
+from app.export.picked_frames import PickedFrames
 from app.project.opening.project_access import open_project
+from engine.children.kind import Unwanted
+from engine.children.messages import decoded, encoded
 from engine.storage.files import PARTIAL_PREFIX
 
 DEADLINE_S = 120.0
@@ -35,7 +41,7 @@ def start(project: Path, tmp_path: Path) -> Iterator[Start]:
         settings = open_project(project, is_writable=False).settings
         out = entries.pop("out", tmp_path / "out" / "m.csv")
         task = ExportTask(MetricsJob(out), str(project), settings.capture, 1.0, None, False, 1)
-        processes.append(ExportProcess(task, **entries))
+        processes.append(ExportProcess(task))
         return processes[-1]
 
     yield begin
@@ -72,14 +78,13 @@ def test_it_writes_and_tells_how_far_it_is(start: Start, tmp_path: Path):
 def test_a_killed_process_is_reported_and_what_it_began_disappears(start: Start, tmp_path: Path):
     process = start()
     until(process, bool)  # it is at work
-    pid = process.process.pid
-    assert pid is not None
+    pid = process.child.pid
     begun = tmp_path / "out" / f"{PARTIAL_PREFIX}{pid}-m"
     begun.mkdir()
     (begun / "half").write_text("half")
     stranger = tmp_path / "out" / f"{PARTIAL_PREFIX}{pid}1-m.csv"
     stranger.write_text("of another process")
-    os.kill(pid, signal.SIGKILL)
+    process.child.kill()
     ending = until(process, is_over)[-1]
     if isinstance(ending, ExportDone):  # it was faster
         pytest.skip("it was done before it was killed")
@@ -95,25 +100,6 @@ def test_a_cancelled_process_ends_and_leaves_nothing(start: Start, tmp_path: Pat
     process.cancel()
     assert isinstance(until(process, is_over)[-1], ExportStopped)
     assert list((tmp_path / "out").iterdir()) == []
-
-
-def test_nothing_waits_for_a_process_that_does_not_start(start: Start, monkeypatch: pytest.MonkeyPatch):
-    may_go_on = threading.Event()
-
-    def refuse(process: object) -> None:
-        assert may_go_on.wait(DEADLINE_S)
-        raise OSError(11, "Resource temporarily unavailable")
-
-    monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", refuse)
-    process = start()
-    assert process.poll() == []
-    process.cancel()
-    process.end(timeout_s=0.0)
-    assert process.poll() == []
-    may_go_on.set()
-    ending = until(process, is_over)[-1]
-    assert isinstance(ending, ExportFailed)
-    assert "Resource temporarily unavailable" in ending.message
 
 
 def test_ending_it_leaves_nothing(start: Start, tmp_path: Path):
@@ -132,38 +118,49 @@ def test_what_cannot_be_written_is_told_in_words(start: Start, tmp_path: Path):
     assert "Choose another place" in ending.hint
 
 
-class FakePipe:
-    """A pipe to nobody, or one through which a cancel came."""
+class FakeParent:
+    """Hears what is reported, for as long as it is wanted."""
 
-    def __init__(self, *, has_command: bool = False, is_broken: bool = False) -> None:
-        self.sent: list[bytes] = []
-        self._has_command, self._is_broken = has_command, is_broken
+    def __init__(self, *, is_wanted: bool = True) -> None:
+        self.heard: list[ExportProgress] = []
+        self._is_wanted = is_wanted
 
-    def poll(self, _: float) -> bool:
-        return self._has_command
+    def receive(self, _: float) -> None:
+        if not self._is_wanted:
+            raise Unwanted
 
-    def recv_bytes(self) -> bytes:
-        return b"cancel"
-
-    def send_bytes(self, data: bytes) -> None:
-        if self._is_broken:
-            raise BrokenPipeError
-        self.sent.append(data)
+    def report(self, progress: ExportProgress) -> None:
+        self.heard.append(progress)
 
 
-@pytest.mark.parametrize(
-    ("commands", "events"), [(FakePipe(has_command=True), FakePipe()), (FakePipe(), FakePipe(is_broken=True))]
-)
-def test_a_report_raises_once_nobody_wants_the_export(commands: Any, events: Any):
-    from app.export.export_progress import ExportCancelled
-
-    with pytest.raises(ExportCancelled):
-        Wanted(commands, events).report(ExportProgress(0, 3))
+def test_a_report_raises_once_nobody_wants_the_export():
+    parent: Any = FakeParent(is_wanted=False)
+    with pytest.raises(Unwanted):
+        reporting(parent)(ExportProgress(0, 3))
 
 
-def test_reports_are_not_told_more_often_than_anybody_reads():
-    events: Any = FakePipe()
-    wanted = Wanted(FakePipe(), events)  # type: ignore[arg-type]
+def test_no_more_is_reported_than_anybody_reads():
+    parent: Any = FakeParent()
+    report = reporting(parent)
     for n_done in range(1001):
-        wanted.report(ExportProgress(n_done, 1000))
-    assert 2 <= len(events.sent) < 50
+        report(ExportProgress(n_done, 1000))
+    assert 2 <= len(parent.heard) < 50
+
+
+EVERY_KIND = [
+    GaussiansJob(Path("/out"), frames=PickedFrames((range(0, 4, 2), range(10, 20, 2)), 2), scale=2.0, up="-y"),
+    VideoJob(
+        Path("/a.mp4"), "mp4", turntable=Turntable(), hold=3.0, frames=PickedFrames.of(range(2, 5)), size=(64, 48)
+    ),
+    VideoJob(Path("/a"), "png", camera="cam", background=(1, 2, 3)),
+    PlayerJob(Path("/a.html"), has_folder=False),
+    MetricsJob(Path("/m.json"), "json", PickedFrames.of(range(20))),
+    CamerasJob(Path("/cameras")),
+]
+
+
+@pytest.mark.parametrize("job", EVERY_KIND, ids=lambda job: job.kind)
+def test_every_kind_of_export_crosses_to_its_process(job: ExportJob):
+    task = ExportTask(job, "/p", "/c", 0.5, (0, 7), True, n_threads=2, backend="cpu")
+    assert decoded(encoded(task), ExportTask) == task
+    assert {type(one) for one in EVERY_KIND} == {*KINDS.values()}

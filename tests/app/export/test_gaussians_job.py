@@ -17,11 +17,13 @@ from msgspec import structs
 from app.document.changes import world_changes
 from app.evaluation.headless import TrainedProject, open_trained
 from app.export import gaussian_sequence, gaussians_job, read_back
-from app.export.export_progress import ExportCancelled, ExportProgress
+from app.export.export_progress import ExportProgress
 from app.export.gaussian_files import GaussianFile, base_name, moment_files, static_file
 from app.export.gaussians_job import GaussiansJob, estimate, run
+from app.export.picked_frames import PickedFrames
 from app.export.scene_frames import Part, SceneFrames
 from app.project.opening.project_access import open_project
+from engine.children.kind import Unwanted
 from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.splats import Splats
@@ -49,7 +51,7 @@ def sidecar(folder: Path) -> dict:
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_holds_what_the_frame_decodes_and_looks_like_it(opened: TrainedProject, tmp_path: Path, name: str):
     out, suffix = tmp_path / "out", FORMATS[name].suffix
-    result = run(opened, GaussiansJob(out, name, range(1, 5)), quiet)
+    result = run(opened, GaussiansJob(out, name, PickedFrames.of(range(1, 5))), quiet)
     assert names(out) == [*(f"p_{frame:04d}{suffix}" for frame in range(1, 5)), "p_export.json"]
     document = sidecar(out)
     assert result.psnr_db == document["psnr_db"]
@@ -66,7 +68,9 @@ def test_every_format_holds_what_the_frame_decodes_and_looks_like_it(opened: Tra
 
 
 def test_the_document_says_what_the_files_are(opened: TrainedProject, tmp_path: Path):
-    result = run(opened, GaussiansJob(tmp_path / "out", "spz", range(0, 6, 2), up="+z", scale=2.0), quiet)
+    result = run(
+        opened, GaussiansJob(tmp_path / "out", "spz", PickedFrames.of(range(0, 6, 2)), up="+z", scale=2.0), quiet
+    )
     document = sidecar(tmp_path / "out")
     assert document["schema"] == 1
     assert (document["project"], document["first_frame"], document["last_frame"], document["n_frames"]) == (
@@ -86,7 +90,7 @@ def test_the_document_says_what_the_files_are(opened: TrainedProject, tmp_path: 
 
 
 def test_a_scene_that_is_turned_and_scaled_still_measures_well(opened: TrainedProject, tmp_path: Path):
-    job = GaussiansJob(tmp_path / "out", "ply", range(2, 3), up="+z", scale=3.0, axes="rub")
+    job = GaussiansJob(tmp_path / "out", "ply", PickedFrames.of(range(2, 3)), up="+z", scale=3.0, axes="rub")
     assert (run(opened, job, quiet).psnr_db or 0) > 60
     found = read(tmp_path / "out" / "p.ply", "ply")
     live = Splats.of(SceneFrames(opened).gaussians(2))
@@ -95,7 +99,7 @@ def test_a_scene_that_is_turned_and_scaled_still_measures_well(opened: TrainedPr
 
 
 def test_full_fields_are_read_back_and_measured_as_others(opened: TrainedProject, tmp_path: Path):
-    job = GaussiansJob(tmp_path / "out", frames=range(2, 3), fields="full")
+    job = GaussiansJob(tmp_path / "out", frames=PickedFrames.of(range(2, 3)), fields="full")
     result = run(opened, job, quiet)
     assert (result.psnr_db or 0) > 60
     path = tmp_path / "out" / "p.ply"
@@ -103,7 +107,7 @@ def test_full_fields_are_read_back_and_measured_as_others(opened: TrainedProject
     live = Splats.of(SceneFrames(opened).gaussians(2))
     np.testing.assert_array_equal(read(path, "ply").means, live.means)
     assert sidecar(tmp_path / "out")["settings"]["fields"] == "full"
-    usual = estimate(opened, GaussiansJob(tmp_path / "o", frames=range(2, 3)))
+    usual = estimate(opened, GaussiansJob(tmp_path / "o", frames=PickedFrames.of(range(2, 3))))
     assert estimate(opened, job).n_bytes == pytest.approx(usual.n_bytes * 248 / 56)
     wrongs: tuple[dict[str, Any], ...] = ({"format": "spz", "fields": "full"}, {"fields": "all"})
     for wrong in wrongs:
@@ -113,18 +117,18 @@ def test_full_fields_are_read_back_and_measured_as_others(opened: TrainedProject
 
 
 def test_parts_are_the_whole(opened: TrainedProject, tmp_path: Path):
-    run(opened, GaussiansJob(tmp_path / "split", "ply", range(3), part="split"), quiet)
+    run(opened, GaussiansJob(tmp_path / "split", "ply", PickedFrames.of(range(3)), part="split"), quiet)
     assert names(tmp_path / "split") == [
         *("p_export.json", "p_moving_0000.ply", "p_moving_0001.ply", "p_moving_0002.ply", "p_static.ply")
     ]
-    run(opened, GaussiansJob(tmp_path / "all", "ply", range(3)), quiet)
+    run(opened, GaussiansJob(tmp_path / "all", "ply", PickedFrames.of(range(3))), quiet)
     still = read(tmp_path / "split" / "p_static.ply", "ply")
     for frame in range(3):
         moving = read(tmp_path / "split" / f"p_moving_{frame:04d}.ply", "ply")
         whole = read(tmp_path / "all" / f"p_{frame:04d}.ply", "ply")
         np.testing.assert_array_equal(np.concatenate([still.means, moving.means]), whole.means)
     run(opened, GaussiansJob(tmp_path / "static", "spz", None, part="static"), quiet)
-    run(opened, GaussiansJob(tmp_path / "moving", "spz", range(4, 5), part="moving"), quiet)
+    run(opened, GaussiansJob(tmp_path / "moving", "spz", PickedFrames.of(range(4, 5)), part="moving"), quiet)
     assert names(tmp_path / "moving") == ["p_export.json", "p_moving.spz"]
 
 
@@ -167,7 +171,7 @@ def test_a_project_with_another_name_gives_it_to_its_files(project: Path, tmp_pa
 
     renamed = project.rename(tmp_path / "Tänzer 数 100%s {x}")
     opened = open_trained(open_project(renamed, is_writable=False))
-    run(opened, GaussiansJob(tmp_path / "out", "splat", range(1)), quiet)
+    run(opened, GaussiansJob(tmp_path / "out", "splat", PickedFrames.of(range(1))), quiet)
     assert names(tmp_path / "out") == ["Tänzer 数 100%s {x}.splat", "Tänzer 数 100%s {x}_export.json"]
     document = json.loads((tmp_path / "out" / "Tänzer 数 100%s {x}_export.json").read_text(encoding="utf-8"))
     assert document["project"] == "Tänzer 数 100%s {x}"
@@ -206,7 +210,7 @@ def test_files_are_written_with_as_many_threads_as_the_process_may_use(
 
     monkeypatch.setattr(gaussians_job, "use_threads", lambda _: n_threads)
     monkeypatch.setattr(gaussian_sequence, "ThreadPoolExecutor", Pool)
-    run(opened, GaussiansJob(tmp_path / "out", "ply", range(2)), quiet)
+    run(opened, GaussiansJob(tmp_path / "out", "ply", PickedFrames.of(range(2))), quiet)
     assert pools == [n_writers]
 
 
@@ -224,13 +228,13 @@ def at_frame(n: int, act: Callable[[], None]) -> Callable[[ExportProgress], None
 
 
 def cancel() -> None:
-    raise ExportCancelled
+    raise Unwanted
 
 
 def test_a_cancelled_export_leaves_nothing(opened: TrainedProject, tmp_path: Path):
     before = names(tmp_path)
     for n in (0, 3, 6):
-        with pytest.raises(ExportCancelled):
+        with pytest.raises(Unwanted):
             run(opened, GaussiansJob(tmp_path / "out", "spz"), at_frame(n, cancel))
         assert names(tmp_path) == before
 
@@ -278,7 +282,7 @@ def test_untrained_clips_are_named_before_anything_is_made(opened: TrainedProjec
     opened.project.clip_path(1).unlink()
     before = names(tmp_path)
     with pytest.raises(ProjectError, match="Frame 3 lies in clip 1, which is not trained") as error:
-        run(opened, GaussiansJob(tmp_path / "out", frames=range(6)), quiet)
+        run(opened, GaussiansJob(tmp_path / "out", frames=PickedFrames.of(range(6))), quiet)
     assert "--frames 0:3" in error.value.hint
     assert names(tmp_path) == before
     run(opened, GaussiansJob(tmp_path / "out"), quiet)  # all trained frames
@@ -326,7 +330,7 @@ def test_a_file_that_does_not_look_like_the_scene_is_a_warning(
         return found
 
     monkeypatch.setattr("app.export.gaussians_job.FORMATS", {"ply": FORMATS["ply"]._replace(read=pale)})
-    result = run(opened, GaussiansJob(tmp_path / "out", frames=range(1)), quiet)
+    result = run(opened, GaussiansJob(tmp_path / "out", frames=PickedFrames.of(range(1))), quiet)
     assert result.psnr_db is not None
     assert 10 < result.psnr_db < 50
     (warning,) = [line for line in result.lines if line.startswith("Warning")]
@@ -342,7 +346,7 @@ def test_many_measured_files_are_one_line(opened: TrainedProject, tmp_path: Path
 
 def test_large_pictures_are_compared_smaller(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(read_back, "LONGEST_SIDE_PX", 12)
-    assert (run(opened, GaussiansJob(tmp_path / "out", frames=range(1)), quiet).psnr_db or 0) > 60
+    assert (run(opened, GaussiansJob(tmp_path / "out", frames=PickedFrames.of(range(1))), quiet).psnr_db or 0) > 60
 
 
 def test_a_part_without_gaussians_is_written_and_said(
@@ -351,7 +355,7 @@ def test_a_part_without_gaussians_is_written_and_said(
     gaussians = SceneFrames.gaussians
     monkeypatch.setattr(SceneFrames, "gaussians", lambda self, frame, part: gaussians(self, frame, part)[:0])
     for name in FORMATS:
-        result = run(opened, GaussiansJob(tmp_path / name, name, range(2)), quiet)
+        result = run(opened, GaussiansJob(tmp_path / name, name, PickedFrames.of(range(2))), quiet)
         assert any("2 files hold no Gaussians" in line for line in result.lines)
         assert result.psnr_db == 100.0
 
@@ -362,7 +366,7 @@ def test_up_and_scale_are_those_of_the_project_unless_others_are_asked_for(proje
     writable.change(said, "set up and scale")
     writable.close()
     opened = open_trained(open_project(project, is_writable=False))
-    job = GaussiansJob(tmp_path / "out", frames=range(1), up="+z")
+    job = GaussiansJob(tmp_path / "out", frames=PickedFrames.of(range(1)), up="+z")
     assert estimate(opened, job).lines == ("Coordinates: turned so that +z is up, 0.25 units per unit of the capture.",)
     run(opened, job, quiet)
     assert sidecar(tmp_path / "out")["up"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)

@@ -12,8 +12,10 @@ import pytest
 
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import TrainedProject
-from app.export.export_progress import ExportCancelled, ExportProgress
+from app.export.export_progress import ExportProgress
 from app.export.metrics_job import NOT_MEASURED, MetricsJob, estimate, run
+from app.export.picked_frames import PickedFrames
+from engine.children.kind import Unwanted
 from engine.errors import DiskError, ProjectError
 from engine.training.config import TrainConfig
 from tests.app.lab.report.made_up import Measure
@@ -84,7 +86,7 @@ def test_the_better_choice_of_figures_counts(opened: TrainedProject, tmp_path: P
 
 def test_json_has_clips_neighbours_and_all_settings(opened: TrainedProject, tmp_path: Path):
     known = measure(opened, [0, 1])
-    result = run(opened, MetricsJob(tmp_path / "m.json", "json", range(2, 6, 2)), nothing)
+    result = run(opened, MetricsJob(tmp_path / "m.json", "json", PickedFrames.of(range(2, 6, 2))), nothing)
     found = json.loads(result.path.read_text())
     assert found["schema"] == 1
     assert found["cameras"] == ["0", "1", "2", "3"]
@@ -104,7 +106,7 @@ def test_untrained_clips_are_left_out_and_said(opened: TrainedProject, tmp_path:
     assert estimate(opened, MetricsJob(tmp_path / "m.csv")).lines == ("1 clip is not trained and left out.",)
     assert len(read(run(opened, MetricsJob(tmp_path / "m.csv"), nothing).path)) == 12
     with pytest.raises(ProjectError, match="None of these frames is trained"):
-        estimate(opened, MetricsJob(tmp_path / "m.csv", frames=range(4, 6)))
+        estimate(opened, MetricsJob(tmp_path / "m.csv", frames=PickedFrames.of(range(4, 6))))
 
 
 def test_the_estimate_is_near_what_is_written(opened: TrainedProject, tmp_path: Path):
@@ -123,9 +125,9 @@ def test_a_cancelled_export_leaves_nothing_and_what_was_there_stays(opened: Trai
 
     def cancel(progress: ExportProgress) -> None:
         if progress.n_done == 1:
-            raise ExportCancelled
+            raise Unwanted
 
-    with pytest.raises(ExportCancelled):
+    with pytest.raises(Unwanted):
         run(opened, MetricsJob(out / "m.csv"), cancel)
     assert [(path.name, path.read_text()) for path in out.iterdir()] == [("m.csv", "before")]
 

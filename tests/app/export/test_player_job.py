@@ -13,11 +13,13 @@ import pytest
 
 from app.evaluation.headless import TrainedProject
 from app.export import player_job
-from app.export.export_progress import ExportCancelled, ExportProgress
+from app.export.export_progress import ExportProgress
+from app.export.picked_frames import PickedFrames
 from app.export.player_job import PlayerJob, estimate, run
 from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
 from app.playback.views.orbit_view import OrbitView
+from engine.children.kind import Unwanted
 from engine.conventions import ALPHA_MIN
 from engine.errors import EngineError, ProjectError
 
@@ -37,7 +39,7 @@ def header_of(page: Path) -> dict[str, Any]:
 def test_frames_are_those_of_the_scene(opened: TrainedProject, tmp_path: Path):
     out = tmp_path / "out" / "scene.html"
     told: list[ExportProgress] = []
-    result = run(opened, PlayerJob(out, range(1, 6)), told.append)
+    result = run(opened, PlayerJob(out, PickedFrames.of(range(1, 6))), told.append)
     assert (result.path, result.n_files, result.n_bytes) == (out, 1, out.stat().st_size)
     assert [entry.name for entry in out.parent.iterdir()] == ["scene.html"]
     assert (told[-1].n_done, told[-1].n_all) == (5, 5)
@@ -54,7 +56,7 @@ def test_frames_are_those_of_the_scene(opened: TrainedProject, tmp_path: Path):
 
 def test_clips_say_where_they_lie_in_the_capture(opened: TrainedProject, tmp_path: Path):
     out = tmp_path / "scene.html"
-    run(opened, PlayerJob(out, range(1, 6, 2)), ignore)
+    run(opened, PlayerJob(out, PickedFrames.of(range(1, 6, 2))), ignore)
     header = header_of(out)
     assert header["step"] == 2
     assert [(clip["clip_index"], clip["first"], clip["frame_index"]) for clip in header["clips"]] == [
@@ -88,7 +90,7 @@ def test_the_size_is_told_without_reading_what_is_in_clips(
     loaded: list[int] = []
     load = TrainedProject.load
     monkeypatch.setattr(TrainedProject, "load", lambda opened, clip: (loaded.append(clip), load(opened, clip))[1])
-    for frames in (None, range(2, 5)):
+    for frames in (None, PickedFrames.of(range(2, 5))):
         estimate(opened, PlayerJob(tmp_path / "scene.html", frames))
     assert loaded == []
     run(opened, PlayerJob(tmp_path / "scene.html"), ignore)
@@ -131,11 +133,11 @@ def test_a_large_scene_gets_a_folder_unless_one_file_is_asked_for(
 def test_a_cancelled_job_leaves_nothing(opened: TrainedProject, tmp_path: Path, has_folder: bool):
     def cancel(progress: ExportProgress) -> None:
         if progress.n_done >= 3:
-            raise ExportCancelled
+            raise Unwanted
 
     folder = tmp_path / "out"
     folder.mkdir()
-    with pytest.raises(ExportCancelled):
+    with pytest.raises(Unwanted):
         run(opened, PlayerJob(folder / "scene.html", has_folder=has_folder), cancel)
     assert list(folder.iterdir()) == []
 
@@ -179,7 +181,7 @@ def test_bad_targets_and_frames_are_named_before_any_work(opened: TrainedProject
             run(opened, PlayerJob(out), ignore)
     opened.project.clip_path(1).unlink()
     with pytest.raises(ProjectError, match="clip 1, which is not trained"):
-        run(opened, PlayerJob(tmp_path / "scene.html", range(6)), ignore)
+        run(opened, PlayerJob(tmp_path / "scene.html", PickedFrames.of(range(6))), ignore)
     assert sorted(entry.name for entry in tmp_path.glob("*scene*")) == []
 
 

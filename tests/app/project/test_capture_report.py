@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import pickle
 from pathlib import Path
 
 import pytest
 
 from app.project.opening.capture_report import refusal_of, report_of
 from engine.capture.capture import open_capture
+from engine.children.messages import Refusal, decoded, encoded
 from engine.errors import CaptureError, OutsideError
 from tests.app.fakes import write_capture
 
@@ -70,7 +70,7 @@ def test_what_lies_outside_may_be_allowed_unless_more_is_wrong(tmp_path):
     outside = OutsideError("'a' is a link.", hint="Use --follow-links.", path=tmp_path / "a")
     assert refusal_of(tmp_path, outside).needs_links
     both = CaptureError("2 problems.", path=tmp_path, problems=(outside, outside))
-    found = refusal_of(tmp_path, pickle.loads(pickle.dumps(both)))
+    found = refusal_of(tmp_path, decoded(encoded(Refusal.of(both)), Refusal).error())
     assert found.needs_links
     assert "--follow-links" not in found.text
     assert [message for message, _ in found.problems] == ["'a' is a link."] * 2

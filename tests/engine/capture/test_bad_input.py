@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 from PIL import Image
 
 from engine.capture.capture import open_capture
+from engine.children.messages import Refusal, decoded, encoded
 from engine.errors import CaptureError
 
 MakeCapture = Callable[..., Path]
@@ -180,7 +180,7 @@ def test_all_problems_are_listed_at_once_and_survive_a_process_boundary(make_sam
     assert len(error.problems) == 4
     for found in ("4 problems", 'Camera "cam00" has NaN', 'Camera "cam01" has NaN', "cam02.mp4", "fps is -1"):
         assert found in str(error)
-    assert str(pickle.loads(pickle.dumps(error))) == str(error)
+    assert str(decoded(encoded(Refusal.of(error)), Refusal).error()) == str(error)
 
 
 def test_panoptic_camera_without_frames(make_panoptic: MakeCapture) -> None:

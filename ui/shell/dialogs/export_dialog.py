@@ -217,8 +217,8 @@ def _begin_box(words: str) -> bool:
     return is_open
 
 
-def _frames_text(frames: range | PickedFrames) -> str:
-    runs = frames.runs if isinstance(frames, PickedFrames) else (frames,)
+def _frames_text(frames: PickedFrames) -> str:
+    runs = frames.runs
     listed = ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs[:2] if run)
     return f"{listed} and more" if len(runs) > 2 else listed or "none"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -83,15 +82,6 @@ def test_a_video_without_end_is_refused(films: Films, monkeypatch: pytest.Monkey
     with pytest.raises(EngineError, match="That makes 501 pictures; at most 100 are written at once"):
         films.render("out", "png", speed=0.01)
     assert films.names == []
-
-
-def test_a_job_goes_through_to_another_process_as_it_is(films: Films):
-    job = films.job("a.mp4", "mp4", camera=None, turntable=Turntable(radius=2.0), size=(10, 20), shows="depth")
-    again = pickle.loads(pickle.dumps(job))
-    assert again == job
-    assert isinstance(again, VideoJob)
-    with pytest.raises(AttributeError):
-        again.speed = 2.0  # type: ignore[misc]
 
 
 def test_what_a_camera_took_has_to_be_there_for_the_comparison(films: Films):
