@@ -144,7 +144,7 @@ def loaded(state: ClipState, reference: ClipState | None) -> EditedClip:
     """
     from engine.editing.clip_rows import named_sets
     from engine.editing.edited_clip import EditedClip
-    from engine.model.clip_model import load_clip_model
+    from engine.model.reading import load_clip_model
 
     header = state.header
     model = load_clip_model(state, reference, backend=process_backend())

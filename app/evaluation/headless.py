@@ -235,7 +235,7 @@ class TrainedProject:
             ProjectError: It is not trained, damaged, or was trained on another reference.
         """
         from engine.metrics.clips.trained_clip import TrainedClip
-        from engine.model.clip_model import load_clip_model, read_field
+        from engine.model.reading import load_clip_model, read_field
 
         if clip_index not in self.trained:
             raise ProjectError(

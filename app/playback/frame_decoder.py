@@ -123,7 +123,7 @@ class ClipFiles:
             ProjectError: The file is missing or damaged, or does not fit its reference.
         """
         from engine.metrics.clips.trained_clip import TrainedClip
-        from engine.model.clip_model import load_clip_model
+        from engine.model.reading import load_clip_model
 
         state = read_clip_state(request.path)
         reference = None if state.is_reference else self._read_reference(request.reference_path)

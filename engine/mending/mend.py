@@ -24,7 +24,7 @@ from engine.mending.remedies import MakeTraining, faded, relit
 from engine.mending.stretch import Stretch
 from engine.mending.targets import Looks
 from engine.metrics.clips.trained_clip import TrainedClip
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from engine.progress import Progress, ReportProgress
 
 MEASURING, LIGHT, FADING, TRAINING = "Measuring", "Measuring light", "Fading", "Training"

@@ -29,9 +29,10 @@ from engine.errors import PreparationError, ProjectError
 from engine.gate.regions import GateRegion
 from engine.images.psnr import psnr
 from engine.model.camera_colors import CameraColors
-from engine.model.clip_model import ClipModel, decoder_shape, load_clip_model
+from engine.model.clip_model import ClipModel, decoder_shape
 from engine.model.clip_view import REACH_SPACINGS, render_model
 from engine.model.host_array import host_array
+from engine.model.reading import load_clip_model
 from engine.progress import Progress, ReportProgress, StepStats
 from engine.training.checkpoint import Checkpoint, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.config import TrainConfig

@@ -10,7 +10,7 @@ from app.session import commands as c
 from app.training import run
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from tests.app.conftest import poll_until
 from tests.app.fakes import DECODER, HEADS, N_ANCHORS, make_slow
 

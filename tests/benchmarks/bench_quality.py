@@ -31,8 +31,8 @@ from engine.kernels.threads import configure_threads
 from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
 from engine.metrics.clips.trained_clip import TrainedClip
-from engine.model.clip_model import load_clip_model
 from engine.model.clip_view import REACH_SPACINGS, View, render_model
+from engine.model.reading import load_clip_model
 from engine.progress import Progress
 from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene

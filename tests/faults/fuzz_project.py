@@ -152,7 +152,7 @@ def _plain(value: Any) -> Any:
 
 def _read_clip(project: Path, path: Path) -> Any:
     from engine.clip_files.clip_state import look_at_clip, read_clip_state
-    from engine.model.clip_model import load_clip_model
+    from engine.model.reading import load_clip_model
 
     look_at_clip(path)
     state = read_clip_state(path)

@@ -155,8 +155,8 @@ class EditedParts:
             return self._base
         from scipy.spatial import KDTree
 
-        from engine.model.clip_model import load_clip_model
         from engine.model.host_array import host_array
+        from engine.model.reading import load_clip_model
         from engine.raster.gaussians import Gaussians
 
         base = self._model

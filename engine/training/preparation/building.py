@@ -20,10 +20,11 @@ from engine.cloud.motion.dedup import mean_neighbor_distance, neighbor_distances
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, inherit
+from engine.model.clip_model import ClipModel
 from engine.model.decoder import Decoder
 from engine.model.host_array import host_array
 from engine.model.model_backend import ModelBackend
+from engine.model.reading import inherit
 from engine.training.config import TrainConfig
 
 _REACH_SPACINGS = 1.05

@@ -15,8 +15,9 @@ from engine.clip_files.clip_state import ClipState
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion
-from engine.model.clip_model import ClipModel, decoder_shape, read_field
+from engine.model.clip_model import ClipModel, decoder_shape
 from engine.model.decoder import Decoder
+from engine.model.reading import read_field
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import ResidualAnchors, adapt_moving
 from engine.training.preparation.clip_field import fit_field

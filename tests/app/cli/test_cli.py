@@ -50,7 +50,7 @@ def test_measuring_needs_something_trained(run, capture_folder, tmp_path, comman
 
 def test_a_damaged_clip_is_named_before_anything_is_written(run, capture_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(
-        "engine.model.clip_model.load_clip_model", lambda state, reference, backend: state
+        "engine.model.reading.load_clip_model", lambda state, reference, backend: state
     )  # fakes hold no model
     run("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3)
     clip = tmp_path / "p" / "clips" / "0001.safetensors"

@@ -10,7 +10,8 @@ from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.roles import ROLES
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, decoder_shape, inherit
+from engine.model.clip_model import ClipModel, decoder_shape
+from engine.model.reading import inherit
 from tests.clip_headers import make_header
 from tests.engine.metrics.tiny_clips import CLIP_LENGTH, make_model
 

@@ -19,7 +19,7 @@ from engine.assets import asset_path
 from engine.backends.table import backend_called
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 
 STORED = Path(__file__).parents[2] / "data" / "stored_project"
 """Clips 0 and 1 of the sample at a quarter of its size, as small as they can be trained."""

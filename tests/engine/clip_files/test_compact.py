@@ -16,7 +16,7 @@ from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_
 from engine.clip_files.compact import compact_clip, write_compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from tests.clip_headers import with_header
 from tests.engine.model.test_clip_model import N_FRAMES, make_anchors, make_field, make_reference, state_of
 

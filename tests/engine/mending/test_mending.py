@@ -24,7 +24,7 @@ from engine.mending.mend import Mended, StretchMending
 from engine.mending.stretch import boundary_stretch, frames_stretch
 from engine.mending.targets import FadedPictures, Looks
 from engine.metrics.clips.trained_clip import TrainedClip
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from tests.engine.training.tiny_training import CLIP_LENGTH, Tiny, finish, same_arrays

@@ -12,9 +12,10 @@ from engine.clip_files.roles import ROLES
 from engine.errors import ProjectError
 from engine.gate.reasons import NO_REASON, STILL, USER_DYNAMIC
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, decoder_shape, inherit, load_clip_model
+from engine.model.clip_model import ClipModel, decoder_shape
 from engine.model.decoder import HEADS, Decoder
 from engine.model.field import SpatioTemporalField
+from engine.model.reading import inherit, load_clip_model
 from tests.clip_headers import make_header, with_header
 
 N_FRAMES = 4

@@ -19,8 +19,8 @@ from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.compact import write_compact_clip
 from engine.images.psnr import psnr_of, squared_error
 from engine.metrics.clips.trained_clip import TrainedClip
-from engine.model.clip_model import load_clip_model
 from engine.model.clip_view import View, render_gaussians
+from engine.model.reading import load_clip_model
 from engine.progress import Progress
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig

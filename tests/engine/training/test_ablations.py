@@ -10,7 +10,7 @@ from engine.backends.table import backend_called
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import ProjectError
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import named_parameters

@@ -38,8 +38,9 @@ from engine.metrics.clips.features_apart import with_features
 from engine.metrics.clips.seams import PairRow, summarize
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, load_clip_model
+from engine.model.clip_model import ClipModel
 from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.model.reading import load_clip_model
 from engine.synthetic.scene import make_scene
 from engine.synthetic.writing import cameras_document, write_json, write_video
 from engine.training.clip_training import ClipTraining

@@ -19,8 +19,8 @@ from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
 from engine.metrics.clips.trained_clip import TrainedClip
-from engine.model.clip_model import load_clip_model
 from engine.model.clip_view import REACH_SPACINGS, reaches_of
+from engine.model.reading import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig

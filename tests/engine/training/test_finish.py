@@ -8,7 +8,7 @@ import pytest
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
 from engine.clip_files.compact import write_compact_clip
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, take_steps
 
 pytestmark = pytest.mark.slow

@@ -15,7 +15,7 @@ from engine.capture.writers.capture_json import capture_document, write_capture_
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.trained_clip import TrainedClip
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from engine.synthetic.writing import write_video
 from tests.built_once import BuiltOnce
 from tests.engine.training.tiny_training import CLIP_LENGTH, Tiny, finish, make_training, same_arrays

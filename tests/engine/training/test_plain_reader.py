@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.compact import compact_clip, write_compact_clip
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from tests.engine.training.tiny_training import Tiny
 
 pytestmark = pytest.mark.slow

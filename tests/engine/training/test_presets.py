@@ -7,7 +7,7 @@ import torch
 from torch import nn
 
 from engine.backends.table import backend_called
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import named_parameters
 from engine.training.presets import preset

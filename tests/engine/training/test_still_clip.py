@@ -9,7 +9,7 @@ from safetensors.numpy import load_file
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
 from engine.clip_files.compact import write_compact_clip
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from engine.training.plan.plan import footage_of, make_plan
 from engine.training.preparation import clip_preparation
 from engine.training.preparation.cloud_preparation import BACKGROUNDS_FILE

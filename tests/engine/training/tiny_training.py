@@ -15,7 +15,7 @@ from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.metrics.clips.trained_clip import TrainedClip
-from engine.model.clip_model import load_clip_model
+from engine.model.reading import load_clip_model
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.step.stepwise_phase import StepwisePhase

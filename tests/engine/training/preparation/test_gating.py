@@ -11,7 +11,8 @@ from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.compact import write_compact_clip
 from engine.gate.reasons import STILL, USER_DYNAMIC, USER_STATIC
 from engine.gate.regions import GateRegion
-from engine.model.clip_model import ClipModel, load_clip_model
+from engine.model.clip_model import ClipModel
+from engine.model.reading import load_clip_model
 from engine.training.variants.variant_method import merged
 from tests.engine.training.tiny_training import (
     CLIP_LENGTH,
