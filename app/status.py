@@ -151,7 +151,7 @@ class TrainingStatus:
         loss_history, psnr_history: (step, value) of that clip; PSNR is of held-out pictures, dB.
         can_train_next: Whether TrainNextClip would start something.
         next_clip_index: The clip that TrainNextClip would train; None when all are trained.
-        resume_step: The step that it would go on from; None when it would start from the beginning.
+        resume_step: The step that it would continue from; None when it would start from the beginning.
         queue: Clips that wait.
     """
 
@@ -183,13 +183,13 @@ class ClipStatus:
     Attributes:
         state: untrained, queued, preparing, training, paused (its training holds and waits), stopped (its training
             has ended before the last step and goes on there), trained, failed, stale (its reference was trained
-            again, or the clip that it goes on from), or damaged (finished, but its file cannot be read).
+            again, or the clip that it continues from), or damaged (finished, but its file cannot be read).
         progress: Share of its steps, 0..1.
         held_out_psnr, held_out_whole: dB, and what it is over, see ClipRecord; None when not measured.
         n_inherited, n_own: All anchors of the clip, whatever frames they are alive in: those it inherits from the
             reference clip, and those it holds itself (all of the reference clip, residual ones of another). 0 where
             there are none yet.
-        resume_step: The step that its training goes on from; None when there is nothing to go on from. A clip that
+        resume_step: The step that its training continues from; None when there is nothing to continue from. A clip that
             was being trained again when that was stopped is trained and has one.
         reason: Why it is stale or damaged; empty otherwise.
         exposure_change: How far the cameras' exposure is from the reference clip's on average, a share: 0.01 is 1
@@ -247,7 +247,7 @@ class QueueStatus:
     Attributes:
         waiting: In the order in which they are trained.
         failed: Clips whose training failed, each with the reason.
-        is_held: Whether they wait until the user goes on.
+        is_held: Whether they wait until the user continues.
         is_ending_after: Whether they are held once the clip that trains has ended.
         queued: The clip that trains and those that wait; None without any.
         everything: All clips that are not finished, whether they wait or not; None where every clip is.
@@ -414,7 +414,7 @@ class JobStatus:
         return None if self.began_s is None else max(now_s - self.began_s, 0.0)
 
     def eta_s(self, now_s: float) -> float | None:
-        """Seconds that are left, if its share goes on rising as it did; None before LEAST_TOLD."""
+        """Seconds that are left, if its share continues rising as it did; None before LEAST_TOLD."""
         spent_s = self.elapsed_s(now_s)
         if spent_s is None or not LEAST_TOLD <= self.done < 1.0:
             return None
@@ -506,7 +506,7 @@ class ResidualStatus:
         measured: By column of CELL_COLUMNS: of how many pictures it is measured, and of how many it can be.
         n_done, n_all: Pictures of which every column is measured, and all of trained clips.
         is_measuring: Whether more are being measured now.
-        is_held_back: Whether that goes on slowly only, because a clip trains or the user looks around.
+        is_held_back: Whether that continues slowly only, because a clip trains or the user looks around.
         rate: Pictures per second; 0 when unknown.
         eta_s: Seconds until all are measured; None while it is not known well.
         message: What went wrong, in sentences; empty when nothing did.

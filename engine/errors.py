@@ -6,7 +6,7 @@ EngineError
 |-- ProjectError      a project folder, clip state or configuration cannot be used
 |   |-- DiskError     a file could not be written: nothing is wrong with what was asked for
 |-- PreparationError  clouds or masks could not be built from this capture
-|-- TrainingError     training could not go on
+|-- TrainingError     training could not continue
     |-- NonFiniteLoss the loss or a gradient stopped being a number
 
 Messages state the cause first, with numbers, then what was done; the hint says what to do; the path comes last.
@@ -102,7 +102,7 @@ class PreparationError(EngineError):
 
 
 class TrainingError(EngineError):
-    """Training could not go on."""
+    """Training could not continue."""
 
 
 class NonFiniteLoss(TrainingError):

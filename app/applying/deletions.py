@@ -34,7 +34,7 @@ class ClipDeletions:
         fingerprint: Of the clip that was looked at.
         own: Rows of the sets that the clip itself stores.
         inherited: Rows of the reference clip's sets that this clip shows at present and need not show.
-        needed: Rows of the reference clip's sets that it goes on to show.
+        needed: Rows of the reference clip's sets that it continues to show.
     """
 
     clip_index: int

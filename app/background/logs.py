@@ -57,7 +57,7 @@ class SharedLogHandler(logging.Handler):
         finally:
             os.close(handle)
         if size + len(data) > self._max_bytes:
-            with suppress(OSError):  # some systems move no file that is open elsewhere: it goes on growing until then
+            with suppress(OSError):  # some systems move no file that is open elsewhere: it keeps growing until then
                 self._move_aside()
 
     def _move_aside(self) -> None:

@@ -47,7 +47,7 @@ def to_path(stored: StoredPath) -> CameraPath:
     """A camera path as it was stored.
 
     Raises:
-        ProjectError: It makes no sense.
+        ProjectError: It is not valid.
     """
     try:
         keys = tuple(
@@ -75,7 +75,7 @@ def camera_path_named(paths: Sequence[CameraPath], name: str, folder: Path) -> C
 
 
 def check_paths(paths: Sequence[CameraPath]) -> None:
-    """See that paths can be kept and told apart: each has a name of its own, and there are not too many.
+    """See that paths can be kept and distinguished: each has a name of its own, and there are not too many.
 
     Raises:
         ProjectError: They cannot; says why.

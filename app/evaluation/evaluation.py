@@ -1,6 +1,6 @@
 """What `clipgstream eval` does: every frame of the chosen clips against every camera, as one JSON-able document.
 
-Figures are kept in the project (app.evaluation.kept_figures), so that an evaluation goes on where it was interrupted,
+Figures are kept in the project (app.evaluation.kept_figures), so that an evaluation resumes where it was interrupted,
 and eval, report and ablate measure a version of a clip once.
 """
 

@@ -77,7 +77,7 @@ class KeptFigures:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Write what is added inside the block. Where that fails, the reason is reported and the work goes on."""
+        """Write what is added inside the block. Where that fails, the reason is reported and the work continues."""
         with contextlib.ExitStack() as stack:
             try:
                 check_folder(self.path.parent)

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's palette: told apart with any colour vision."""
+"""Okabe and Ito's palette: distinguished with any colour vision."""
 FAINT_COLOR, GRID_COLOR = "#555555", "#DDDDDD"
 DPI = 110
 

@@ -45,7 +45,7 @@ def plan_clip(
         clip: One of its clips.
         step_time: Asked where no other clip of this kind says how long training takes.
         history: Of all its clips, for callers that plan many; read here when None.
-        catalog: Says whether the training was stopped and goes on; when None, the whole of it is planned.
+        catalog: Says whether the training was stopped and continues; when None, the whole of it is planned.
         is_afresh: Plan as if nothing were trained yet.
     Raises:
         CaptureError, PreparationError: The capture does not fit the settings.

@@ -19,7 +19,7 @@ class Course:
         frame_index: Where it is.
         direction: 1 or -1.
         first, last: What is played, ends included.
-        is_looping: Whether it goes on at the other end.
+        is_looping: Whether it continues at the other end.
         is_playing: Whether it moves by itself.
         frames_per_s: How fast, while it does.
         is_loaded_first: Whether all of what is played is made ready, because no frame of it may be left out.

@@ -55,7 +55,7 @@ class Timeline:
         self._carried = 0.0  # frames that are due and not yet gone: less than one, but for rounding not below zero
 
     def take_over(self, other: Timeline) -> None:
-        """Go on where another timeline of the same frames is, as when they are cut into other clips."""
+        """Continue where another timeline of the same frames is, as when they are cut into other clips."""
         for name in ("is_looping", "is_every_frame", "speed", "markers"):
             setattr(self, name, getattr(other, name))
         self.set_range(other.in_frame, other.out_frame)
@@ -78,7 +78,7 @@ class Timeline:
         self.go_to(frame_index)
 
     def go_to(self, frame_index: int) -> None:
-        """Move the playhead as `seek` does, and go on following."""
+        """Move the playhead as `seek` does, and keep following."""
         self.frame_index = self.clamped(frame_index)
         self._carried = 0.0
         if self.around is not None and not self.around[0] <= self.frame_index <= self.around[1]:

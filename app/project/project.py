@@ -1,4 +1,4 @@
-"""Project: the folder that keeps what was learned about one capture. Paths, settings and the lock; no training.
+"""Project: the folder that keeps the results of one capture. Paths, settings and the lock; no training.
 
 project.json                 the document: settings, regions, camera paths, edits and so on, see ProjectDocument
 journal/00000000.jsonl       what has happened to the document since that step
@@ -9,7 +9,7 @@ clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge;
 mends/0001.json              what was mended, with figures before and after
 versions/0000/               what was trained before it was trained again
 damaged/0000-1.safetensors   damaged files that were put aside
-checkpoints/0000.safetensors unfinished clips: everything needed to go on
+checkpoints/0000.safetensors unfinished clips: everything needed to continue
 live/                        snapshots of the running training; swept when the project is opened for writing
 prep/                        what clips share, such as backgrounds
 metrics/0000.jsonl           curves of the finished clip, one JSON object per line
@@ -181,9 +181,9 @@ class Project:
         return [first, *(i for i in range(n_clips) if i != first)]
 
     def previous_index(self, clip_index: int) -> int:
-        """The clip that a clip goes on from where they do: the one before, which is the reference where there is none.
+        """The clip that a clip continues from, if clips do: the one before, or the reference if there is none.
 
-        Not for the reference itself, which goes on from nothing.
+        Not for the reference itself, which continues from nothing.
         """
         return self.training_order(clip_index)[-1]
 

@@ -47,7 +47,7 @@ class RecentProject:
 
 
 def read_recents(document: dict[str, Any]) -> list[RecentProject]:
-    """The list in a document of preferences, newest first; entries that make no sense are left out.
+    """The list in a document of preferences, newest first; entries that are not valid are left out.
 
     Earlier versions kept folders of captures only, under another name: those without a project come last.
     """

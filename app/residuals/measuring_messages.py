@@ -59,7 +59,7 @@ class PictureMeasured(msgspec.Struct, frozen=True, tag=True):
 
 
 class Trouble(msgspec.Struct, frozen=True, tag=True):
-    """Something could not be read or kept; the rest goes on."""
+    """Something could not be read or kept; the rest continues."""
 
     message: str
 

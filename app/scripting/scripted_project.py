@@ -183,7 +183,7 @@ class ScriptedProject:
         Args:
             entries: By name: "markers", "labels", "camera_paths" and so on.
         Raises:
-            ProjectError: An entry is not known or makes no sense, or what `change` raises.
+            ProjectError: An entry is not known or is not valid, or what `change` raises.
         """
         try:
             document = document_of(plain_document(self.document) | dict(entries))
@@ -317,7 +317,7 @@ class ScriptedProject:
             volume: Only what lies in it.
             is_inverted: Pick everything else.
         Raises:
-            ProjectError: The frame is not trained, a condition makes no sense, or nothing is picked.
+            ProjectError: The frame is not trained, a condition is not valid, or nothing is picked.
         """
         from app.scripting.selecting import select
 
@@ -384,7 +384,7 @@ class ScriptedProject:
         is_again: bool = False,
         settings: Mapping[str, int | float | str | bool] | None = None,
     ) -> ClipOutcome:
-        """Train a clip in a process of its own, and wait for it. One that was stopped goes on where it was.
+        """Train a clip in a process of its own, and wait for it. One that was stopped resumes where it was.
 
         Args:
             on_progress: Told some twenty times a second how far it is; what it raises stops the training, and what was
@@ -395,7 +395,7 @@ class ScriptedProject:
             How it ended: "trained", or "skipped" where it was finished already.
         Raises:
             ProjectError: It cannot be trained, or another program trains into the project.
-            TrainingError: The training failed; what was learned is kept.
+            TrainingError: The training failed; progress is kept.
         """
         from app.scripting.training import train_one
 

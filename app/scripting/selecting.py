@@ -78,7 +78,7 @@ def conditions(text: str) -> Sequence[SelectByAttribute]:
     """Conditions joined by "and", such as "opacity<0.05 and size>=0.2", as commands that narrow a selection.
 
     Raises:
-        ProjectError: One makes no sense, or names something that is not known without a window.
+        ProjectError: One is not valid, or names something that is not known without a window.
     """
     return [_condition(part) for part in re.split(r"\band\b|,", text)] if text.strip() else []
 

@@ -177,7 +177,7 @@ class ResumeTraining:
 
 @dataclass(frozen=True, slots=True)
 class StopTraining:
-    """End the running training, keep what was learned and empty the queue."""
+    """End the running training, keep progress and empty the queue."""
 
 
 @dataclass(frozen=True, slots=True)

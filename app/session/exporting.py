@@ -112,7 +112,7 @@ class Exporting:
         return self._revision, self._queue.revision, self._planner.newest, self._namer.newest
 
     def open(self, opened: OpenedProject) -> None:
-        """Another project is open: what has ended of others is not listed. What runs goes on."""
+        """Another project is open: what has ended of others is not listed. What runs continues."""
         self._project = opened.project.folder.absolute()
         self._revision += 1
 

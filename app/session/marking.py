@@ -74,7 +74,7 @@ class Marking:
         """Carry out a command.
 
         Raises:
-            ProjectError: It cannot be done now, or makes no sense.
+            ProjectError: It cannot be done now, or is not valid.
         """
         match command:
             case MarkRegion(treat=treat, center=center, radius=radius):

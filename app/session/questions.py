@@ -30,7 +30,7 @@ class RetrainQuestion:
             None where nothing was recorded.
         is_average: Whether that is an average.
         outdated_seconds: Likewise for training all of `outdated` again.
-        resume_step: The step of an earlier try that it goes on from; None when it starts from the beginning.
+        resume_step: The step of an earlier try that it continues from; None when it starts from the beginning.
         settings: Of its own, with which it is to be trained; see commands.TrainClip.
     """
 
@@ -111,7 +111,7 @@ class SettingsQuestion:
         clip_index: The clip.
         settings: Those that may be others in this clip, as they are now.
         retrain: What has to be known before a finished clip is trained again; None where it is not finished.
-        has_progress: Whether what was learned before a stop is given up by it.
+        has_progress: Whether progress from before a stop is given up by it.
     """
 
     clip_index: int

@@ -83,7 +83,7 @@ def clip_training(
         seed: Fixes what is random.
         reference: What the clip inherits from.
         report: Told how far a preparation is.
-        previous: The clip that it goes on from.
+        previous: The clip that it continues from.
     """
     from engine.training.clip_training import ClipTraining  # torch takes a second to import
     from engine.training.variants.variant_method import method_of
@@ -105,7 +105,7 @@ def clip_training(
 
 
 def _read_previous(project: Project, clip_index: int) -> ClipState:
-    """The trained clip that this one goes on from.
+    """The trained clip that this one continues from.
 
     Raises:
         ProjectError: It is not trained.

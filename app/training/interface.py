@@ -49,7 +49,7 @@ class Training(Protocol):
         ...
 
     def write_checkpoint(self, path: Path | str) -> None:
-        """Everything needed to go on."""
+        """Everything needed to continue."""
         ...
 
     def restore_checkpoint(self, path: Path | str) -> None:

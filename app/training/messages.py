@@ -62,7 +62,7 @@ class Stop(Struct, frozen=True, tag=True):
     """End after the current step.
 
     Attributes:
-        keep: Write a checkpoint to go on from later; otherwise forget this training.
+        keep: Write a checkpoint to continue from later; otherwise forget this training.
     """
 
     keep: bool = True
@@ -134,7 +134,7 @@ class SnapshotWritten(Struct, frozen=True, tag=True):
 
 
 class WarningRaised(Struct, frozen=True, tag=True):
-    """Something the user should know; training goes on."""
+    """Something the user should know; training continues."""
 
     title: str
     detail: str = ""
@@ -148,7 +148,7 @@ class TrainingPaused(Struct, frozen=True, tag=True):
 
 
 class TrainingResumed(Struct, frozen=True, tag=True):
-    """The worker goes on."""
+    """The worker continues."""
 
     step: int
 
@@ -169,7 +169,7 @@ class TrainingStopped(Struct, frozen=True, tag=True):
 
 
 class TrainingFailed(Struct, frozen=True, tag=True):
-    """The training cannot go on. `kind` names the error's class; `trace` is for the log."""
+    """The training cannot continue. `kind` names the error's class; `trace` is for the log."""
 
     kind: str
     message: str

@@ -58,7 +58,7 @@ class Worker(Protocol):
         ...
 
     def close(self, *, timeout_s: float) -> None:
-        """End it for certain, keeping what was learned when there is time for it."""
+        """End it for certain, keeping progress when there is time for it."""
         ...
 
 

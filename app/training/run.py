@@ -280,7 +280,7 @@ class TrainingRun:
         return False
 
     def _try_again(self, training: Training, error: DiskError) -> bool:
-        """The disk refused a finished clip: make room, or keep it as a checkpoint meanwhile. Whether to go on trying.
+        """The disk refused a finished clip: make room, or keep it as a checkpoint meanwhile. Whether to keep trying.
 
         Raises:
             DiskError: It is given up.
@@ -358,7 +358,7 @@ class TrainingRun:
         while True:
             try:
                 command = self._receive(wait_s)
-            except Unwanted:  # the window is gone: keep what was learned and end
+            except Unwanted:  # the window is gone: keep progress and end
                 self._stop = Stop(keep=True)
                 raise StopRequested from None
             match command:
@@ -435,7 +435,7 @@ class TrainingRun:
         except ProjectError as error:
             is_written = False
             self._checkpoint_refusals.refused(error)
-        if is_written:  # beside the checkpoint, so that a run that goes on from it knows what it took
+        if is_written:  # beside the checkpoint, so that a run that continues from it knows what it took
             self._note({"step": training.steps_done, **self._watch.document(), **self._memory()})
         self._checkpoint_cadence.done(started_s, self._clock())
         return is_written
@@ -459,7 +459,7 @@ class TrainingRun:
             found.rename(self._project.unfinished_metrics_path(self._job.clip_index))
 
     def _recall_times(self, step: int) -> None:
-        """Add what earlier runs took up to the checkpoint that this one goes on from, and the most that they held."""
+        """Add what earlier runs took up to the checkpoint that this one continues from, and the most that they held."""
         assert self._project is not None
         rows = read_metrics(self._project.unfinished_metrics_path(self._job.clip_index))
         noted = [row for row in rows if row["step"] <= step and "stages_s" in row]
@@ -528,7 +528,7 @@ class TrainingRun:
         self._send(TrainingFailed(type(error).__name__, message, hint, trace))
 
     def _keep_last_good(self, training: Training) -> str:
-        """Keep what was learned before a failure, if it is any good. Says what is kept now."""
+        """Keep progress from before a failure, if it is any good. Says what is kept now."""
         try:
             is_good = is_finite(training.state())
         except EngineError:

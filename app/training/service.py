@@ -82,7 +82,7 @@ class ShownState:
 
     Attributes:
         revision: Names the state.
-        is_live: Whether it is a snapshot, which its worker replaces and removes as it goes on.
+        is_live: Whether it is a snapshot, which its worker replaces and removes as it continues.
         reference_file: The clip it is shown with, where that is not the project's reference as it is now.
     """
 
@@ -336,7 +336,7 @@ class TrainingService:
             self.worker.send(SnapshotConsumed(revision))
 
     def close(self, *, timeout_s: float = CLOSE_TIMEOUT_S) -> None:
-        """End the worker, keeping what was learned."""
+        """End the worker, keeping progress."""
         self.queue.clear()
         if self.worker is not None:
             self.worker.close(timeout_s=timeout_s)
@@ -382,7 +382,7 @@ class TrainingService:
         self.worker = self._launch(job, self.project)
 
     def _begin_afresh(self, clip_index: int, own: OwnSettings) -> None:
-        """What was learned with other settings is nothing to go on from."""
+        """Progress with other settings is not a start."""
         self._begun[clip_index] = own
         self.project.discard_progress(clip_index)
         remove_stages(self.project.prep_dir, clip_index)

@@ -20,7 +20,7 @@ class TrainQueue:
     """Clips in the order in which they are to be trained, each at most once.
 
     Attributes:
-        is_held: Whether the first of them waits until the user goes on.
+        is_held: Whether the first of them waits until the user continues.
         failed: Why clips could not be trained, by clip; one that is tried again leaves.
         n_done, steps_done: Clips that ended since the queue was last empty, and the steps they had.
     """

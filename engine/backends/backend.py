@@ -71,7 +71,7 @@ class Backend(ModelBackend, Protocol):
     """What a clip is trained with. Stateless, so that threads may share one.
 
     Arguments are those of the public calls, already checked: `engine.raster.rasterize`, `engine.model.decoding`,
-    `engine.model.joining` and `engine.training.step.losses`. Tensors come and go on `device`.
+    `engine.model.joining` and `engine.training.step.losses`. Tensors are on `device` throughout.
     """
 
     @property

@@ -151,7 +151,7 @@ class Fault:
 
 
 class Phase(Protocol):
-    """Steps of one phase of a training. Between two calls the model of the plan holds what was learned."""
+    """Steps of one phase of a training. Between two calls the model of the plan holds the result."""
 
     steps_done: int
 

@@ -14,7 +14,7 @@ from engine.capture.layout.format_checks import raise_problems
 from engine.errors import CaptureError
 
 MIN_CAMERAS = 3
-"""Two cameras see a scene, but focal lengths and what lies far apart cannot be told from two alone."""
+"""Two cameras see a scene, but focal lengths and what lies far apart cannot be distinguished from two alone."""
 UNSTATED_FPS = 30.0
 """Taken for images, and for videos that state no rate."""
 

@@ -52,7 +52,7 @@ class CameraKey:
         fov_y_rad: Vertical field of view, from MIN_FOV_RAD to MAX_FOV_RAD.
 
     Raises:
-        ValueError: A value makes no sense; says which.
+        ValueError: A value is not valid; says which.
     """
 
     frame: float
@@ -94,7 +94,7 @@ class CameraKey:
 class CameraPath:
     """Keys in the order of time, and what lies between them. A value.
 
-    Before the first key the camera stands at the first one, after the last key at the last one. A closed path goes on
+    Before the first key the camera stands at the first one, after the last key at the last one. A closed path continues
     from the last key to the first one, in the mean time from key to key, and round and round, both ways.
 
     Attributes:

@@ -43,7 +43,7 @@ def turntable(
         fov_y_rad: Vertical field of view, radians.
         start: Direction from `center` in which it begins; only its level part counts. Any one when None. [3]
     Raises:
-        ValueError: A value makes no sense.
+        ValueError: A value is not valid.
     """
     center, up = np.asarray(center, dtype=np.float64), np.asarray(up, dtype=np.float64)
     length = float(np.linalg.norm(up))

@@ -98,7 +98,7 @@ class Parent(Generic[Event]):
         os._exit(1)
 
     def _beat(self) -> None:
-        """Tell for as long as this process works, so that work can be told from standing still."""
+        """Tell for as long as this process works, so that work can be distinguished from standing still."""
         worked_s = 0.0
         while True:
             time.sleep(BEAT_EVERY_S)

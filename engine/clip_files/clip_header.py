@@ -191,7 +191,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
             same rows still; see `origin`.
         exclusions: What of its pictures was excluded from its training, see engine.capture.exclusions.exclusion_key.
         reference_fingerprint: Of the clip that this one inherits from.
-        previous_fingerprint: Of the clip that this one goes on from.
+        previous_fingerprint: Of the clip that this one continues from.
         metrics: Of a finished clip; see `figures`.
         resume: Of a checkpoint: where the training stands.
     """

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def linear_of(encoded: np.ndarray) -> np.ndarray:
-    """Light of display-encoded colours. Both in 0..1, brighter ones as the curve goes on. [...]"""
+    """Light of display-encoded colours. Both in 0..1, brighter ones as the curve continues. [...]"""
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 

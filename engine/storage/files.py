@@ -69,7 +69,7 @@ def atomic_folder(path: Path | str) -> Iterator[Path]:
 
 
 def is_left_over(path: Path, is_alive: Callable[[int], bool], *, of: str = "") -> bool:
-    """Whether `atomic_path` or `atomic_folder` yielded this once, and nobody goes on writing it.
+    """Whether `atomic_path` or `atomic_folder` yielded this once, and nobody still writes it.
 
     Its process is dead then, or it is a day old.
 

@@ -1,4 +1,4 @@
-"""Checkpoints: a clip's state with all that its training needs to go on exactly, bit for bit.
+"""Checkpoints: a clip's state with all that its training needs to continue exactly, bit for bit.
 
 A checkpoint is a clip file like any other. Beside the state it holds the moments of the optimiser, the gains, the
 backgrounds as they are by now, and in its header where the training stands.
@@ -68,7 +68,7 @@ def read_checkpoint(
 
     Args:
         path: The file.
-        frames: First frame, number of frames and clip_length of the clip that goes on.
+        frames: First frame, number of frames and clip_length of the clip that continues.
         camera_names, seed: Of its training.
     Raises:
         ProjectError: The file is damaged, or of another training.

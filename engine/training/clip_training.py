@@ -2,7 +2,7 @@
 
 Reference clip: "static" phase on the backgrounds, then "joint" phase on the pictures with the moving anchors added.
 Source clip: one "source" phase; everything inherited is frozen, residual anchors and the clip's own field learn.
-It owns model, optimiser and sampling; it has no loop, no process, no file of its own accord.
+It owns model, optimiser and sampling; it has no loop, no process, and opens no files itself.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class ClipTraining:
         holdout: Camera indices never looked at in training.
         reference: Finished reference clip for a source clip, None to train the reference clip itself, or a clip that
             shares nothing.
-        previous: The clip before, finished, for a method that goes on from it.
+        previous: The clip before, finished, for a method that continues from it.
         seed: Fixes initial values and the order of pictures.
         prep_dir: Folder that keeps backgrounds between clips.
         report: Receives progress of the preparation stages.
@@ -314,7 +314,7 @@ class ClipTraining:
         return float(np.mean(values)) if values else float("nan")
 
     def state(self) -> ClipState:
-        """Snapshot of everything the clip owns. Copies, so that training can go on."""
+        """Snapshot of everything the clip owns. Copies, so that training can continue."""
         return self._state_of(self.model)
 
     def _state_of(self, model: ClipModel) -> ClipState:
@@ -391,7 +391,7 @@ class ClipTraining:
         n_steps: int,
         learning: tuple[str, ...] = ("",),
     ) -> None:
-        """Go on from a finished clip instead of `prepare`: some steps more, on pictures that the caller chooses.
+        """Continue from a finished clip instead of `prepare`: some steps more, on pictures that the caller chooses.
 
         For a clip that inherits from another one. Settings say how fast it learns; rates fall over these steps.
 
@@ -432,7 +432,7 @@ class ClipTraining:
         self._order = ShuffledOrder(len(self._items), seed=self.seed)
 
     def write_checkpoint(self, path: Path | str) -> None:
-        """State, optimiser, order of pictures and random state: enough to go on exactly."""
+        """State, optimiser, order of pictures and random state: enough to continue exactly."""
         index, in_phase = phase_at(self.phases, self.steps_done)
         place = Place(
             phase_index=self._phase_index,
@@ -448,7 +448,7 @@ class ClipTraining:
         write_checkpoint(path, Checkpoint(state, gains, self.backgrounds, place, reaches, self._cameras.kept))
 
     def restore_checkpoint(self, path: Path | str) -> None:
-        """Go on from a checkpoint instead of `prepare`.
+        """Continue from a checkpoint instead of `prepare`.
 
         Raises:
             ProjectError: The checkpoint is damaged or belongs to another clip, reference or set of cameras.
@@ -512,7 +512,7 @@ def seed_of(config: TrainConfig, clip: Clip, seed: int) -> int:
 
 
 def _training_cameras(capture: Capture, holdout: Sequence[int], base: ClipState | None) -> list[int]:
-    """Rows of the rig that a clip is trained with. One that goes on from another clip has that one's cameras: of one
+    """Rows of the rig that a clip is trained with. One that continues from another clip has that one's cameras: of one
     that was excluded since, no picture is usable."""
     cameras = capture.training_cameras(holdout)
     if base is None or capture.exclusions == NOTHING_EXCLUDED:

@@ -47,7 +47,7 @@ class Guard:
         n_clips, alpha = len(draw._clip_rect_stack), imgui.get_style().alpha
         try:
             draw_part()
-        except Exception as error:  # noqa: BLE001 - the edge of the frame loop, which goes on
+        except Exception as error:  # noqa: BLE001 - the edge of the frame loop, which continues
             traceback.clear_frames(error.__traceback__)  # what they hold may end itself, while that is still possible
             _recover(stack)
             while len(draw._clip_rect_stack) > n_clips:

@@ -44,7 +44,7 @@ def run_demo(capture_path: Path, out_dir: Path, quick: bool = False) -> int:
 
     Args:
         capture_path: Capture folder; or a project folder, which then is the one trained in.
-        out_dir: Gets project/ or project_quick/, metrics.json, window.png and held_out.mp4. A second run goes on
+        out_dir: Gets project/ or project_quick/, metrics.json, window.png and held_out.mp4. A second run continues
             from the first.
         quick: Train a few steps only.
     Returns:

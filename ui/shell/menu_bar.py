@@ -48,7 +48,7 @@ def draw_menu_bar(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
 def _begin_menu(title: str, ui: UiState) -> bool:
     menu_id = imgui.internal.get_current_window().get_id(title)
     if imgui.get_current_context().nav_just_moved_to_id == menu_id:
-        imgui.open_popup(title)  # an arrow key went on to this menu: it opens as under the pointer
+        imgui.open_popup(title)  # an arrow key moved on to this menu: it opens as under the pointer
     is_open = imgui.begin_menu(title)
     if not is_open:
         ui.mark(f"menu.{title}")

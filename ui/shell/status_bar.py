@@ -54,7 +54,7 @@ def draw_status_bar(session: SessionView, dispatch: Dispatch, ui: UiState, *, is
 
 
 def status_text(session: SessionView) -> str:
-    """What goes on, in one line."""
+    """Current activity, in one line."""
     if session.jobs:
         job = session.jobs[0]
         return f"{job.name}: {job_words(job, time.monotonic())}"

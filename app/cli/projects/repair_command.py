@@ -1,4 +1,4 @@
-"""clipgstream repair: what is left of a project whose document or journal is damaged, and going on with it."""
+"""clipgstream repair: what is left of a project whose document or journal is damaged, and continuing with it."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class PlanLines:
     Args:
         line: Where to say it.
         project, capture: What is trained.
-        catalog: Says which trainings were stopped and go on.
+        catalog: Says which trainings were stopped and continue.
         step_time: Asked where no clip of the same kind says how long training takes.
         is_quiet: Plan nothing.
     """

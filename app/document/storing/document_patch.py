@@ -62,7 +62,7 @@ def document_with(before: ProjectDocument, patch: Any) -> ProjectDocument:
 
     Raises:
         PatchError: It is not a patch, or one for another document.
-        ProjectError: A value makes no sense.
+        ProjectError: A value is not valid.
     """
     if not isinstance(patch, dict) or not patch.keys() <= CODECS.keys():
         raise PatchError("a patch is for entries that a document does not have")
@@ -98,7 +98,7 @@ def _items_with(codec: Codec, before: tuple[Any, ...], patch: Any) -> tuple[Any,
 
 
 def _check(document: ProjectDocument, changed: dict[str, Any]) -> None:
-    """See that items can be told apart, where they have changed. Raises ProjectError."""
+    """See that items can be distinguished, where they have changed. Raises ProjectError."""
     if "camera_paths" in changed:
         check_paths(document.camera_paths)
     if "edits" in changed:

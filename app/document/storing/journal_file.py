@@ -1,6 +1,6 @@
 """A file of the journal: what has happened to the document since a step, one line for each event.
 
-    {"journal": 2, "step": 123, "document": checksum or null, "after": checksum, "checksum": ...}   what it goes on from
+    {"journal": 2, "step": 123, "document": checksum or null, "after": checksum, "checksum": ...}   its start
     {"kept": 126             , "checksum": ...}                                                     its last step
     {"step": 124, "do": "change", "name": ..., "merge": ..., "patch": {...}, "after": ..., "checksum": ...}
     {"step": 125, "do": "undo", "name": ..., "patch": {...}, "after": ..., "checksum": ...}     or "redo"
@@ -43,14 +43,14 @@ class JournalFile:
 
     Attributes:
         path: The file.
-        start: Step that it goes on from.
+        start: Step that it continues from.
         document: Checksum of project.json at that step; empty where that was not known.
         after: Checksum of the last line before it, in the file before; empty where there is none.
         rows: Its events, without what chains them.
         links: The checksum of the first line, and then of each event.
         ends: Where each of these lines ends, in bytes.
         is_whole: Whether the last line is there.
-        is_left: Whether another file goes on from it.
+        is_left: Whether another file continues from it.
         n_head: Lines before the first event.
         kept: The last step that was kept, as its second line has it; None where it has none, or a damaged one.
     """
@@ -233,7 +233,7 @@ def append_rows(file: JournalFile, rows: list[Row]) -> JournalFile:
 
 
 def leave_journal(file: JournalFile) -> None:
-    """Note that another file goes on from this one.
+    """Note that another file continues from this one.
 
     Raises:
         OSError: The disk refused; the file is as it was, or breaks off after its last event.

@@ -1,4 +1,4 @@
-"""Recovery: what is left of a project whose document or journal is damaged, and how to go on with it.
+"""Recovery: what is left of a project whose document or journal is damaged, and how to continue with it.
 
 Nothing is thrown away: what is damaged is kept aside in a folder whose name says so.
 """
@@ -121,7 +121,7 @@ def plain_history(folder: Path) -> DocumentHistory:
 
 
 def recover(folder: Path) -> Path:
-    """Go on with the steps before the damage. Only for who has the project's lock.
+    """Continue with the steps before the damage. Only for who has the project's lock.
 
     Returns:
         The folder with what was damaged.
@@ -142,7 +142,7 @@ def recover(folder: Path) -> Path:
         raise disk_error(error, what="The copy of the damaged files", path=folder) from error
     store = DocumentStore(folder)
     history = best[1].history.each(lambda document: with_capture(document, lambda place: found_place(place, folder)))
-    step = max([best[1].step, *journal_steps(folder)]) + 1  # so that no file that is there goes on from it
+    step = max([best[1].step, *journal_steps(folder)]) + 1  # so that no file that is there continues from it
     store.begin(history, step=step, is_backup_kept=False)
     return aside
 

@@ -1,6 +1,6 @@
 """Replay: the document of a project as it is now, put together from project.json, its history and the journal.
 
-project.json is the document at some step. Each file of the journal goes on from the step in its name; those that are
+project.json is the document at some step. Each file of the journal continues from the step in its name; those that are
 needed are replayed one after the other. Nothing is written here, so that any process may read a project.
 """
 
@@ -48,12 +48,12 @@ class Replayed:
 
 
 def journal_path(folder: Path, step: int) -> Path:
-    """The file of the journal that goes on from a step. folder: Of the project."""
+    """The file of the journal that continues from a step. folder: Of the project."""
     return folder / JOURNAL_FOLDER / f"{step:08d}{_SUFFIX}"
 
 
 def journal_steps(folder: Path) -> list[int]:
-    """Steps from which files of the journal go on, rising."""
+    """Steps from which files of the journal continue, rising."""
     found = [path.name.removesuffix(_SUFFIX) for path in (folder / JOURNAL_FOLDER).glob(f"*{_SUFFIX}")]
     return sorted(int(name) for name in found if name.isascii() and name.isdecimal() and len(name) >= 8)
 
@@ -251,7 +251,7 @@ def history_after(history: DocumentHistory, row: Row) -> DocumentHistory:
 
     Raises:
         PatchError: The line holds something else.
-        ProjectError: A value makes no sense.
+        ProjectError: A value is not valid.
     """
     before = history.present
     known = {name: value for name, value in row.items() if name not in ("step", "do")}

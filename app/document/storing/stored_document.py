@@ -131,7 +131,7 @@ def document_of(content: Any) -> ProjectDocument:
 
     Raises:
         EntryError: An entry is missing, not known, or not of its kind.
-        ProjectError: A value makes no sense; says which.
+        ProjectError: A value is not valid; says which.
     """
     stored = to_type(content, _Stored)
     settings = replace(stored.settings, overrides=without_retired(stored.settings.overrides))
@@ -155,7 +155,7 @@ def document_of(content: Any) -> ProjectDocument:
 
 
 def check_numbers(edits: Sequence[Edit]) -> None:
-    """See that edits can be told apart.
+    """See that edits can be distinguished.
 
     Raises:
         ProjectError: They cannot.

@@ -74,7 +74,7 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
 
     Raises:
         MissingCodecError: This machine cannot encode the format.
-        ProjectError: The job makes no sense in this project, a clip is not trained or damaged, or there is no place
+        ProjectError: The job is not valid in this project, a clip is not trained or damaged, or there is no place
             for the result.
         CaptureError: The camera has no sound.
     """

@@ -1,4 +1,4 @@
-"""Trains and measures the variants of an ablation, each in a project folder of its own; goes on where it stopped.
+"""Trains and measures the variants of an ablation, each in a project folder of its own; resumes where it stopped.
 
 FOLDER/full-seed0/ and so on are ordinary projects, to be opened, reported or compared like any other. Variants that
 only change source clips take over the reference clip of "full" instead of training the same again.

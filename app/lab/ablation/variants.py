@@ -58,17 +58,17 @@ MIN_STEPS_PER_FRAME = 20
 VARIANTS = (
     Variant(FULL, "the settings as they are"),
     Variant("decoder-new", "without decoder inheritance (DI): new heads in every source clip", {"decoder": "new"}),
-    Variant("decoder-finetune", "inherited heads go on learning in every source clip", {"decoder": "finetune"}),
+    Variant("decoder-finetune", "inherited heads keep learning in every source clip", {"decoder": "finetune"}),
     Variant("residual-none", "without residual anchors: inherited anchors only", {"residual": "none"}),
     Variant(
         "residual-full",
         "without residual anchor compensation (RAC): all points of a clip beside the inherited anchors, however many",
         {"residual": "full"},
     ),
-    Variant("inherit-moving", "inherited moving anchors go on learning, static ones stay", {"inherit": "moving"}),
+    Variant("inherit-moving", "inherited moving anchors keep learning, static ones stay", {"inherit": "moving"}),
     Variant(
         "inherit-trainable",
-        "without anchor inheritance (AI): inherited anchors go on learning in every source clip",
+        "without anchor inheritance (AI): inherited anchors keep learning in every source clip",
         {"inherit": "trainable"},
     ),
     Variant(
@@ -79,12 +79,12 @@ VARIANTS = (
     ),
     Variant(
         "inherit-trainable-residual-full",
-        "without RAC and AI: all points of a clip, however many, and inherited anchors go on learning",
+        "without RAC and AI: all points of a clip, however many, and inherited anchors keep learning",
         {"inherit": "trainable", "residual": "full"},
     ),
     Variant(
         "field-continue",
-        "one field goes on from clip to clip, its last state shows all",
+        "one field continues from clip to clip, its last state shows all",
         {"field": "continue"},
         shares_reference=True,
     ),
@@ -230,7 +230,7 @@ def settings_of(
         n_cameras: Training cameras. A single long clip, and all frames of a stream together, get as many steps as all
             clips of "full" together, and clips of another length as many per frame.
         n_capture_frames: Where the chosen frames end before the capture does, they are cut without a remainder, because
-            the last clip would go on beyond them.
+            the last clip would continue beyond them.
     """
     from engine.training.config import TrainConfig
 

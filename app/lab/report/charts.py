@@ -1,4 +1,4 @@
-"""The charts of a report as PNG files. Colours are Okabe and Ito's and cividis: told apart with any colour vision."""
+"""The charts of a report as PNG files. Colours are Okabe and Ito's and cividis: distinct with any colour vision."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def draw_over_time(
 
     Args:
         frames: Frame indices of the values, or other numbers that count time.
-        borders: First frames of clips; a line stands before each, unless they are too many to be told apart.
+        borders: First frames of clips; a line stands before each, unless they are too many to be distinguished.
         unit: What is counted. Where frames are missing, lines end and begin anew.
     """
     breaks = [

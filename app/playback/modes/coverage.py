@@ -41,7 +41,7 @@ class CoveredSpace:
 
     @property
     def range(self) -> float:
-        """Distances up to this are told apart by colour, scene units, to two digits; 1 where no sphere has a size."""
+        """Distances up to this differ in colour, scene units, to two digits; 1 where no sphere has a size."""
         usual = float(np.median(self.radii)) if len(self.radii) else 0.0
         return float(f"{RANGE_RADII * usual:.1e}") if usual > 0.0 else 1.0
 

@@ -93,7 +93,7 @@ class Bookmarks:
 
 
 def read_bookmarks(values: Any) -> Bookmarks:
-    """Bookmarks from what `Bookmarks.values` has made; entries that make no sense are left out."""
+    """Bookmarks from what `Bookmarks.values` has made; entries that are not valid are left out."""
     items: list[Bookmark] = []
     for value in values if isinstance(values, list) else []:
         place = ViewPlace.read(value) if isinstance(value, dict) else None

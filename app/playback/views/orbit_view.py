@@ -146,7 +146,7 @@ class OrbitView:
         return self.look_through, self._shown_K(1000, 1000).tobytes(), self.world_to_camera().tobytes()
 
     def advance(self, dt_s: float) -> bool:
-        """Let a move go on. Whether it still does."""
+        """Let a move continue. Whether it still does."""
         if self._motion is not None:
             self._motion = self._motion.advanced(dt_s)
         return self._motion is not None
@@ -259,7 +259,7 @@ class OrbitView:
             self.fov_y = camera_fov(self.rig, camera)
 
     def look(self, camera_index: int | None) -> None:
-        """Look through a capture camera; None goes on freely from where that camera stands.
+        """Look through a capture camera; None continues freely from where that camera stands.
 
         Raises:
             ValueError: There is no such camera.

@@ -51,7 +51,7 @@ class ViewPlace:
 
     @classmethod
     def read(cls, values: dict[str, Any]) -> Self | None:
-        """A place from what `values` has made; None where that makes no sense. What older versions did not know of
+        """A place from what `values` has made; None where that is not valid. What older versions did not know of
         may be missing."""
         pivot = values.get("pivot")
         place = _numbers([(value, -1e6, 1e6) for value in pivot] if isinstance(pivot, list | tuple) else [])

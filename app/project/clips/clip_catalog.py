@@ -32,7 +32,7 @@ class ClipRecord:
     """One clip as it lies on disk. A value.
 
     Attributes:
-        state: untrained; stopped, with a checkpoint that its training goes on from; trained; stale, trained on
+        state: untrained; stopped, with a checkpoint that its training continues from; trained; stale, trained on
             something that is not there any more; damaged, a finished clip that cannot be read.
         step, n_steps: Of the state that is shown.
         held_out_psnr: dB: an evaluation's where there is one, else what the training measured last; None when not
@@ -40,7 +40,7 @@ class ClipRecord:
         held_out_whole: Whether that is over all frames in all held-out cameras; else it is over at most three pictures.
         file: The state to show; None when there is none.
         revision: Names that state; empty when there is none.
-        resume_step: The step that training this clip goes on from; None when it starts from the beginning.
+        resume_step: The step that training this clip continues from; None when it starts from the beginning.
         resume_n_steps: Steps of that training.
         reason: Why it is stale or damaged, what became of its checkpoint, or that it was trained with other pictures;
             empty otherwise.
@@ -213,7 +213,7 @@ class ClipCatalog:
 
     def _bases(self, *, replaced: int | None = None) -> list[Basis]:
         """Whether each clip stands on what it was trained on: one pass in the order of training, so that a chain of
-        clips that go on from each other costs no more than single ones.
+        clips that continue from each other costs no more than single ones.
 
         Args:
             replaced: Suppose that this clip had been trained again, with another result.
@@ -344,7 +344,7 @@ class ClipCatalog:
         return "Exclusions from training have changed since, so it was trained on other pictures."
 
     def _lost_checkpoint(self, kept: ClipHeader | None) -> str:
-        """Why the training cannot go on from a checkpoint; empty when it can. kept: None where it is damaged."""
+        """Why the training cannot continue from a checkpoint; empty when it can. kept: None where it is damaged."""
         if kept is None:
             return "Progress from before the stop cannot be read; training starts from the beginning."
         reference = None if not self.order else self._good(self.order[0])

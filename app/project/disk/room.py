@@ -29,7 +29,7 @@ class Room:
     Attributes:
         paths: The files.
         n_bytes: What they take.
-        n_clips: How many of them hold a clip or what was learned of one.
+        n_clips: How many of them hold a clip or the progress of one.
     """
 
     paths: tuple[Path, ...] = ()

@@ -171,7 +171,7 @@ def open_project(
 
 
 def repair_project(folder: Path | str) -> Path:
-    """Go on with the steps before the damage; see app.document.storing.recovery.
+    """Continue with the steps before the damage; see app.document.storing.recovery.
 
     Returns:
         The folder with what was damaged.

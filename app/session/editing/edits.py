@@ -71,7 +71,7 @@ class Edits:
         """Carry out a command; one that changes nothing does not become a step of the history.
 
         Raises:
-            ProjectError: It cannot be done now, or makes no sense.
+            ProjectError: It cannot be done now, or is not valid.
         """
         document = self._document.checked().document
         if isinstance(command, c.AddEdit) and command.target is None:
@@ -115,7 +115,7 @@ def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
 
 
 def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
-    """What a command makes of a document. Raises ProjectError where it makes no sense."""
+    """What a command makes of a document. Raises ProjectError where it is not valid."""
     match command:
         case c.AddEdit(action=action, target=target, scope=scope, is_inverted=is_inverted, name=name):
             added = edit_changes.add_edit(document, action, target, scope=scope, is_inverted=is_inverted, name=name)

@@ -60,7 +60,7 @@ def found_by(command: SelectionCommand, ground: Ground) -> np.ndarray:
     afterwards. [N] bool
 
     Raises:
-        ValueError: The command makes no sense: an attribute that does not exist.
+        ValueError: The command is not valid: an attribute that does not exist.
         TypeError: It finds nothing by itself.
     """
     gaussians, selected = ground.gaussians, ground.selected

@@ -143,7 +143,7 @@ class ProjectSelecting:
         """Carry out a command; what takes long is found by a thread and taken up in `poll`.
 
         Raises:
-            ProjectError: There is nothing to select, or the command makes no sense.
+            ProjectError: There is nothing to select, or the command is not valid.
         """
         if isinstance(command, ClearSelection | Reselect) and not self._is_busy:
             self._change(command)

@@ -13,7 +13,7 @@ class AskSaveAs:
 
 @dataclass(frozen=True, slots=True)
 class SaveProjectAs:
-    """Copy the open project into a new folder and go on in that one."""
+    """Copy the open project into a new folder and continue in that one."""
 
     folder: Path
 

@@ -10,7 +10,7 @@ from app.document.storing.recovery import Recovery
 
 @dataclass(frozen=True, slots=True)
 class RecoveryQuestion:
-    """How to go on with a project whose document or journal is damaged?
+    """How to continue with a project whose document or journal is damaged?
 
     Attributes:
         recovery: What is damaged, and what is left.
@@ -55,7 +55,7 @@ SAVING = "Saving the project"
 
 @dataclass(frozen=True, slots=True)
 class SavingQuestion:
-    """Is the project to go on being copied? It is up while that is done.
+    """Is the project to continue being copied? It is up while that is done.
 
     Attributes:
         folder: Of the copy.

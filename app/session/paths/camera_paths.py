@@ -48,7 +48,7 @@ class CameraPaths:
         """Carry out a command on what the current view shows.
 
         Raises:
-            ProjectError: It cannot be done now, or makes no sense.
+            ProjectError: It cannot be done now, or is not valid.
         """
         status, view = self.status(), views.current.view
         match command:

@@ -121,7 +121,7 @@ def _document(values: Preferences) -> dict[str, Any]:
 
 
 def _read(path: Path) -> Preferences:
-    """The values in a file. One that makes no sense is left out, and the others are taken."""
+    """The values in a file. One that is not valid is left out, and the others are taken."""
     preferences = Preferences()
     try:
         found = read_checked_json(path, max_bytes=MAX_BYTES)

@@ -82,7 +82,7 @@ class Settings:
 
 
 def _taken(found: Any, kind: type[Value]) -> Value:
-    """The values of a document; the usual ones where they make no sense."""
+    """The values of a document; the usual ones where they are not valid."""
     try:
         return kind() if found is None else msgspec.convert(found, kind)
     except msgspec.ValidationError:

@@ -40,7 +40,7 @@ WRITING_TIMEOUT_S = 5.0
 class WindowMemory:
     """The values, read once; `save` writes them if they are others than those on disk.
 
-    A file that is damaged counts as empty, never as a failure; so does a value in it that makes no sense.
+    A file that is damaged counts as empty, never as a failure; so does a value in it that is not valid.
 
     Attributes:
         path: The file.
@@ -179,7 +179,7 @@ def _look_of(view: OrbitView, overlays: Overlays) -> dict[str, Any]:
 
 
 def show_again(session: SessionView, kept: dict[str, Any]) -> None:
-    """Go back to what `view_of` has kept. What makes no sense for this capture stays as it is."""
+    """Go back to what `view_of` has kept. What is not valid for this capture stays as it is."""
     timeline = session.timeline
     frame_index = _number(kept.get("frame_index"), 0, timeline.last_frame)
     if frame_index is not None:

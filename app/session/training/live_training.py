@@ -59,7 +59,7 @@ class LiveTraining:
 
     def open(self, opened: OpenedProject, catalog: ClipCatalog | None = None) -> None:
         """Take up a project, or the same one with other settings. What trains in another one is ended on a thread,
-        keeping what was learned.
+        keeping progress.
 
         Args:
             catalog: What lies on disk of its clips; read here when None.
@@ -138,7 +138,7 @@ class LiveTraining:
     # ---------------------------------------------------------------- commands
 
     def train_next(self) -> None:
-        """Train the first clip that is not finished, or go on with a queue that was held.
+        """Train the first clip that is not finished, or continue with a queue that was held.
 
         Raises:
             ProjectError: It cannot be trained.
@@ -213,7 +213,7 @@ class LiveTraining:
             self.service.go_on()
 
     def stop(self) -> None:
-        """End the running training, keep what was learned and empty the queue."""
+        """End the running training, keep progress and empty the queue."""
         if self.service is not None:
             self.service.stop()
 
@@ -317,7 +317,7 @@ class LiveTraining:
         return tuple(None if found is None else found[0] for found in newest)
 
     def close(self) -> None:
-        """End the worker, keeping what was learned, and the threads. Blocks for a few seconds at most."""
+        """End the worker, keeping progress, and the threads. Blocks for a few seconds at most."""
         if self.service is not None:
             self.service.close()
         self._curves.close()

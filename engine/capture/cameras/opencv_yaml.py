@@ -103,7 +103,7 @@ class _Lines:
         return self._next
 
     def take(self) -> str | None:
-        """The next line, and go on."""
+        """The next line, and continue."""
         taken = self._next
         self._next = next(self._lines, None)
         return taken

@@ -165,7 +165,7 @@ def _look_at_video(reading: _Reading, name: str) -> tuple[Path, VideoHeader]:
 
 
 def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
-    """One entry of "cameras". Adds its problems; None when there is too little to go on."""
+    """One entry of "cameras". Adds its problems; None when there is too little to continue."""
     path = reading.folder / CAMERAS_FILE
     hint = "Export the capture again."
     if not isinstance(row, dict) or not isinstance(row.get("name"), str) or not isinstance(row.get("file"), str):

@@ -1,7 +1,7 @@
 """Checks shared by the format readers. Each returns the problems it found as CaptureErrors; readers list them all.
 
 A problem says what was found, with numbers, what to do, and names the file. Nothing is raised here except by
-`raise_problems` and the two file readers that cannot go on.
+`raise_problems` and the two file readers that cannot continue.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 Most of a picture shows the same surfaces as a still picture of the same camera, a person or a shadow does not. The
 ratio that most pixels share is the camera's gain: the densest ratio is found first, whatever else there is, and refined
 from the ratios near it. Only pixels that are neither dark nor white count. Changes too small
-to be told from noise are dropped, so that a camera that does not change is left alone.
+to be distinguished from noise are dropped, so that a camera that does not change is left alone.
 
-Not a light model: what changes in all cameras alike, such as daylight, cannot be told from their exposure, and counts
+Not a light model: what changes in all cameras alike, such as daylight, looks like their exposure, and counts
 as that.
 """
 
@@ -62,7 +62,7 @@ class Exposure:
         return cls(at_working_size(background), np.ones(3))
 
     def gains_of(self, frames: np.ndarray) -> np.ndarray:
-        """Gain of each frame against this exposure; exactly 1 where it cannot be told from 1. [T, 3] float32
+        """Gain of each frame against this exposure; exactly 1 where it cannot be distinguished from 1. [T, 3] float32
 
         Args:
             frames: Of the same camera. [T, H, W, 3] uint8

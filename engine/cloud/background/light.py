@@ -3,7 +3,7 @@
 A shadow, a lamp or what a person reflects changes a surface for every camera that sees it. So each camera says, pixel
 by pixel, how bright it finds what stands still; an anchor takes the median of the cameras that see it, and only where
 most of them agree, which those that see a person in front of the surface do not. Neighbours are averaged. Changes too
-small to be told from noise are dropped, so that a surface on which nothing changes keeps its colours to the bit.
+small to be sure of are dropped, so that a surface on which nothing changes keeps its colours to the bit.
 
 Brightness alone, no colour: with a colour per anchor, still pixels of cameras left out came out no better.
 """

@@ -1,7 +1,7 @@
 """Points where no training camera looks, so that a view from between the cameras shows something smooth, never a hole.
 
 Seen from the cameras with a wider picture, and from half way between neighbouring ones, the cloud ends somewhere: at
-the edge of all pictures, behind what stands in front. There its surface is continued by a thin plate, which goes on
+the edge of all pictures, behind what stands in front. There its surface is continued by a thin plate, which continues
 flat, in the colours around. What a camera looks through is left out, so nothing gets in the way of what is seen.
 """
 
@@ -18,7 +18,7 @@ from engine.cloud.stereo.depth.fill import fill_inverse_depth
 from engine.cloud.voxel import voxel_means
 
 MARGIN = 0.3
-"""The wider pictures go on by this share of the width and of the height on every side."""
+"""The wider pictures continue by this share of the width and of the height on every side."""
 VIEW_WIDTH_PX = 96
 N_NEIGHBORS = 2
 """Each camera is joined with so many of the nearest ones by a view from half way."""

@@ -19,7 +19,7 @@ STILL_SHARE = 0.08
 MOVING_SHARE = 0.4
 """... while the others change by more than this share of what is usual for them."""
 LEAST_CHANGE = 0.02
-"""Mean grey levels that usually change; less cannot be told from nothing."""
+"""Mean grey levels that usually change; less cannot be distinguished from nothing."""
 MANY = 0.6
 """Share of the cameras that makes it a repeated moment, not a frozen camera."""
 BAD_SHARE = 0.1

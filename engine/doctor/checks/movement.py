@@ -49,7 +49,7 @@ def check_movement(look: PictureSurvey, tell: Callable[[float], None] = lambda d
     findings = []
     for row, found in enumerate(map_ordered(motions, range(len(look.cameras)))):
         has_moved = found > MOVED_SHARE
-        # one picture alone may be a passer-by close to the lens; a camera that was moved stays there or goes on
+        # one picture alone may be a passer-by close to the lens; a camera that was moved stays there or continues
         if has_moved.sum() >= 2 or (len(found) and has_moved[-1]):
             findings.append(_finding(look, row, frames, found, has_moved))
     return findings

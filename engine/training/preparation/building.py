@@ -100,7 +100,7 @@ def inheriting_model(reference: ClipState, clip: Clip, backend: ModelBackend, *,
     """A source clip before its motion is known: all that the reference has, and no moving anchor alive yet.
 
     Args:
-        learns: Whether the anchors go on learning. The decoder is frozen.
+        learns: Whether the anchors keep learning. The decoder is frozen.
     """
     presence = {
         # promoted anchors are part of the still scene and exist at all times; what moves is not known yet

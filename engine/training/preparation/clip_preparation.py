@@ -117,7 +117,7 @@ class ClipPreparation:
         camera_indices: Training cameras, in capture numbering.
         cameras: The same, as they are by now.
         base: What the clip inherits from; None for a reference clip.
-        previous: The clip before, finished, for a method that goes on from it.
+        previous: The clip before, finished, for a method that continues from it.
         regions: Where the user overrules the gate.
         seed: Of new decoder heads.
         generator: Draws all other initial values.
@@ -213,7 +213,7 @@ class ClipPreparation:
 
         Raises:
             PreparationError: It needs a static cloud of its own and no static point was found.
-            ProjectError: The reference was trained with other cameras, or the field before cannot go on.
+            ProjectError: The reference was trained with other cameras, or the field before cannot continue.
         """
         parts = self._inherited_parts(reference, pictures)
         model, moving_spacing = parts.model, None

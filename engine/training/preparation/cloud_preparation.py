@@ -59,7 +59,7 @@ class Backgrounds:
 
     @classmethod
     def none(cls) -> Backgrounds:
-        """Of no camera: for a clip that goes on without them."""
+        """Of no camera: for a clip that continues without them."""
         return cls(np.zeros((0, 0, 0, 3), np.uint8), np.zeros((0, 0, 0), bool))
 
     def equals(self, other: Backgrounds) -> bool:

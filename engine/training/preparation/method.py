@@ -27,7 +27,7 @@ class Method:
     """The decisions. Owns nothing; the numbers are those of the settings.
 
     Attributes:
-        learns_inherited: Whether all inherited anchors go on learning; they are stored with the clip then.
+        learns_inherited: Whether all inherited anchors keep learning; they are stored with the clip then.
         builds_static: Whether a source clip has static anchors of its own in place of all inherited ones.
         obeys_regions: Whether regions that the user marks count.
         has_active_tiles: Whether a step of a source clip may leave out tiles that nothing learning touches.

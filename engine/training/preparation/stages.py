@@ -1,4 +1,4 @@
-"""Finished pieces of a clip's preparation as files, so that one that was stopped or killed goes on behind them.
+"""Finished pieces of a clip's preparation as files, so that one that was stopped or killed continues behind them.
 
 prep/clip-0000-3.safetensors    some pieces of clip 0, as arrays "piece/array"
 

@@ -30,7 +30,7 @@ class ShuffledOrder:
         return self._items[self._left.pop()]
 
     def state(self) -> dict:
-        """JSON-able state, to go on exactly here."""
+        """JSON-able state, to continue exactly here."""
         return {
             "left": list(self._left),
             "generator": self._generator.bit_generator.state,

@@ -38,7 +38,7 @@ def method_of(config: TrainConfig, *, previous: ClipState | None) -> Method:
 
     Args:
         config: All settings of a clip's training.
-        previous: The clip before, finished; with start=previous a clip goes on from there.
+        previous: The clip before, finished; with start=previous a clip continues from there.
     """
     if config.start == "previous" and previous is not None:
         return StreamingMethod(config)
@@ -152,7 +152,7 @@ class VariantMethod(Method):
 
 
 class StreamingMethod(VariantMethod):
-    """start=previous: a clip goes on from everything that the clip before has learned, and all of it learns on."""
+    """start=previous: a clip continues from everything that the clip before has learned, and all of it learns on."""
 
     def __init__(self, config: TrainConfig) -> None:
         super().__init__(config.going_on())

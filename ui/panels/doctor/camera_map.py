@@ -108,7 +108,7 @@ def draw_bars(rig: CameraRig, camera_px: np.ndarray, chosen: frozenset[str], hei
 
 
 def _draw_sign(draw: imgui.ImDrawList, x: float, y: float, severity: str | None, color: int) -> None:
-    """A dot, a triangle for a warning, a square for an error: told apart without colours."""
+    """A dot, a triangle for a warning, a square for an error: distinct without colours."""
     if severity == "error":
         draw.add_rect_filled(ImVec2(x - 5, y - 5), ImVec2(x + 5, y + 5), color)
     elif severity == "warning":

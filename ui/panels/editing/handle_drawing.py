@@ -1,5 +1,5 @@
 """Handles of what is edited, drawn over one picture: wire, points and rings, each with a dark rim and a shape of its
-own, so that they are told apart on light and dark and without colours.
+own, so that they are distinguished on light and dark and without colours.
 """
 
 from __future__ import annotations

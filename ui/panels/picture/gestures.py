@@ -1,6 +1,6 @@
 """Gestures: what the buttons and the wheel of the mouse do over the picture, as one table per preset.
 
-A preset is chosen, never guessed: a wheel and a touchpad cannot be told apart by what they send.
+A preset is chosen, never guessed: a wheel and a touchpad cannot be distinguished by what they send.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def draw_clip_menu(stage: TimelineStage, session: SessionView, dispatch: Dispatc
         ui.timeline.is_menu_wanted = False
         ui.timeline.menu_frame = session.timeline.frame_index
         imgui.open_popup(POPUP)
-        imgui.set_nav_cursor_visible(True)  # the keyboard goes on in it at once
+        imgui.set_nav_cursor_visible(True)  # the keyboard continues in it at once
     if not imgui.begin_popup(POPUP):
         return
     clip = session.timeline.clip_of(ui.timeline.menu_frame)

@@ -34,7 +34,7 @@ def draw_clip_training(
     """Entries: train or retry, from here, all, with other settings, out of the queue, earlier versions.
 
     Args:
-        is_by_key: The menu was opened by a key, which then goes on at the first entry.
+        is_by_key: The menu was opened by a key, which then continues at the first entry.
     """
     status, reference = session.clip_states[clip_index], session.reference_index
     project = session.project_status

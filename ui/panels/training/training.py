@@ -58,7 +58,7 @@ def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
 
 
 def next_label(session: SessionView) -> str:
-    """What starts the next clip, with its icon: a clip that was stopped goes on where that was."""
+    """What starts the next clip, with its icon: a clip that was stopped resumes where that was."""
     index, step = session.training.next_clip_index, session.training.resume_step
     if index is None:
         is_all = all(state.state == "trained" for state in session.clip_states)

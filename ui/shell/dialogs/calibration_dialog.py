@@ -1,6 +1,6 @@
 """The dialog that makes a capture of plain videos: the cameras found, how they are calibrated, progress, the result.
 
-Enter goes on, Escape goes back: it stops a calibration that runs, and closes the dialog otherwise.
+Enter continues, Escape goes back: it stops a calibration that runs, and closes the dialog otherwise.
 """
 
 from __future__ import annotations

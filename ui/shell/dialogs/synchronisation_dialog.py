@@ -1,6 +1,6 @@
 """The dialog that shows how far cameras are ahead of each other, how certain that is, and corrects it on request.
 
-Enter goes on where there is something to correct; Escape closes, and stops a measurement that runs.
+Enter continues where there is something to correct; Escape closes, and stops a measurement that runs.
 """
 
 from __future__ import annotations

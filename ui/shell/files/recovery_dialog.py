@@ -1,4 +1,4 @@
-"""The dialog for a project whose document or journal is damaged: what is wrong, and three ways to go on."""
+"""The dialog for a project whose document or journal is damaged: what is wrong, and three ways to continue."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BUTTON = ImVec2(170, 34)
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """One way to go on.
+    """One way to continue.
 
     Attributes:
         title, detail: What it is and what it means.

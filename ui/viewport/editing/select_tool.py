@@ -158,7 +158,7 @@ class SelectTool:
         self.points, self.held_mode, self.surface = [(x, y)], mode, surface
 
     def extend(self, x: float, y: float) -> None:
-        """The pointer went on."""
+        """The pointer moved on."""
         last = self.points[-1]
         if abs(x - last[0]) + abs(y - last[1]) >= LEAST_STEP_PX:
             self.points.append((x, y))

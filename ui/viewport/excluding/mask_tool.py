@@ -55,7 +55,7 @@ class MaskTool:
         self.radius = min(max(self.radius * GROWTH**steps, SMALLEST), LARGEST)
 
     def extend(self, x: float, y: float) -> None:
-        """The stroke goes on to here, in shares; slightly outside is allowed."""
+        """The stroke continues to here, in shares; slightly outside is allowed."""
         x, y = min(max(x, -0.5), 1.5), min(max(y, -0.5), 1.5)
         if not self.points or max(abs(self.points[-1][0] - x), abs(self.points[-1][1] - y)) >= LEAST_STEP:
             self.points.append((round(x, 5), round(y, 5)))

@@ -23,11 +23,11 @@ ON_REQUEST = BASELINE | {"is_on_request": True}
 PINNED: dict[str, tuple[dict[str, Any], dict[str, Any], list[str]]] = {
     "full": ({}, {}, ["settings as they are"]),
     "decoder-new": ({"decoder": "new"}, {}, ["new heads in every source clip"]),
-    "decoder-finetune": ({"decoder": "finetune"}, {}, ["inherited heads go on learning"]),
+    "decoder-finetune": ({"decoder": "finetune"}, {}, ["inherited heads keep learning"]),
     "residual-none": ({"residual": "none"}, {}, ["inherited anchors only"]),
     "residual-full": ({"residual": "full"}, {}, ["all points of a clip", "however many"]),
-    "inherit-moving": ({"inherit": "moving"}, {}, ["moving anchors go on learning, static ones stay"]),
-    "inherit-trainable": ({"inherit": "trainable"}, {}, ["inherited anchors go on learning"]),
+    "inherit-moving": ({"inherit": "moving"}, {}, ["moving anchors keep learning, static ones stay"]),
+    "inherit-trainable": ({"inherit": "trainable"}, {}, ["inherited anchors keep learning"]),
     "inherit-off": (
         {"inherit": "off"},
         {},
@@ -36,9 +36,9 @@ PINNED: dict[str, tuple[dict[str, Any], dict[str, Any], list[str]]] = {
     "inherit-trainable-residual-full": (
         {"inherit": "trainable", "residual": "full"},
         {},
-        ["all points of a clip, however many", "inherited anchors go on learning"],
+        ["all points of a clip, however many", "inherited anchors keep learning"],
     ),
-    "field-continue": ({"field": "continue"}, {}, ["one field goes on from clip to clip"]),
+    "field-continue": ({"field": "continue"}, {}, ["one field continues from clip to clip"]),
     "clips-shorter": ({}, OWN | {"cut": "shorter"}, ["half the length", "as many steps a frame"]),
     "clips-longer": ({}, OWN | {"cut": "longer"}, ["twice the length", "as many steps a frame"]),
     "reference-middle": ({}, OWN | {"is_reference_moved": True}, ["in the middle is the reference"]),

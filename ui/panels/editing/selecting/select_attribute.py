@@ -92,7 +92,7 @@ def _draw_histogram(spread: ValueSpread, tool: SelectTool, ui: UiState) -> None:
         x0 = area.x0 + index * bar
         if is_in:
             draw.add_rect_filled(ImVec2(x0, top), ImVec2(x0 + max(bar - 1, 1), area.y1), theme.u32(color))
-        else:  # told apart without its hue too
+        else:  # distinguished without its hue too
             draw.add_rect(ImVec2(x0, top), ImVec2(x0 + max(bar - 1, 2), area.y1), theme.u32(color))
     for share in (low, high):
         x = area.x0 + share * width

@@ -26,7 +26,7 @@ EASY = 2.0
 
 
 def draw_path_lane(stage: TimelineStage, session: SessionView) -> None:
-    """A line from the first to the last key, a diamond per key; a loop goes on, fainter, till it is back."""
+    """A line from the first to the last key, a diamond per key; a loop continues, fainter, till it is back."""
     status, row, scale = session.paths, stage.rows[CAMERA], stage.scale
     path = status.path
     if path is None or not path.keys:

@@ -72,7 +72,7 @@ def draw_map(report: CaptureReport, holdout: frozenset[str], box: Rect, ui: UiSt
         length = max(float(np.linalg.norm(looks[row])), 1e-9)
         dx, dy = looks[row] * (LOOK_LENGTH / max(length, 0.2))
         draw.add_line(ImVec2(x, y), ImVec2(x + dx, y + dy), color, 1.5)
-        if is_out:  # told apart by their shape, too
+        if is_out:  # distinguished by their shape, too
             draw.add_rect_filled(ImVec2(x - DOT, y - DOT), ImVec2(x + DOT, y + DOT), theme.u32(theme.BACKDROP))
             draw.add_rect(ImVec2(x - DOT, y - DOT), ImVec2(x + DOT, y + DOT), color, 0.0, 2.0)
         else:
