@@ -2,7 +2,7 @@
 
 What differs is data: which anchor sets there are, which of them are trainable, and whether decoder and static sets are
 inherited. Sets: "static", "moving" and "promoted" come from the reference clip; "residual" is what a source clip adds,
-"adapted" are moving ones that go on learning in a source clip and take the place of the inherited ones there.
+"adapted" are moving ones that keep learning in a source clip and take the place of the inherited ones there.
 "promoted" anchors stood still in space but changed in the reference clip, as under a lamp: they exist in all frames of
 all clips. "replacing" ones are the same for one source clip: they take the place of static anchors that the clip hides.
 """

@@ -32,7 +32,7 @@ def inherit(
     Args:
         reference: A finished reference clip.
         presence: Gate in time of dynamic sets in the clip that inherits; sets without one are left out. [A, M] bool
-        is_trainable: Whether the anchors go on learning (an ablation; they are stored with the clip then).
+        is_trainable: Whether the anchors keep learning (an ablation; they are stored with the clip then).
         hidden: Rows that are left out, by role. [A] bool
     """
     decoder = _read_decoder(reference)
@@ -52,7 +52,7 @@ def inherit(
 def load_clip_model(
     state: ClipState, reference: ClipState | None, *, backend: ModelBackend, is_learning: bool = False
 ) -> ClipModel:
-    """Rebuild a clip for viewing or for going on.
+    """Rebuild a clip for viewing or for continuing.
 
     Args:
         state: The clip.
@@ -105,7 +105,7 @@ def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBacken
         light = _read_light(state, reference)
         sets = inherited | _read_sets(state, is_trainable=True)
         sets = {role: sets[role] for role in ROLES if role in sets}
-        if any(name.startswith(DECODER) for name in state.arrays):  # it went on learning in this clip
+        if any(name.startswith(DECODER) for name in state.arrays):  # it continued learning in this clip
             decoder = _read_decoder(state)
     model = ClipModel(
         sets=sets,
