@@ -137,7 +137,9 @@ class TrainingStatus:
 
     Attributes:
         state: idle, starting, preparing, running, paused, stopping or failed.
-        clip_index: Clip of the worker, or of the last one that failed; None when idle.
+        clip_index: Clip of the worker, or of the last one that failed; None when idle. Of several that train, the one
+            that began first: everything else here is about that one.
+        n_running: How many clips train.
         step, n_steps: Optimiser steps of that clip.
         progress: Share of the current stage while preparing, of all steps later. 0..1
         stage: What is done at the moment, as shown to the user.
@@ -157,6 +159,7 @@ class TrainingStatus:
 
     state: str = "idle"
     clip_index: int | None = None
+    n_running: int = 0
     step: int = 0
     n_steps: int = 0
     progress: float = 0.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -43,7 +43,7 @@ def read_usage(pid: int | None = None) -> ProcessUsage:
 
 
 class UsageMeter:
-    """Usage of the window's process and of a training. For one thread; takes a tenth of a millisecond.
+    """Usage of the window's process and of trainings. For one thread; takes a tenth of a millisecond.
 
     Args:
         clock: Seconds.
@@ -58,31 +58,34 @@ class UsageMeter:
         self._before: dict[int | None, float] = {}
         self._status = UsageStatus(n_cores=n_cores())
 
-    def sample(self, worker_pid: int | None) -> UsageStatus:
+    def sample(self, worker_pids: Sequence[int]) -> UsageStatus:
         """The usage now, or that of the last look while that is less than a second ago.
 
         Args:
-            worker_pid: Process of the training; None without one.
+            worker_pids: Processes of trainings.
         """
         now_s = self._clock()
         passed_s = now_s - self._sampled_s
         if passed_s < SAMPLE_EVERY_S:
             return self._status
-        found: dict[int | None, ProcessUsage] = {None: self._read(None)}
-        if worker_pid is not None:
-            found[worker_pid] = self._read(worker_pid)
+        found = {pid: self._read(pid) for pid in (None, *worker_pids)}
         cores: dict[int | None, float | None] = {}
         for pid, usage in found.items():
             before = self._before.get(pid)
             cores[pid] = None if before is None or usage.cpu_s is None else max(usage.cpu_s - before, 0.0) / passed_s
         self._before = {pid: usage.cpu_s for pid, usage in found.items() if usage.cpu_s is not None}
         self._sampled_s = now_s
-        training = found.get(worker_pid) if worker_pid is not None else None
         self._status = UsageStatus(
             window_mb=found[None].memory_mb,
             window_cores=cores[None],
-            training_mb=None if training is None else training.memory_mb,
-            training_cores=None if training is None else cores.get(worker_pid),
+            training_mb=_together([found[pid].memory_mb for pid in worker_pids]),
+            training_cores=_together([cores[pid] for pid in worker_pids]),
             n_cores=n_cores(),
         )
         return self._status
+
+
+def _together(values: list[float | None]) -> float | None:
+    """Their sum; None where none is known."""
+    known = [value for value in values if value is not None]
+    return sum(known) if known else None

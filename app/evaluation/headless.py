@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,11 @@ from app.project.clips.clip_versions import read_finished, recovery_hint
 from app.project.opening.opening import open_capture_of
 from app.project.project import Project
 from app.status import TrainingStatus
-from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
+from app.training.clip_run import ClipRun
+from app.training.messages import ENDINGS, ClipTrained, Event, TrainingFailed, WorkerDied
 from app.training.service import TrainingService
-from app.training.train_queue import OwnSettings
+from app.training.train_queue import OwnSettings, needed_clips
+from app.training.training_status import training_status
 from engine.backends.table import process_backend
 from engine.camera.corrections import corrected
 from engine.camera.rig import CameraRig
@@ -74,10 +76,11 @@ def train_clips(
     own: OwnSettings | None = None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> list[ClipOutcome]:
-    """Train clips one after another; a failure ends it. KeyboardInterrupt stops, keeps and is raised again.
+    """Train clips, as many side by side as the service does; after a failure no other one begins. KeyboardInterrupt
+    stops, keeps and is raised again.
 
     Args:
-        service: Queue and worker of the project.
+        service: Queue and workers of the project.
         clip_indices: In order.
         on_status, on_event, on_outcome: Told how it goes.
         on_begin: Told the index of each clip before it is trained; not of those that are left as they are.
@@ -86,51 +89,49 @@ def train_clips(
         sleep: Waits some seconds between looks.
     Raises:
         ProjectError: A clip cannot be trained, for instance because its reference is not.
-        KeyboardInterrupt: After the worker has ended and its checkpoint is written.
+        KeyboardInterrupt: After the workers have ended and their checkpoints are written.
     """
     outcomes: list[ClipOutcome] = []
-    for clip_index in clip_indices:
-        known = service.catalog[clip_index]
-        if known.state == "trained" and not is_again:
-            outcome = ClipOutcome(
-                clip_index, "skipped", known.step, known.held_out_psnr, held_out_whole=known.held_out_whole
-            )
-        elif (known.state == "damaged" and not is_again) or known.blocked_by is not None:
-            outcome = _left_alone(service, clip_index)
-        else:
-            on_begin(clip_index)
-            outcome = _train_clip(service, clip_index, own, on_status, on_event, sleep)
+    waiting, begun = list(clip_indices), dict[int, float]()
+
+    def end(outcome: ClipOutcome) -> None:
         outcomes.append(outcome)
         on_outcome(outcome)
         if outcome.state == "failed":
-            break
+            waiting.clear()
+
+    while waiting or begun:
+        while waiting and _has_room(service, waiting[0], begun):
+            clip_index = waiting.pop(0)
+            left = _left_as_it_is(service, clip_index, is_again=is_again)
+            if left is not None:
+                end(left)
+                continue
+            on_begin(clip_index)
+            service.add(clip_index, own)
+            begun[clip_index] = time.monotonic()
+        service.go_on()
+        runs = dict(service.runs)
+        try:
+            for clip_index, event in service.poll():
+                on_event(event)
+                if isinstance(event, ENDINGS):
+                    end(_outcome(service, runs[clip_index], event, time.monotonic() - begun.pop(clip_index)))
+            on_status(training_status(service))
+            sleep(POLL_EVERY_S)
+        except KeyboardInterrupt:
+            service.close(timeout_s=STOP_TIMEOUT_S)
+            raise
     return outcomes
 
 
-def _train_clip(
-    service: TrainingService,
-    clip_index: int,
-    own: OwnSettings | None,
-    on_status: Callable[[TrainingStatus], None],
-    on_event: Callable[[Event], None],
-    sleep: Callable[[float], None],
-) -> ClipOutcome:
-    started_s = time.monotonic()
-    service.enqueue(clip_index, own)
-    ending: Event | None = None
-    try:
-        while service.worker is not None:
-            for event in service.poll():
-                on_event(event)
-                if isinstance(event, ClipTrained | TrainingStopped | TrainingFailed | WorkerDied):
-                    ending = event
-            on_status(service.status())
-            sleep(POLL_EVERY_S)
-    except KeyboardInterrupt:
-        service.close(timeout_s=STOP_TIMEOUT_S)
-        raise
-    seconds = time.monotonic() - started_s
-    step = service.status().step
+def _has_room(service: TrainingService, clip_index: int, begun: Collection[int]) -> bool:
+    needed = needed_clips(service.project, clip_index)
+    return len(begun) < service.n_workers and not any(index in begun for index in needed)
+
+
+def _outcome(service: TrainingService, run: ClipRun, ending: Event, seconds: float) -> ClipOutcome:
+    clip_index, step = run.clip_index, run.step
     match ending:
         case ClipTrained():
             return ClipOutcome(clip_index, "trained", ending.step, ending.held_out_psnr, seconds)
@@ -149,6 +150,16 @@ def _train_clip(
             return ClipOutcome(clip_index, "failed", step, seconds=seconds, message=f"{ending.reason}.", hint=hint)
         case _:
             return ClipOutcome(clip_index, "stopped", step, seconds=seconds)
+
+
+def _left_as_it_is(service: TrainingService, clip_index: int, *, is_again: bool) -> ClipOutcome | None:
+    """How a clip ends that is not trained now; None for one that is."""
+    known = service.catalog[clip_index]
+    if known.state == "trained" and not is_again:
+        return ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr, held_out_whole=known.held_out_whole)
+    if (known.state == "damaged" and not is_again) or known.blocked_by is not None:
+        return _left_alone(service, clip_index)
+    return None
 
 
 def _left_alone(service: TrainingService, clip_index: int) -> ClipOutcome:

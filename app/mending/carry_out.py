@@ -51,7 +51,15 @@ def mend(job: MendJob, report: ReportProgress) -> MendResult:
         clip, seed = opened.clips[clip_index], settings.seed
         quiet = lambda progress: report(Progress(progress.stage, 0.0, progress.message))  # noqa: E731
         return clip_training(
-            project, capture, clip, config, holdout=holdout, seed=seed, reference=reference, report=quiet
+            capture,
+            clip,
+            config,
+            holdout=holdout,
+            seed=seed,
+            reference=reference,
+            prep_dir=project.prep_dir,
+            regions=project.document.regions,
+            report=quiet,
         )
 
     n_threads = n_cores() if job.n_threads is None else job.n_threads

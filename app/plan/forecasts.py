@@ -20,6 +20,8 @@ from app.project.clips.clip_catalog import ClipCatalog, ClipRecord
 from app.project.disk.discarding import progress_of
 from app.project.project import Project
 from app.status import PlanStatus, QueuedClip, QueueStatus, SequenceForecast
+from app.training.clip_run import ClipRun
+from app.training.due import due_clips, stale_clips
 from app.training.own_settings import is_source
 from app.training.service import TrainingService
 from engine.capture.capture import Capture
@@ -130,7 +132,7 @@ class Forecasts:
     ) -> tuple[ForecastRequest, tuple[ForecastRequest, Plans] | None]:
         """What is to be planned now, and what was planned last of this project; asks for it where that says less."""
         basis = (f"{project.settings!r} {id(project.document.exclusions)}", service.catalog.revision)
-        is_idle, index = service.worker is None, service.next_clip_index
+        is_idle, index = not service.is_busy, service.next_clip_index
         next_clip = service.clips[index] if is_idle and index is not None else None
         request = ForecastRequest(
             basis, next_clip, can_measure and is_idle, project, capture, service.clips, service.catalog
@@ -164,11 +166,10 @@ class Forecasts:
         """The queue as it is shown, its figures a moment later."""
         _, newest = self._ask(service, project, capture, can_measure=can_measure)
         plans = NO_PLANS if newest is None else newest[1]
-        running, steps = service.running_clip, service.steps_of_run
-        waiting = self._waiting(service, project, plans.kinds)
-        going = () if running is None else (_running_part(service, self._parts[running]),)
+        runs, waiting = service.runs, self._waiting(service, project, plans.kinds)
+        going = [_running_part(run, self._parts[index]) for index, run in runs.items()]
         queued, everything = together([*going, waiting.queued]), together([*going, waiting.everything])
-        n_done = service.queue.steps_done + steps[0]
+        n_done = service.queue.steps_done + sum(run.step for run in runs.values())
         return QueueStatus(
             waiting=waiting.clips,
             failed=tuple(sorted(service.queue.failed.items())),
@@ -186,7 +187,7 @@ class Forecasts:
     def _waiting(self, service: TrainingService, project: Project, kinds: Mapping[Kind, TrainingPlan]) -> Waiting:
         """What does not depend on the clip that trains; made anew only when something has changed, since clips may be
         thousands and this is asked for at every change of the picture."""
-        queue, running = service.queue, service.running_clip
+        queue, running = service.queue, tuple(service.runs)
         clips = tuple(queue)
         own = tuple(index for index in clips if queue.own_settings(index) is not None)
         waiting_of = (id(service), service.catalog.revision, kinds, running, clips, own)
@@ -194,12 +195,12 @@ class Forecasts:
             return self._kept
         self._waiting_of = waiting_of
         parts = self._parts = _clip_parts(service, project, kinds, own)
-        due = {*service.unfinished, *clips} - {running}
+        due = {*due_clips(service.catalog), *clips}.difference(running)
         self._kept = Waiting(
             tuple(QueuedClip(index, parts[index].n_steps, parts[index].seconds, index in own) for index in clips),
             together([parts[index] for index in clips]),
             together([parts[index] for index in sorted(due)]),
-            together([parts[index] for index in service.stale if index not in queue and index != running]),
+            together([parts[index] for index in stale_clips(service.catalog) if index not in {*queue, *running}]),
         )
         return self._kept
 
@@ -234,14 +235,12 @@ def _clip_parts(
     ]
 
 
-def _running_part(service: TrainingService, whole: SequenceForecast) -> SequenceForecast:
+def _running_part(run: ClipRun, whole: SequenceForecast) -> SequenceForecast:
     """What is left of the clip that trains: by its own speed once it has one, else by its plan."""
-    step, n_steps = service.steps_of_run
-    eta_s = service.eta_s
-    if not n_steps:
+    if not run.n_steps:
         return whole
-    left_s = None if whole.seconds is None else whole.seconds * (1.0 - step / n_steps)
-    return SequenceForecast(1, n_steps - step, left_s if eta_s is None else eta_s, whole.disk_mb)
+    left_s = None if whole.seconds is None else whole.seconds * (1.0 - run.step / run.n_steps)
+    return SequenceForecast(1, run.n_steps - run.step, left_s if run.eta_s is None else run.eta_s, whole.disk_mb)
 
 
 # ---------------------------------------------------------------- on the thread

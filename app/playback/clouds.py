@@ -16,7 +16,7 @@ from app.playback.modes.arrays import PointArrays
 from app.playback.point_spacing import point_spacing
 from app.playback.preview import CloudJob, make_cloud, picture_hint, read_cloud
 from app.project.opening.opened_project import OpenedProject
-from app.training.service import ShownState
+from app.training.clip_run import ShownState
 from engine.capture.capture import Capture
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError

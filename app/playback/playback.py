@@ -26,7 +26,7 @@ from app.playback.timeline import Timeline
 from app.playback.views.orbit_view import OrbitView
 from app.project.opening.opened_project import OpenedProject
 from app.status import WantedFrame
-from app.training.service import ShownState
+from app.training.clip_run import ShownState
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
 from engine.editing.effects import EditStack

@@ -19,7 +19,6 @@ logs/                        one file per clip
 
 from __future__ import annotations
 
-import os
 import shutil
 from contextlib import suppress
 from dataclasses import replace
@@ -31,7 +30,8 @@ from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import BACKUP_FILE, PROJECT_FILE
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.history_file import HISTORY_FILE
-from app.project.clips.clip_names import clip_name, finished_files
+from app.project.clips.clip_files import LIVE, PREP, ClipFiles
+from app.project.clips.clip_names import clip_name, finished_files, index_of
 from app.project.clips.header_cache import HeaderCache
 from app.project.folders import FOLDERS
 from app.project.lock import ProcessLock
@@ -88,12 +88,12 @@ class Project:
     @property
     def live_dir(self) -> Path:
         """Snapshots of the running training."""
-        return self.folder / "live"
+        return self.folder / LIVE
 
     @property
     def prep_dir(self) -> Path:
         """What clips share."""
-        return self.folder / "prep"
+        return self.folder / PREP
 
     @property
     def first_cloud_path(self) -> Path:
@@ -103,6 +103,10 @@ class Project:
     def clip_name(self, clip_index: int) -> str:
         """The name of a clip's files, see app.project.clips.clip_names."""
         return clip_name(clip_index, self.settings.clip_bounds, self.settings.clip_length)
+
+    def index_of(self, key: str) -> int | None:
+        """Inverse of `clip_name`; None for a name that no clip has as they are cut now."""
+        return index_of(key, self.settings.clip_bounds, self.settings.clip_length)
 
     def frames_of(self, clip_index: int) -> tuple[int, int | None]:
         """First frame of a clip, and one past its last; None of the last where only the capture knows it."""
@@ -115,21 +119,25 @@ class Project:
         """Index and file of every finished clip, damaged ones included, in order."""
         return finished_files(self.folder, self.settings.clip_bounds, self.settings.clip_length)
 
+    def files(self, clip_index: int) -> ClipFiles:
+        """Where the files of a clip lie."""
+        return ClipFiles(self.folder, self.clip_name(clip_index))
+
     def clip_path(self, clip_index: int) -> Path:
         """A finished clip."""
-        return self.folder / "clips" / f"{self.clip_name(clip_index)}.safetensors"
+        return self.files(clip_index).clip
 
     def checkpoint_path(self, clip_index: int) -> Path:
         """An unfinished clip."""
-        return self.folder / "checkpoints" / f"{self.clip_name(clip_index)}.safetensors"
+        return self.files(clip_index).checkpoint
 
     def metrics_path(self, clip_index: int) -> Path:
         """Curves of a finished clip."""
-        return self.folder / "metrics" / f"{self.clip_name(clip_index)}.jsonl"
+        return self.files(clip_index).metrics
 
     def unfinished_metrics_path(self, clip_index: int) -> Path:
-        """Curves of a training that is not finished. Beside the others, so that those of an earlier one stand."""
-        return self.folder / "metrics" / f"{self.clip_name(clip_index)}.unfinished.jsonl"
+        """Curves of a training that is not finished."""
+        return self.files(clip_index).unfinished_metrics
 
     def curve_path(self, clip_index: int, *, is_finished: bool) -> Path:
         """Curves of the finished clip, or of its training that was stopped."""
@@ -140,7 +148,7 @@ class Project:
 
     def log_path(self, clip_index: int) -> Path:
         """Log of a clip's worker."""
-        return self.folder / "logs" / f"clip-{self.clip_name(clip_index)}.log"
+        return self.files(clip_index).log
 
     def is_trained(self, clip_index: int) -> bool:
         """Whether the clip is finished."""
@@ -225,19 +233,10 @@ class Project:
 
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip and its curves stay."""
-        for path in (self.checkpoint_path(clip_index), self.unfinished_metrics_path(clip_index)):
+        files = self.files(clip_index)
+        for path in (files.checkpoint, files.unfinished_metrics, files.handed_over):
             with suppress(OSError):
                 path.unlink()
-
-    def keep_curves(self, clip_index: int) -> None:
-        """The training of a clip is finished: its curves take the place of those of an earlier one.
-
-        Raises:
-            OSError: The disk refused; the earlier ones stand.
-        """
-        path = self.unfinished_metrics_path(clip_index)
-        if path.is_file():
-            os.replace(path, self.metrics_path(clip_index))
 
     def close(self) -> None:
         """Write what the journal holds into project.json, and release the lock. The object can still be read from."""

@@ -563,11 +563,11 @@ class Session(SessionFace):
 
     def _release_snapshot(self) -> None:
         """Give a snapshot back once it was read, or where nobody looks at its clip."""
-        unread, clip = self.live_training.unread_clip, self.timeline.clip
-        if unread is None:
+        if not self.live_training.unread_clips:
             return
-        if clip is None or clip.clip_index != unread or self.playback.is_loaded(self.timeline):
-            self.live_training.give_back_snapshot()
+        clip = self.timeline.clip
+        is_read = clip is None or self.playback.is_loaded(self.timeline)
+        self.live_training.give_back_snapshots(but=None if is_read or clip is None else clip.clip_index)
 
     def _tell_failures(self) -> None:
         told = []
@@ -595,7 +595,8 @@ class Session(SessionFace):
             self._unopened = None
         follow_training(self.timeline, self.live_training)
         live, clip, opened = self.live_training, self.timeline.clip, self.opened
-        live.note_anchors(self.playback.live_anchors(self.timeline))
+        if clip is not None:
+            live.note_anchors(clip.clip_index, self.playback.live_anchors(self.timeline))
         self.training = live.status(None if clip is None else clip.clip_index)
         self.clip_states = live.clip_states()
         self.regions = self.marking.status(self.clip_states)
@@ -604,7 +605,7 @@ class Session(SessionFace):
         self.edits = self.editing.status()
         self.selection = self.selecting.status()
         self.plan, self.queue = live.plan(), live.queue()
-        self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
+        self.usage = self._usage.sample(() if live.service is None else live.service.worker_pids)
         if opened is not None:
             n_trained = 0 if live.service is None else live.service.catalog.n_trained
             name = project_name(opened.project.folder.absolute(), opened.project.settings.capture)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from app.training.messages import TrainJob
+from app.training.store import ClipStore
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.compact import CompactClip
 from engine.progress import ReportProgress, StepStats
@@ -61,4 +62,4 @@ class Training(Protocol):
         ...
 
 
-MakeTraining = Callable[[TrainJob, ReportProgress], Training]
+MakeTraining = Callable[[TrainJob, ClipStore, ReportProgress], Training]

@@ -8,7 +8,10 @@ from __future__ import annotations
 from msgspec import Struct, field
 
 from engine.backends.table import chosen_name
+from engine.capture.clip import Clip
+from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.clip_files.clip_header import SettingValue
+from engine.gate.regions import GateRegion
 
 LIVE_VIEWS = ("off", "low", "live")
 """How often a worker writes snapshots: never, now and then, or as often as they are looked at."""
@@ -17,34 +20,46 @@ LIVE_VIEWS = ("off", "low", "live")
 
 
 class TrainJob(Struct, frozen=True):
-    """Everything a worker needs to train one clip. A copy: later changes of the project do not reach it.
+    """Everything about the training of one clip that is not bulk; that comes from a store by its key. A copy: later
+    changes of the project do not reach it.
 
     Attributes:
-        project: Project folder.
-        capture: Capture folder.
-        scale, clip_length, seed, overrides: As in the project.
-        clip_index: The clip to train.
+        key: Of the clip, in the store.
+        clip: Its frames.
+        reference: Key of the clip that it inherits from; None where it inherits nothing.
+        previous: Key of the clip that it continues from; None where it continues from none.
+        fingerprint: Of the capture.
+        scale, seed, overrides: As in the project.
         holdout: Camera indices never trained on.
-        follow_links: Whether files of the capture may lie outside of its folder.
         frames: Of the capture, as in the project.
+        exclusions, regions: As in the project.
         backend: Name of what is computed with.
         is_window_open: Leave a core, or at least right of way, to a window.
         live_view: How often snapshots are written, one of LIVE_VIEWS.
+        n_beside: How many trainings share the cores, this one included.
     """
 
-    project: str
-    capture: str
-    scale: float
-    clip_length: int
-    clip_index: int
+    key: str
+    clip: Clip
+    fingerprint: str
+    scale: float = 1.0
+    reference: str | None = None
+    previous: str | None = None
     holdout: tuple[int, ...] = ()
     seed: int = 0
     overrides: dict[str, SettingValue] = field(default_factory=dict)
-    is_window_open: bool = True
-    follow_links: bool = False
-    live_view: str = "live"
     frames: tuple[int, int] | None = None
+    exclusions: Exclusions = NOTHING_EXCLUDED
+    regions: tuple[GateRegion, ...] = ()
+    is_window_open: bool = True
+    live_view: str = "live"
+    n_beside: int = 1
     backend: str = field(default_factory=chosen_name)
+
+    @property
+    def clip_index(self) -> int:
+        """Of the clip."""
+        return self.clip.clip_index
 
 
 # ---------------------------------------------------------------- commands
@@ -126,11 +141,10 @@ class HeldOutMeasured(Struct, frozen=True, tag=True):
 
 
 class SnapshotWritten(Struct, frozen=True, tag=True):
-    """A complete snapshot lies at `path`."""
+    """A complete snapshot is in the store."""
 
     revision: int
     step: int
-    path: str
 
 
 class WarningRaised(Struct, frozen=True, tag=True):
@@ -154,17 +168,16 @@ class TrainingResumed(Struct, frozen=True, tag=True):
 
 
 class ClipTrained(Struct, frozen=True, tag=True):
-    """The clip is finished, was read back and lies at `path`."""
+    """The clip is finished, was read back and is in the store, from where the owner of the project takes it in."""
 
-    path: str
     step: int
     held_out_psnr: float | None = None
 
 
 class TrainingStopped(Struct, frozen=True, tag=True):
-    """The worker ended before the last step. `path` is the checkpoint, empty when there is none."""
+    """The worker ended before the last step. `is_kept`: whether there is a checkpoint."""
 
-    path: str
+    is_kept: bool
     step: int
 
 

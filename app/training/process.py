@@ -21,11 +21,13 @@ class TrainTask(Struct, frozen=True):
     """What a worker process is asked.
 
     Attributes:
+        project: Folder of it, in which the worker's store lies.
         log: File for everything that the process prints.
         make: "module:name" of what builds the training, a MakeTraining.
     """
 
     job: TrainJob
+    project: Path
     log: Path
     make: str
 
@@ -67,7 +69,7 @@ class ProcessWorker:
 
     Args:
         job: What to train.
-        project: For the log file.
+        project: Where it is read from and kept.
         make: See `TrainTask`.
 
     Attributes:
@@ -78,7 +80,7 @@ class ProcessWorker:
         self.job = job
         self._log_path = project.log_path(job.clip_index)
         self._has_ended = False
-        self.child = ChildProcess(TRAINING, TrainTask(job, self._log_path, make))
+        self.child = ChildProcess(TRAINING, TrainTask(job, project.folder, self._log_path, make))
 
     def send(self, command: Command) -> None:
         """See `Worker`."""

@@ -5,7 +5,7 @@ A clip waits only while it can still be trained: one that needs another clip lea
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
@@ -54,12 +54,12 @@ class TrainQueue:
             self._clips.append(clip_index)
             self._waiting.add(clip_index)
 
-    def take(self) -> tuple[int, OwnSettings | None]:
-        """The first clip and its settings; it waits no more. The queue must not be empty."""
-        clip_index = self._clips.pop(0)
+    def take(self, clip_index: int) -> OwnSettings | None:
+        """A waiting clip waits no more. Returns its settings."""
+        self._clips.remove(clip_index)
         self._waiting.discard(clip_index)
         self.failed.pop(clip_index, None)
-        return clip_index, self._own.pop(clip_index, None)
+        return self._own.pop(clip_index, None)
 
     def move(self, clip_index: int, position: int) -> None:
         """Put a waiting clip at a position, counted from 0 without it; held inside the queue."""
@@ -101,19 +101,18 @@ def needed_clips(project: Project, clip_index: int, config: TrainConfig | None =
         return ()
     config = settings.config() if config is None else config
     inherited = () if config.independent else (settings.reference_clip,)
-    goes_on = config.field == "continue" or config.start == "previous"
-    before = (project.previous_index(clip_index),) if goes_on else ()
+    before = (project.previous_index(clip_index),) if config.follows_previous else ()
     return tuple(dict.fromkeys((*inherited, *before)))
 
 
-def drop_hopeless(queue: TrainQueue, running: int | None, project: Project, catalog: ClipCatalog) -> list[int]:
+def drop_hopeless(queue: TrainQueue, running: Iterable[int], project: Project, catalog: ClipCatalog) -> list[int]:
     """Take out the clips that need one which is neither finished nor comes before them. Returns them.
 
     Args:
-        running: The clip that trains.
+        running: Clips that train.
     """
     dropped: list[int] = []
-    come: set[int | None] = {running}
+    come = set(running)
     config = project.settings.config()
     for clip_index in queue:
         needed = needed_clips(project, clip_index, config)

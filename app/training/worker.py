@@ -13,7 +13,8 @@ from pathlib import Path
 
 from app.background.kernels import use_threads
 from app.background.logs import FORMAT, PrintableFormatter
-from app.training.messages import Event, WarningRaised
+from app.training.folder_store import FolderStore
+from app.training.messages import Event, TrainJob, WarningRaised
 from app.training.process import TrainTask
 from app.training.run import TrainingRun
 from engine.backends.table import choose_backend
@@ -28,16 +29,20 @@ from engine.storage.files import disk_error, open_to_append
 logger = logging.getLogger(__name__)
 
 
-def n_training_threads(cores: int, *, is_window_open: bool) -> int:
-    """Threads to compute with: one core is left to the window where there are more than two."""
-    return cores - 1 if is_window_open and cores > 2 else cores
+def n_training_threads(cores: int, *, is_window_open: bool, n_beside: int = 1) -> int:
+    """Threads to compute with: one core is left to the window where there are more than two.
+
+    Args:
+        n_beside: How many trainings share the cores.
+    """
+    return max((cores - 1 if is_window_open and cores > 2 else cores) // n_beside, 1)
 
 
 def main(task: TrainTask, parent: Parent[Event]) -> None:
     """Runs in the child until the clip is finished, stopped or failed."""
     job, refused = task.job, _redirect_output(task.log)
     use_kernel_cache()  # before the training imports kernels
-    n_threads = _set_threads(is_window_open=job.is_window_open)
+    n_threads = _set_threads(job)
     choose_backend(job.backend)
     logger.info("worker %d trains clip %d with %d threads", os.getpid(), job.clip_index, n_threads)
 
@@ -47,7 +52,14 @@ def main(task: TrainTask, parent: Parent[Event]) -> None:
 
     if refused is not None:
         send(WarningRaised("The log of the training could not be written", str(refused)))
-    run = TrainingRun(job, receive=parent.receive, send=send, make_training=find(task.make), n_threads=n_threads)
+    run = TrainingRun(
+        job,
+        lambda: FolderStore(task.project),
+        receive=parent.receive,
+        send=send,
+        make_training=find(task.make),
+        n_threads=n_threads,
+    )
     while run.advance():
         pass
     logger.info("worker %d ends", os.getpid())
@@ -90,7 +102,7 @@ def _flush_output() -> None:
         _point_output_to(os.open(os.devnull, os.O_WRONLY))
 
 
-def _set_threads(*, is_window_open: bool) -> int:
-    if is_window_open:  # before any thread is started, since threads take over the priority
+def _set_threads(job: TrainJob) -> int:
+    if job.is_window_open:  # before any thread is started, since threads take over the priority
         lower_process()
-    return use_threads(n_training_threads(n_cores(), is_window_open=is_window_open))
+    return use_threads(n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside))

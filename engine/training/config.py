@@ -436,6 +436,11 @@ class TrainConfig(msgspec.Struct, frozen=True):
         return self.inherit in ("frozen", "moving") and self.decoder == "frozen"
 
     @property
+    def follows_previous(self) -> bool:
+        """Whether a clip goes on from the one before, which has to be finished then."""
+        return self.field == "continue" or self.start == "previous"
+
+    @property
     def needs_backgrounds(self) -> bool:
         """Whether backgrounds are estimated: with cloud=frames nothing but exposures is measured against them."""
         return self.cloud != "frames" or self.color != "off"

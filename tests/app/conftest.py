@@ -49,7 +49,7 @@ def known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:
     """A launch function for sessions and services."""
-    return InlineWorker(job, make_training)
+    return InlineWorker(job, project.folder, make_training)
 
 
 @pytest.fixture

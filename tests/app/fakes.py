@@ -14,9 +14,9 @@ import numpy as np
 from PIL import Image
 
 from app.project.opening.opened_project import OpenedProject
-from app.project.opening.project_access import open_project
 from app.training.messages import TrainJob
-from engine.capture.capture import Capture, open_capture
+from app.training.store import ClipStore
+from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.clip_files.compact import CompactClip, compact_clip
@@ -178,42 +178,35 @@ def write_trained(opened: OpenedProject, clip_index: int, *, n_steps: int = N_ST
     return path
 
 
-def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+def make_fake(job: TrainJob, store: ClipStore, report: Callable[[Progress], None]) -> FakeTraining:
     """Builds a FakeTraining from a job as the real builder would. Overrides go unused but `joint_steps` sets n_steps
     and `static_steps` the step that fails."""
-    project = open_project(job.project, is_writable=False)
-    capture = open_capture(job.capture, scale=job.scale, follow_links=job.follow_links)
-    clip = project.clips(capture.n_frames)[job.clip_index]
-    first = project.settings.reference_clip
-    reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))
-    goes_on = job.clip_index > 0 and job.overrides.get("field") == "continue"
-    previous = read_clip_state(project.clip_path(project.previous_index(job.clip_index))) if goes_on else None
     fails_at = job.overrides.get("static_steps")
     return FakeTraining(
-        capture,
-        clip,
-        reference,
+        store.capture(scale=job.scale, frames=job.frames),
+        job.clip,
+        None if job.reference is None else store.clip(job.reference),
         report,
         n_steps=int(job.overrides.get("joint_steps") or N_STEPS),
         fails_at=None if fails_at is None else int(fails_at),
-        previous=previous,
+        previous=None if job.previous is None else store.clip(job.previous),
     )
 
 
-def make_slow(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+def make_slow(job: TrainJob, store: ClipStore, report: Callable[[Progress], None]) -> FakeTraining:
     """Like make_fake, with more steps than any test waits for."""
-    training = make_fake(job, report)
+    training = make_fake(job, store, report)
     training.n_steps = 10_000_000
     return training
 
 
-def make_telling(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+def make_telling(job: TrainJob, store: ClipStore, report: Callable[[Progress], None]) -> FakeTraining:
     """Like make_fake; the environment of its process goes to a file in the project."""
-    (Path(job.project) / "environment.json").write_text(json.dumps(dict(os.environ)))
-    return make_fake(job, report)
+    (store.shared.parent / "environment.json").write_text(json.dumps(dict(os.environ)))
+    return make_fake(job, store, report)
 
 
-def make_crashing(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+def make_crashing(job: TrainJob, store: ClipStore, report: Callable[[Progress], None]) -> FakeTraining:
     """Ends its process without a word."""
     import signal
 

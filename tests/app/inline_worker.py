@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from pathlib import Path
 
 from app.training.build import build_training
+from app.training.folder_store import FolderStore
 from app.training.interface import MakeTraining
 from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob
 from app.training.run import TrainingRun
@@ -17,18 +19,26 @@ class InlineWorker:
 
     Args:
         job: What to train.
+        folder: Of the project.
         make_training: Builds the training.
         budget_s: Each poll steps for about this long, at least once.
     """
 
-    def __init__(self, job: TrainJob, make_training: MakeTraining = build_training, *, budget_s: float = 0.0) -> None:
+    def __init__(
+        self, job: TrainJob, folder: Path, make_training: MakeTraining = build_training, *, budget_s: float = 0.0
+    ) -> None:
         self.job = job
         self._commands: deque[bytes] = deque()
         self._events: deque[bytes] = deque()
         self._budget_s = budget_s
         self._is_running = True
         self._run = TrainingRun(
-            job, receive=self._receive, send=self._send, make_training=make_training, can_wait=False
+            job,
+            lambda: FolderStore(folder),
+            receive=self._receive,
+            send=self._send,
+            make_training=make_training,
+            can_wait=False,
         )
 
     def _receive(self, wait_s: float) -> Command | None:

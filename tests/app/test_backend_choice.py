@@ -20,6 +20,7 @@ from engine.backends.table import (
     chosen_name,
     process_backend,
 )
+from engine.capture.clip import Clip
 from engine.errors import ProjectError
 from engine.kernels import compile_ahead
 
@@ -75,7 +76,7 @@ def test_a_choice_holds_for_the_process_and_the_jobs_of_its_children():
     assert chosen_name() == AUTO
     choose_backend("reference:cpu")
     assert process_backend() is backend_called("reference:cpu")
-    job = TrainJob("p", "c", 1.0, 10, 0)
+    job = TrainJob("0000", Clip(0, 0, 3, 3), "f")
     tasks = [job, MendJob("p", MendRequest(after=0), "f"), ExportTask(None, "p", "c", 1.0, None, False)]  # type: ignore[arg-type]
     assert [task.backend for task in tasks] == 3 * ["reference:cpu"]
 

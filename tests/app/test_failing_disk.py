@@ -8,13 +8,12 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
-from app.project.clips.clip_versions import list_versions
 from app.training import disk_retries
 from app.training import messages as m
 from app.training.messages import Pause, SnapshotConsumed, Stop
@@ -32,15 +31,18 @@ def bench(tmp_path, capture_folder):
     return make
 
 
-class Disk:
-    """Refuses to put files of some folders in their place, for as long as it is full."""
+HANDED_OVER = "0000-trained.safetensors"
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *folders: str, number: int = errno.ENOSPC) -> None:
+
+class Disk:
+    """Refuses to put files of some names or folders in their place, for as long as it is full."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *names: str, number: int = errno.ENOSPC) -> None:
         self.is_full, self.n_refused = True, 0
         replace = os.replace
 
         def refuse(source, target):
-            if self.is_full and Path(target).parent.name in folders:
+            if self.is_full and {Path(target).name, Path(target).parent.name}.intersection(names):
                 self.n_refused += 1
                 raise OSError(number, os.strerror(number), str(target))
             replace(source, target)
@@ -56,8 +58,8 @@ def without_window(it: Bench) -> Bench:
 
 
 def finished(it: Bench) -> dict:
-    """Arrays of the clip in its place."""
-    return read_clip_state(it.project.clip_path(0)).arrays
+    """Arrays of the clip that was handed over."""
+    return read_clip_state(it.handed_over).arrays
 
 
 def test_live_snapshots_come_back_when_there_is_room_again(bench, monkeypatch):
@@ -111,11 +113,11 @@ def test_a_checkpoint_is_due_by_the_clock_however_slowly_it_is_written(bench, mo
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EROFS, errno.ESTALE])
-def test_a_clip_that_cannot_be_put_in_its_place_is_a_checkpoint_until_it_can(bench, monkeypatch, number):
+def test_a_clip_that_cannot_be_handed_over_is_a_checkpoint_until_it_can(bench, monkeypatch, number):
     it = bench(n_steps=5)
-    disk = Disk(monkeypatch, "clips", number=number)
+    disk = Disk(monkeypatch, HANDED_OVER, number=number)
     assert it.steps(8) is True
-    assert not it.project.is_trained(0)
+    assert not it.handed_over.exists()
     assert read_clip_state(it.checkpoint).header.step == 5
     (told,) = it.of(m.WarningRaised)
     assert "trained, but could not be written" in told.title
@@ -124,7 +126,7 @@ def test_a_clip_that_cannot_be_put_in_its_place_is_a_checkpoint_until_it_can(ben
     disk.is_full = False
     assert it.steps(20) is False
     assert isinstance(it.events[-1], m.ClipTrained)
-    assert not it.checkpoint.exists()
+    assert read_clip_state(it.handed_over).header.step == 5
 
 
 def test_a_disk_full_of_finished_preparation_takes_the_clip_once_that_is_gone(bench, monkeypatch):
@@ -134,7 +136,7 @@ def test_a_disk_full_of_finished_preparation_takes_the_clip_once_that_is_gone(be
     prep.mkdir(exist_ok=True)
     for name in ("clip-0000-0", "clip-0000-1", "clip-0001-0", "backgrounds"):
         (prep / f"{name}.safetensors").write_text("x")
-    disk = Disk(monkeypatch, "clips", "checkpoints")
+    disk = Disk(monkeypatch, HANDED_OVER, "checkpoints")
     monkeypatch.setattr("os.replace", full_while(lambda: (prep / "clip-0000-1.safetensors").exists(), disk))
     assert it.steps(20) is False
     assert isinstance(it.events[-1], m.ClipTrained)
@@ -153,45 +155,14 @@ def full_while(is_full, disk: Disk):
     return act
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
-def test_a_finished_clip_stays_where_it_cannot_be_kept_as_a_version(bench, monkeypatch, number):
-    it = bench(n_steps=5)
-    assert it.steps(20) is False
-    before = it.project.clip_path(0).read_bytes()
-    it._n_steps = 8
-    it.start()
-    is_full = [True]
-    link, copy = os.link, shutil.copy2
-
-    def refuse(instead):
-        def act(source, target, **options):
-            if is_full[0]:
-                raise OSError(number, os.strerror(number), str(target))
-            return instead(source, target, **options)
-
-        return act
-
-    monkeypatch.setattr("os.link", refuse(link))
-    monkeypatch.setattr("shutil.copy2", refuse(copy))
-    assert it.steps(12) is True
-    assert it.project.clip_path(0).read_bytes() == before
-    assert read_clip_state(it.checkpoint).header.step == 8
-    (told,) = it.of(m.WarningRaised)
-    assert "The earlier version of the clip could not be written" in told.detail
-    is_full[0] = False
-    assert it.steps(20) is False
-    (version,) = list_versions(it.project, 0)
-    assert version.path.read_bytes() == before
-    assert read_clip_state(it.project.clip_path(0)).header.step == 8
-
-
 def test_without_a_window_it_gives_up_after_some_tries_and_the_same_command_finishes(bench, monkeypatch):
     it = without_window(bench(n_steps=5))
     assert it.steps(10) is False
     expected = finished(it)
-    it.project.clip_path(0).unlink()  # and the same once more
+    it.handed_over.unlink()  # and the same once more
+    it.checkpoint.unlink(missing_ok=True)
     it.start()
-    disk = Disk(monkeypatch, "clips")
+    disk = Disk(monkeypatch, HANDED_OVER)
     assert it.steps(200) is False
     assert 2 <= disk.n_refused <= 6
     failed = it.events[-1]
@@ -210,7 +181,7 @@ def test_without_a_window_it_gives_up_after_some_tries_and_the_same_command_fini
 
 def test_where_nothing_can_be_kept_it_waits_longer_and_says_so(bench, monkeypatch):
     it = without_window(bench(n_steps=5))
-    Disk(monkeypatch, "clips", "checkpoints")
+    Disk(monkeypatch, HANDED_OVER, "checkpoints")
     assert it.steps(int(disk_retries.PATIENCE_UNKEPT_S) - 5) is True
     assert "in memory only" in it.of(m.WarningRaised)[-1].detail
     assert it.steps(60) is False
@@ -219,11 +190,11 @@ def test_where_nothing_can_be_kept_it_waits_longer_and_says_so(bench, monkeypatc
 
 def test_a_clip_that_waits_for_room_can_be_stopped(bench, monkeypatch):
     it = bench(n_steps=5)
-    Disk(monkeypatch, "clips")
+    Disk(monkeypatch, HANDED_OVER)
     it.steps(8)
     it.commands.append(Stop(keep=True))
     assert it.steps(1) is False
-    assert it.events[-1] == m.TrainingStopped(str(it.checkpoint), 5)
+    assert it.events[-1] == m.TrainingStopped(True, 5)
 
 
 def test_a_failure_between_steps_keeps_what_was_learned(bench):
@@ -279,7 +250,7 @@ def test_another_folder_in_the_place_of_a_project_is_left_alone(bench, tmp_path)
 
 def test_the_command_ends_with_1_deletes_nothing_and_goes_on_with_room(run, capture_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(disk_retries, "PATIENCE_S", 0.0)
-    disk = Disk(monkeypatch, "clips")
+    disk = Disk(monkeypatch, HANDED_OVER)
     arguments = ("train", capture_folder, "--project", tmp_path / "p")
     code, _, err = run(*arguments)
     assert code == 1
@@ -307,8 +278,8 @@ def test_nor_is_one_whose_checkpoint_could_not_be_written(run, capture_folder, t
     assert (tmp_path / "p" / "project.json").is_file()
 
 
-def _breaks_at_the_end(job, report):
-    training = make_fake(job, report)
+def _breaks_at_the_end(job, store, report):
+    training = make_fake(job, store, report)
 
     def measure() -> float:
         if training.steps_done:
@@ -320,13 +291,13 @@ def _breaks_at_the_end(job, report):
 
 
 def test_a_project_deleted_while_training_ends_with_1_and_is_not_made_again(run, capture_folder, tmp_path):
-    def deletes_itself(job, report):
-        training = make_fake(job, report)
+    def deletes_itself(job, store, report):
+        training = make_fake(job, store, report)
         ordinary = training.step
 
         def step(n=1):
             if training.steps_done == 2:
-                shutil.rmtree(job.project)
+                shutil.rmtree(store.folder)
             return ordinary(n)
 
         training.step = step

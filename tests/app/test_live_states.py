@@ -7,7 +7,7 @@ import pytest
 from msgspec import to_builtins
 
 from app.session import commands as c
-from app.training import run
+from app.training import keeper
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
 from engine.model.reading import load_clip_model
@@ -18,8 +18,8 @@ from tests.app.fakes import DECODER, HEADS, N_ANCHORS, make_slow
 @pytest.fixture
 def live_session(make_session, monkeypatch):
     """A session whose reference clip trains for as long as anybody looks, with snapshots as often as they are read."""
-    monkeypatch.setattr(run, "SNAPSHOT_EVERY_S", 0.0)
-    monkeypatch.setattr(run, "SNAPSHOT_SHARE", 1.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_SHARE", 1.0)
     session = make_session(make_training=make_slow)
     session.dispatch(c.TrainNextClip())
     return session
@@ -71,7 +71,7 @@ def test_a_live_state_is_shown_and_given_back(live_session, caplog):
 
 
 def test_a_live_state_is_given_back_when_nobody_looks_at_its_clip(make_session, monkeypatch):
-    monkeypatch.setattr(run, "SNAPSHOT_EVERY_S", 0.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
     session = make_session(make_training=make_slow)
     session.dispatch(c.SetClipLength(3))
     session.dispatch(c.SetFrame(4))

@@ -10,14 +10,27 @@ import pytest
 
 from app.training.messages import Command, Event, SetSnapshots, StepReported, TrainJob, WorkerDied
 from app.training.process import TrainTask
+from engine.capture.clip import Clip
+from engine.capture.exclusions import ExcludedFrames, Exclusions
 from engine.children.messages import decoded, encoded
+from engine.gate.regions import GateRegion
 
 
 def test_a_job_arrives_as_it_was_sent() -> None:
     overrides = {"field": "continue", "joint_steps": 3, "rate": 1.0, "light": True}
-    job = TrainJob("p", "c", 1.0, 10, 2, holdout=(1, 5), overrides=overrides, frames=(0, 7))
-    task = decoded(encoded(TrainTask(job, Path("logs/a.log"), "module:name")), TrainTask)
-    assert task == TrainTask(job, Path("logs/a.log"), "module:name")
+    job = TrainJob(
+        "0002",
+        Clip(2, 6, 3, 3),
+        "f",
+        reference="0000",
+        holdout=(1, 5),
+        overrides=overrides,
+        frames=(0, 7),
+        exclusions=Exclusions(("a",), (ExcludedFrames(None, 0, 2),)),
+        regions=(GateRegion("static", (0.0, 1.0, 2.0), (3.0, 4.0, 5.0)),),
+    )
+    task = decoded(encoded(TrainTask(job, Path("p"), Path("logs/a.log"), "module:name")), TrainTask)
+    assert task == TrainTask(job, Path("p"), Path("logs/a.log"), "module:name")
     assert [type(value) for value in task.job.overrides.values()] == [str, int, float, bool]
 
 

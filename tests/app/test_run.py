@@ -10,9 +10,12 @@ import pytest
 from app.project.clips.metrics_file import read_metrics
 from app.project.opening.project_access import create_project, default_settings
 from app.training import messages as m
+from app.training.cadence import Cadence
+from app.training.folder_store import FolderStore
+from app.training.jobs import train_job
+from app.training.keeper import CHECKPOINT_EVERY_S
 from app.training.rate import SmoothedRate
-from app.training.run import CHECKPOINT_EVERY_S, TrainingRun
-from app.training.snapshots import Cadence, keep_clip
+from app.training.run import TrainingRun
 from engine.capture.capture import open_capture
 from engine.children.kind import Unwanted
 from engine.clip_files.clip_state import ClipState, read_clip_state
@@ -27,9 +30,9 @@ class Bench:
     """A run with a clock that the test turns and commands that the test queues."""
 
     def __init__(self, folder, capture_folder, *, n_steps=100, change=None) -> None:
-        self.settings = default_settings(open_capture(capture_folder))
-        self.project = create_project(folder, self.settings)
-        self.job = m.TrainJob(str(folder), str(capture_folder), 1.0, self.settings.clip_length, 0, seed=0)
+        capture = open_capture(capture_folder)
+        self.project = create_project(folder, default_settings(capture))
+        self.job = train_job(self.project, self.project.clips(capture.n_frames)[0])
         self.commands, self.events, self.now_s = [], [], 0.0
         self.is_alone = False
         self.training = None
@@ -40,6 +43,7 @@ class Bench:
         """Begin, or go on after an end, as a new worker would."""
         self.run = TrainingRun(
             self.job,
+            lambda: FolderStore(self.project.folder),
             receive=self._receive,
             send=self.events.append,
             make_training=self._make,
@@ -47,8 +51,8 @@ class Bench:
             clock=lambda: self.now_s,
         )
 
-    def _make(self, job, report):
-        self.training = make_fake(job, report)
+    def _make(self, job, store, report):
+        self.training = make_fake(job, store, report)
         self.training.n_steps = self._n_steps
         if self._change is not None:
             self._change(self)
@@ -69,6 +73,10 @@ class Bench:
 
     def of(self, kind):
         return [event for event in self.events if isinstance(event, kind)]
+
+    @property
+    def handed_over(self):
+        return self.project.files(0).handed_over
 
     @property
     def checkpoint(self):
@@ -93,7 +101,7 @@ def test_the_next_snapshot_waits_until_the_last_one_was_read(bench):
     it.commands.append(m.SnapshotConsumed(2))
     it.steps(1, each_s=0.1)
     assert sorted(path.name for path in it.project.live_dir.iterdir()) == ["clip-0000-r0002.safetensors"]
-    state = read_clip_state(it.of(m.SnapshotWritten)[1].path)
+    state = read_clip_state(it.project.files(0).snapshot(2))
     assert state.header.step == it.of(m.SnapshotWritten)[1].step
 
 
@@ -125,7 +133,7 @@ def test_stopping_while_preparing_ends_at_the_next_report(bench):
 
     it = bench(change=stop_in_between)
     assert it.steps(1) is False
-    assert it.events[-1] == m.TrainingStopped("", 0)
+    assert it.events[-1] == m.TrainingStopped(False, 0)
 
 
 def test_stopping_in_a_change_of_phase_keeps_the_state_before_it(bench):
@@ -148,7 +156,7 @@ def test_stopping_in_a_change_of_phase_keeps_the_state_before_it(bench):
     kept = read_clip_state(it.checkpoint)
     assert kept.header.step == 5
     assert kept.arrays["value"][0] < 1e6
-    assert it.events[-1] == m.TrainingStopped(str(it.checkpoint), 5)
+    assert it.events[-1] == m.TrainingStopped(True, 5)
 
 
 def test_a_window_that_is_gone_ends_the_run_and_keeps_it(bench):
@@ -168,7 +176,7 @@ def test_stopping_without_keeping_forgets(bench):
     it.commands.append(m.Stop(keep=False))
     assert it.steps(1) is False
     assert not it.checkpoint.exists()
-    assert it.events[-1] == m.TrainingStopped("", 3)
+    assert it.events[-1] == m.TrainingStopped(False, 3)
 
 
 def test_a_full_disk_costs_the_snapshot_not_the_training(bench, monkeypatch):
@@ -177,7 +185,7 @@ def test_a_full_disk_costs_the_snapshot_not_the_training(bench, monkeypatch):
     def full(*_args):
         raise ProjectError("The clip could not be written (No space left on device).", hint="Free some space.")
 
-    monkeypatch.setattr("app.training.snapshots.write_clip_state", full)
+    monkeypatch.setattr("app.training.folder_store.write_clip_state", full)
     it.steps(1)
     assert it.of(m.WarningRaised)[0].hint == "Free some space."
     monkeypatch.undo()
@@ -206,7 +214,7 @@ def test_clipped_steps_are_counted_and_told(bench, n_clipped):
 
     it = bench(n_steps=5, change=clip_some)
     assert it.steps(10) is False
-    figures = read_clip_state(it.project.clip_path(0)).header.figures
+    figures = read_clip_state(it.handed_over).header.figures
     assert figures.gradient_clipped_steps == n_clipped
     told = [event.detail for event in it.of(m.WarningRaised)]
     assert told == (["They were scaled down in 2 of 5 steps, up to 5."] if n_clipped else [])
@@ -261,25 +269,26 @@ def test_a_state_that_is_no_number_is_not_kept(bench):
 HEADER = make_header()
 
 
+@pytest.fixture
+def store(make_opened):
+    return FolderStore(make_opened().project.folder)
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_clip_with_numbers_that_are_none_is_not_kept(tmp_path, bad):
+def test_a_clip_with_numbers_that_are_none_is_not_kept(store, bad):
     state = ClipState({"value": np.array([1.0, bad], np.float32)}, HEADER)
     with pytest.raises(NonFiniteLoss):
-        keep_clip(compact_clip(state), tmp_path / "clips" / "0000.safetensors", tmp_path / "live")
-    assert not list(tmp_path.rglob("*.safetensors"))
+        store.put_clip("0000", compact_clip(state))
+    assert not list(store.folder.rglob("*.safetensors"))
 
 
-def test_a_clip_that_reads_back_differently_does_not_replace_the_old_one(tmp_path, monkeypatch):
-    path = tmp_path / "clips" / "0000.safetensors"
+def test_a_clip_that_reads_back_differently_is_not_handed_over(store, monkeypatch):
     good = ClipState({"value": np.ones(2, np.float32)}, HEADER)
-    keep_clip(compact_clip(good), path, tmp_path / "live")
     other = ClipState({"value": np.zeros(2, np.float32)}, good.header)
-    monkeypatch.setattr("app.training.snapshots.read_clip_state", lambda _path: good)
+    monkeypatch.setattr("app.training.folder_store.read_clip_state", lambda _path: good)
     with pytest.raises(ProjectError, match="differs"):
-        keep_clip(compact_clip(other), path, tmp_path / "live")
-    monkeypatch.undo()
-    assert read_clip_state(path).arrays["value"][0] == 1.0
-    assert not list((tmp_path / "live").iterdir())
+        store.put_clip("0000", compact_clip(other))
+    assert not list((store.folder / "live").iterdir())
 
 
 def test_what_is_dear_is_done_less_often():
@@ -358,21 +367,21 @@ def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_w
     it.now_s += 10_000.0
     it.commands.append(m.Resume())
     assert it.steps(10, each_s=0.0) is False
-    figures = read_clip_state(it.project.clip_path(0)).header.figures
+    figures = read_clip_state(it.handed_over).header.figures
     assert figures.stages_s == pytest.approx(
-        {"Starting": 2.0, "Carving": 30.0, "Sizing": 4.0, "Measuring and saving": 0.0, "Training": 2.0}
+        {"Starting": 2.0, "Carving": 30.0, "Sizing": 4.0, "Measuring and keeping": 0.0, "Training": 2.0}
     )
     assert figures.preparation_s == pytest.approx(36.0)
-    norms = range(1, read_clip_state(it.project.clip_path(0)).header.n_steps + 1)  # of the fake: its step
+    norms = range(1, read_clip_state(it.handed_over).header.n_steps + 1)  # of the fake: its step
     assert figures.gradient_norm_median == pytest.approx(sum(norms) / len(norms))
     assert figures.gradient_norm_max == norms[-1]
     assert figures.training_s == pytest.approx(2.0)
-    assert read_metrics(it.project.metrics_path(0))[-1]["training_s"] == pytest.approx(2.0)
+    assert read_metrics(it.project.unfinished_metrics_path(0))[-1]["training_s"] == pytest.approx(2.0)
 
 
 def test_the_most_memory_of_a_training_is_kept_across_its_runs(bench, monkeypatch):
     held = iter([700.0, 700.0])
-    monkeypatch.setattr("app.training.run.peak_mb", lambda: next(held, 650.0))
+    monkeypatch.setattr("app.training.keeper.peak_mb", lambda: next(held, 650.0))
     it = bench(n_steps=6)
     it.steps(4)
     it.commands.append(m.Stop(keep=True))
@@ -380,15 +389,15 @@ def test_the_most_memory_of_a_training_is_kept_across_its_runs(bench, monkeypatc
     held = iter(())
     it.start()  # another process, which holds less
     assert it.steps(20) is False
-    assert read_clip_state(it.project.clip_path(0)).header.figures.memory_mb == 700.0
-    assert read_metrics(it.project.metrics_path(0))[-1]["memory_mb"] == 700.0
+    assert read_clip_state(it.handed_over).header.figures.memory_mb == 700.0
+    assert read_metrics(it.project.unfinished_metrics_path(0))[-1]["memory_mb"] == 700.0
 
 
 def test_memory_that_the_system_does_not_say_is_unknown(bench, monkeypatch):
-    monkeypatch.setattr("app.training.run.peak_mb", lambda: None)
+    monkeypatch.setattr("app.training.keeper.peak_mb", lambda: None)
     it = bench(n_steps=3)
     assert it.steps(10) is False
-    assert read_clip_state(it.project.clip_path(0)).header.figures.memory_mb is None
+    assert read_clip_state(it.handed_over).header.figures.memory_mb is None
 
 
 def test_the_times_of_a_training_that_was_stopped_add_up(bench):
@@ -399,7 +408,7 @@ def test_the_times_of_a_training_that_was_stopped_add_up(bench):
     it.now_s += 10_000.0
     it.start()
     assert it.steps(20) is False  # from second 10 006: going on, three steps, the end
-    figures = read_clip_state(it.project.clip_path(0)).header.figures
+    figures = read_clip_state(it.handed_over).header.figures
     assert it.now_s == 10_010.0
     assert figures.seconds == pytest.approx(4.0 + 4.0)
-    assert figures.stages_s.keys() >= {"Starting", "Training", "Measuring and saving"}
+    assert figures.stages_s.keys() >= {"Starting", "Training", "Measuring and keeping"}

@@ -72,7 +72,7 @@ def test_a_killed_worker_is_told_and_training_goes_on_from_what_was_kept(make_se
     kept = session.project.checkpoint_path(0)
     poll_until(session, kept.is_file, what="the checkpoint")
     step = read_clip_state(kept).header.step
-    session.live_training.service.worker.child.kill()
+    session.live_training.service.leading.worker.child.kill()
     poll_until(session, lambda: session.training.state == "failed")
     assert "signal 9" in session.notices[-1].detail
     assert session.clip_states[0].state == "failed"
@@ -97,7 +97,7 @@ def test_closing_ends_the_process_and_keeps_what_it_learned(make_session, monkey
     session = make_session(launch=launch(make_slow))
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: session.training.step >= 1)
-    child = session.live_training.service.worker.child
+    child = session.live_training.service.leading.worker.child
     project = session.project
     session.close()
     child.result()  # it was not killed
@@ -108,7 +108,8 @@ PARENT = """
 import os, sys
 from pathlib import Path
 from app.project.opening.project_access import create_project, default_settings
-from app.training.messages import StepReported, TrainJob
+from app.training.jobs import train_job
+from app.training.messages import StepReported
 from app.training.process import ProcessWorker
 from engine.capture.capture import open_capture
 
@@ -116,7 +117,7 @@ if __name__ == "__main__":
     capture, folder = Path(sys.argv[1]), Path(sys.argv[2])
     settings = default_settings(open_capture(capture))
     project = create_project(folder, settings)
-    job = TrainJob(str(folder), str(capture), 1.0, settings.clip_length, 0)
+    job = train_job(project, project.clips(6)[0])
     worker = ProcessWorker(job, project, "tests.app.fakes:make_slow")
     while not any(isinstance(event, StepReported) and event.step > 0 for event in worker.poll()):
         pass

@@ -134,16 +134,16 @@ def make_bad(captures: Path, plain: Path, project: Path, kind: str) -> None:
     config = config_of(settings.config().difference() | own)
     capture = open_capture(captures / kind)
     training = clip_training(
-        opened.project,
         capture,
         opened.clips[BAD_CLIP],
         config,
         holdout=capture.camera_indices(settings.holdout),
         seed=settings.seed,
         reference=opened.reference,
+        prep_dir=opened.project.prep_dir,
+        regions=disturbance.regions,
         report=lambda progress: None,
     )
-    training.regions = training._preparation._regions = disturbance.regions
     training.prepare()
     while not training.is_finished:
         training.step()

@@ -148,7 +148,7 @@ def exchanged(project: Any) -> None:
 
 def trained(project: Any) -> None:
     """What a training leaves beside its clip: log, curves, snapshots."""
-    from app.training.snapshots import SnapshotWriter
+    from app.training.folder_store import FolderStore
     from engine.clip_files.clip_state import read_clip_state
     from engine.errors import ProjectError
     from engine.storage.files import open_to_append
@@ -157,10 +157,8 @@ def trained(project: Any) -> None:
         with contextlib.suppress(OSError):  # as worker and run, which go on without
             path.parent.mkdir(exist_ok=True)
             os.close(open_to_append(path))
-    with contextlib.suppress(OSError):
-        project.keep_curves(0)
     with contextlib.suppress(ProjectError):
-        SnapshotWriter(project.live_dir, 0).write(read_clip_state(project.clip_path(0)))
+        FolderStore(project.folder).put_snapshot("0000", 1, read_clip_state(project.clip_path(0)))
     project.discard_progress(0)
 
 

@@ -17,11 +17,12 @@ from msgspec.structs import replace
 
 from app.cli.cli import main
 from app.project.opening.project_access import open_project
-from app.training import disk_retries, run
+from app.training import disk_retries, keeper
 from app.training.build import build_training
 from app.training.interface import Training
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
+from app.training.store import ClipStore
 from engine.assets import asset_path
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import read_clip_state
@@ -163,13 +164,13 @@ def _processes_of(scratch: Path) -> Iterator[tuple[int, str]]:
                 yield int(folder.name), (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
 
 
-def make_training(job: TrainJob, report: ReportProgress) -> Training:
+def make_training(job: TrainJob, store: ClipStore, report: ReportProgress) -> Training:
     """The real training."""
-    return build_training(job, report)
+    return build_training(job, store, report)
 
 
 if CADENCE in os.environ:
-    run.CHECKPOINT_EVERY_S = float(os.environ[CADENCE])
+    keeper.CHECKPOINT_EVERY_S = float(os.environ[CADENCE])
 if PATIENCE in os.environ:
     disk_retries.PATIENCE_UNKEPT_S = float(os.environ[PATIENCE])
 

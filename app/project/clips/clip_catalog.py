@@ -105,7 +105,7 @@ class ClipCatalog:
         self._curve_psnr: dict[int, float | None] = {}
         self._evaluated: dict[int, tuple[str, float]] = {}
         config = project.settings.config()
-        self._inherits, self._goes_on = not config.independent, config.field == "continue" or config.start == "previous"
+        self._inherits, self._goes_on = not config.independent, config.follows_previous
         if project.has_progress:
             for index in range(n_clips):
                 if index % REPORT_EVERY == 0:

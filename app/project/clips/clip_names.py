@@ -46,10 +46,20 @@ def is_clip_file(name: str) -> bool:
     return suffix == "safetensors" and PROGRAM_NAME.fullmatch(stem) is not None
 
 
+def index_of(name: str, clip_bounds: tuple[int, ...] | None, clip_length: int) -> int | None:
+    """Inverse of `clip_name`; None for a name that no clip has as they are cut now."""
+    if clip_bounds is None:
+        return int(name) if name.isascii() and name.isdecimal() else None
+    return _ranks(clip_bounds, clip_length).get(name)
+
+
+@lru_cache(maxsize=64)
+def _ranks(clip_bounds: tuple[int, ...], clip_length: int) -> dict[str, int]:
+    return {name: index for index, name in enumerate(_names(clip_bounds, clip_length))}
+
+
 def finished_files(folder: Path, clip_bounds: tuple[int, ...] | None, clip_length: int) -> list[tuple[int, Path]]:
     """Index and file of every finished clip in a project folder, in order; without those of other cuts."""
     found = [path for path in (folder / "clips").glob("*.safetensors") if is_clip_file(path.name)]
-    if clip_bounds is None:
-        return sorted((int(path.stem), path) for path in found if path.stem.isdecimal())
-    rank = {name: index for index, name in enumerate(_names(clip_bounds, clip_length))}
-    return sorted((rank[path.stem], path) for path in found if path.stem in rank)
+    ranked = [(index_of(path.stem, clip_bounds, clip_length), path) for path in found]
+    return sorted((index, path) for index, path in ranked if index is not None)

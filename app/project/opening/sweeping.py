@@ -11,7 +11,7 @@ from engine.storage.files import PARTIAL_PREFIX, discard, is_left_over
 
 logger = logging.getLogger(__name__)
 
-LIVE_NAME = re.compile(r"clip-\d{4,9}-r\d{4,9}\.safetensors|[\d-]{4,19}-final\.safetensors|mended-\d{4,9}\.safetensors")
+LIVE_NAME = re.compile(r"(clip-[\d-]{4,19}-r\d{4,9}|[\d-]{4,19}-final|mended-\d{4,9})\.safetensors")
 """What the program makes in "live": snapshots, a finished clip that is read back, drafts of mended clips."""
 
 

@@ -35,6 +35,7 @@ from app.session.editing.kept_document import KeptDocument
 from app.session.notices import Notices
 from app.session.training.live_training import LiveTraining
 from app.status import DependencyStatus
+from app.training.due import stale_clips
 from app.training.train_queue import needed_clips
 from engine.capture.clip import Clip
 from engine.errors import EngineError, ProjectError
@@ -95,7 +96,7 @@ class ClipWork:
             return None
         match command:
             case TrainStale():
-                service.enqueue_all(service.stale)
+                service.enqueue_all(stale_clips(service.catalog))
             case SplitClip() | MergeClips() | SetReferenceClip():
                 return self._cut(command, opened, service.catalog)
             case AskFreeSpace(what=what, clip_index=clip_index):
@@ -153,9 +154,10 @@ class ClipWork:
         opened, service = self._opened, self._live.service
         assert opened is not None
         assert service is not None
-        project, n_clips, running = opened.project, len(opened.clips), service.running_clip
+        project, n_clips = opened.project, len(opened.clips)
         project.check_writable()
-        if what == "checkpoints" and running is not None and clip_index in (None, running):
+        if what == "checkpoints" and service.is_busy and (clip_index is None or clip_index in service.runs):
+            running = service.running_clip if clip_index is None else clip_index
             raise ProjectError(
                 f"Clip {running} is training and keeps its progress there.",
                 hint="Wait until it is finished.",
@@ -186,7 +188,7 @@ class ClipWork:
         self._looked_for_damage = seen
         damaged = [index for index in range(len(service.catalog)) if service.catalog[index].state == "damaged"]
         first = next((index for index in damaged if index not in self._asked_damage), None)
-        if first is not None and service.running_clip != first:
+        if first is not None and first not in service.runs:
             self._asked_damage.add(first)
             self._ask_about_damage(first)
 

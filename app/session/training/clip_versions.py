@@ -19,7 +19,8 @@ from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.notices import Notices
 from app.status import VersionStatus
-from app.training.service import ShownState, TrainingService
+from app.training.clip_run import ShownState
+from app.training.service import TrainingService
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import EngineError, ProjectError
 from engine.setting import value_text
@@ -118,9 +119,10 @@ class Versions:
         service, opened = self._service(), self._opened
         if service is None or opened is None:
             return
-        running, project = service.running_clip, opened.project
+        runs, project = service.runs, opened.project
         project.check_writable()
-        if running is not None and (running == clip_index or clip_index == project.settings.reference_clip):
+        if clip_index in runs or (runs and clip_index == project.settings.reference_clip):
+            running = clip_index if clip_index in runs else service.running_clip
             raise ProjectError(
                 f"Clip {running} is training and would not match the restored version.",
                 hint="Let training end, or stop it; progress is kept.",

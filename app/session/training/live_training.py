@@ -16,10 +16,12 @@ from app.session.notices import Notices
 from app.session.questions import RetrainQuestion, retrain_question
 from app.session.training.training_notices import tell
 from app.status import ClipStatus, PlanStatus, QueueStatus, TrainingStatus
+from app.training.clip_run import ShownState
 from app.training.curves import CurveReader, Curves
 from app.training.messages import ENDINGS, Event, SnapshotWritten
-from app.training.service import Launch, ShownState, TrainingService
+from app.training.service import Launch, TrainingService
 from app.training.train_queue import OwnSettings
+from app.training.training_status import ClipStatuses, curves_of, training_status
 from engine.errors import EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
@@ -31,7 +33,7 @@ MAX_LISTED = 12
 class LiveTraining:
     """The running training, its queue and what comes of it. For one thread, and nothing here waits.
 
-    At most one snapshot of a running training is unread: its worker writes no other before that was given back.
+    At most one snapshot of each running training is unread: its worker writes no other before that was given back.
 
     Args:
         jobs, notices: Of the session.
@@ -48,8 +50,9 @@ class LiveTraining:
         self._jobs, self._notices, self._launch, self._can_measure = jobs, notices, launch, can_measure
         self._forecasts, self._curves = Forecasts(), CurveReader()
         self._live_view = live_view
-        self._unread: SnapshotWritten | None = None
-        self._live_counts: tuple[int, int] | None = None
+        self._statuses: ClipStatuses | None = None
+        self._unread: dict[int, SnapshotWritten] = {}
+        self._live_counts: tuple[int, int, int] | None = None
         self._n_ending = 0
         self._ended_clip: int | None = None
 
@@ -82,11 +85,12 @@ class LiveTraining:
             curves=self._curves,
         )
         self.service.live_view = self._live_view
+        self._statuses = ClipStatuses(self.service)
 
     def _retire(self, service: TrainingService, opened: OpenedProject) -> None:
         self._forecasts.forget()
-        self._unread = self._live_counts = None
-        if service.worker is None:
+        self._unread, self._live_counts = {}, None
+        if not service.is_busy:
             service.close()
             opened.project.close()
             return
@@ -113,7 +117,7 @@ class LiveTraining:
     @property
     def is_busy(self) -> bool:
         """Whether a clip of the open project trains."""
-        return self.service is not None and self.service.worker is not None
+        return self.service is not None and self.service.is_busy
 
     def check_idle(self) -> None:
         """See that nothing trains or waits to be trained, so that clips may be cut otherwise.
@@ -121,7 +125,7 @@ class LiveTraining:
         Raises:
             ProjectError: Something does.
         """
-        if self.service is not None and (self.service.worker is not None or self.service.queue):
+        if self.service is not None and (self.service.is_busy or self.service.queue):
             raise ProjectError(
                 "Clips are training or queued.",
                 hint="Stop training first; progress is kept.",
@@ -146,7 +150,7 @@ class LiveTraining:
         service = self.service
         if service is None:
             self.tell_nothing_open()
-        elif service.worker is None and service.queue:
+        elif not service.is_busy and service.queue:
             service.go_on()
         elif service.next_clip_index is not None:
             service.enqueue(service.next_clip_index)
@@ -220,20 +224,21 @@ class LiveTraining:
     # ---------------------------------------------------------------- what the worker said
 
     def poll(self) -> Sequence[Event]:
-        """Take in what the worker said, and tell the user what is news. Returns all of it, oldest first."""
-        running = None if self.service is None else self.service.running_clip
+        """Take in what the workers said, and tell the user what is news. Returns all of it, oldest first."""
         events = [] if self.service is None else self.service.poll()
-        for event in events:
-            tell(event, self._notices, running)
+        for clip_index, event in events:
+            tell(event, self._notices, clip_index)
             if isinstance(event, SnapshotWritten):
-                self._unread = event
+                self._unread[clip_index] = event
             elif isinstance(event, ENDINGS):
-                self._unread = self._live_counts = None
-                if running is not None and self.state_of(running) is not None:
-                    self._ended_clip = running
+                self._unread.pop(clip_index, None)
+                if self._live_counts is not None and self._live_counts[0] == clip_index:
+                    self._live_counts = None
+                if self.state_of(clip_index) is not None:
+                    self._ended_clip = clip_index
         if events and self.service is not None:
             self.tell_dropped(self.service.take_dropped())
-        return events
+        return [event for _, event in events]
 
     @property
     def newest_clip(self) -> int | None:
@@ -251,27 +256,33 @@ class LiveTraining:
         return next((index for index in reversed(service.catalog.order) if service.is_finished(index)), None)
 
     @property
-    def unread_clip(self) -> int | None:
-        """The clip with a snapshot that nobody has read yet."""
-        return None if self.service is None or self._unread is None else self.service.running_clip
+    def unread_clips(self) -> tuple[int, ...]:
+        """Clips with a snapshot that nobody has read yet."""
+        return tuple(self._unread)
 
-    def give_back_snapshot(self) -> None:
-        """It was read, or nobody looks at that clip: the worker may write the next one."""
-        if self.service is not None and self._unread is not None and self.service.running_clip is not None:
-            self.service.snapshot_consumed(self.service.running_clip, self._unread.revision)
-        self._unread = None
+    def give_back_snapshots(self, *, but: int | None = None) -> None:
+        """They were read, or nobody looks at their clips: their workers may write the next ones.
+
+        Args:
+            but: A clip whose snapshot is still to be read.
+        """
+        for clip_index in [clip_index for clip_index in self._unread if clip_index != but]:
+            unread = self._unread.pop(clip_index)
+            if self.service is not None:
+                self.service.snapshot_consumed(clip_index, unread.revision)
 
     def replace_snapshot(self, error: Exception) -> None:
-        """It could not be read. It may have been replaced meanwhile; if not, another one is asked for."""
+        """One could not be read. It may have been replaced meanwhile; if not, another one is asked for."""
         logger.info("a live state could not be read: %s", error)
-        if self.service is not None and self._unread is not None:
-            self.service.snapshot_now()
-            self.give_back_snapshot()
+        if self.service is not None:
+            for clip_index in self._unread:
+                self.service.snapshot_now(clip_index)
+            self.give_back_snapshots()
 
-    def note_anchors(self, anchors: AnchorArrays | None) -> None:
-        """All anchors of the running clip, once a state of it was loaded."""
+    def note_anchors(self, clip_index: int, anchors: AnchorArrays | None) -> None:
+        """All anchors of a clip, once a live state of it was loaded."""
         if anchors is not None:
-            self._live_counts = (len(anchors.inherited_positions), len(anchors.own_positions))
+            self._live_counts = (clip_index, len(anchors.inherited_positions), len(anchors.own_positions))
 
     def note_damage(self, error: Exception) -> None:
         """The file of a clip could not be read."""
@@ -286,11 +297,11 @@ class LiveTraining:
         Args:
             viewed_clip: Whose curves to show while nothing trains.
         """
-        return TrainingStatus() if self.service is None else self.service.status(viewed_clip)
+        return TrainingStatus() if self.service is None else training_status(self.service, viewed_clip)
 
     def clip_states(self) -> list[ClipStatus]:
         """One status per clip."""
-        return [] if self.service is None else self.service.clip_statuses(self._live_counts)
+        return [] if self._statuses is None else self._statuses.all(self._live_counts)
 
     def plan(self) -> PlanStatus | None:
         """What training the next clip would take; None while something trains or nothing is left to train."""
@@ -308,7 +319,7 @@ class LiveTraining:
 
     def curves(self, clip_index: int) -> Curves | None:
         """Loss and PSNR over the steps of a clip; None until they were read."""
-        return None if self.service is None else self.service.curves_of(clip_index)
+        return None if self.service is None else curves_of(self.service, clip_index)
 
     @property
     def finished(self) -> tuple[object, ...]:

@@ -77,5 +77,5 @@ class QueueCommands:
                 f"Damaged, or in need of a damaged clip: {listed}{more}.",
                 "Restore the damaged file from a backup, or train that clip again: right-click it in the timeline.",
             )
-        elif service.worker is None and not service.queue:
+        elif not service.is_busy and not service.queue:
             self._notices.add("info", "All of these clips are trained")

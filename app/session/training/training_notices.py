@@ -13,8 +13,8 @@ def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
         case ClipTrained(held_out_psnr=psnr):
             figure = "" if psnr is None else f"{psnr_words(psnr, is_whole=False).capitalize()}."
             notices.add("info", "A clip is trained" if clip_index is None else f"Clip {clip_index} is trained", figure)
-        case TrainingStopped(path=path, step=step):
-            detail = f"Progress of {step} steps is kept." if path else "No progress yet."
+        case TrainingStopped(is_kept=is_kept, step=step):
+            detail = f"Progress of {step} steps is kept." if is_kept else "No progress yet."
             notices.add("info", "Training stopped", detail)
         case WarningRaised(title=title, detail=detail, hint=hint):
             notices.add("warn", title, detail, hint)

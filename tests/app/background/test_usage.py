@@ -42,16 +42,16 @@ def test_it_is_sampled_once_a_second_and_counts_cores() -> None:
         return ProcessUsage(100.0, used[pid])
 
     meter = UsageMeter(lambda: now_s[0], read)
-    first = meter.sample(77)
+    first = meter.sample((77,))
     assert (first.window_mb, first.training_mb, first.window_cores) == (100.0, 100.0, None)
     now_s[0] += 0.5
-    assert meter.sample(77) is first
+    assert meter.sample((77,)) is first
     assert len(n_read) == 2
     now_s[0] += 1.5
     used[None] += 0.5
     used[77] += 3.0
-    second = meter.sample(77)
+    second = meter.sample((77,))
     assert (second.window_cores, second.training_cores) == (0.25, 1.5)
     now_s[0] += 2.0
-    ended = meter.sample(None)
+    ended = meter.sample(())
     assert (ended.training_mb, ended.training_cores) == (None, None)

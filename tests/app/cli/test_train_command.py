@@ -92,8 +92,8 @@ def test_a_damaged_picture_found_while_training_is_bad_input(run, tmp_path):
     assert read_clip_state(tmp_path / "p" / "clips" / "0000.safetensors").header.step == N_STEPS  # what was learned
 
 
-def _reads_pictures(job, report):
-    training = make_fake(job, report)
+def _reads_pictures(job, store, report):
+    training = make_fake(job, store, report)
 
     def prepare() -> None:
         for camera_index in range(4):

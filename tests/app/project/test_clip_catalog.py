@@ -11,6 +11,7 @@ import pytest
 from app.project.clips.clip_catalog import ClipCatalog, anchor_counts
 from app.project.project import Project
 from app.training.service import TrainingService
+from app.training.training_status import ClipStatuses
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import DamagedClip, look_at_clip, read_clip_header
@@ -183,7 +184,7 @@ def test_anchors_of_clips_that_nobody_looked_at_are_known_from_their_headers(tmp
     write_header(project.checkpoint_path(2), clip_header(2, n_anchors=reference | {"residual": 9}, **source))
     write_header(project.clip_path(3), clip_header(3, **source))
     service = TrainingService(project, split_clips(5, 1), holdout=())
-    counts = [(status.n_inherited, status.n_own) for status in service.clip_statuses(None)]
+    counts = [(status.n_inherited, status.n_own) for status in ClipStatuses(service).all()]
     assert counts == [(0, 340), (340, 7), (340, 9), (0, 0), (0, 0)]
 
 

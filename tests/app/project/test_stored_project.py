@@ -14,7 +14,8 @@ from app.project.opening.project_access import open_project
 from app.project.project import Project
 from app.training.build import build_training
 from app.training.curves import read_curves
-from app.training.messages import TrainJob
+from app.training.folder_store import FolderStore
+from app.training.jobs import train_job
 from engine.assets import asset_path
 from engine.backends.table import backend_called
 from engine.capture.capture import open_capture
@@ -56,16 +57,9 @@ def test_its_curves_are_read(project: Project) -> None:
 def test_its_next_clip_is_trained(project: Project) -> None:
     settings = project.settings
     capture = open_capture(asset_path("sample"), scale=settings.scale)
-    job = TrainJob(
-        project=str(project.folder),
-        capture=str(capture.path),
-        scale=settings.scale,
-        clip_length=settings.clip_length,
-        clip_index=2,
-        holdout=tuple(capture.camera_indices(settings.holdout)),
-        overrides=settings.overrides,
-    )
-    training = build_training(job, lambda progress: None)
+    clip, holdout = project.clips(capture.n_frames)[2], capture.camera_indices(settings.holdout)
+    job = train_job(project, clip, holdout=holdout)
+    training = build_training(job, FolderStore(project.folder), lambda progress: None)
     training.prepare()
     stats = training.step()
     assert (stats.step, training.state().header.start) == (1, 6)

@@ -13,7 +13,7 @@ from app.project.opening.opened_project import OpenedProject
 from app.project.opening.project_access import open_project
 from app.session.notices import Notices
 from app.session.training.live_training import LiveTraining
-from app.training import run
+from app.training import keeper
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError
 from tests.app.conftest import inline
@@ -47,8 +47,8 @@ def desk() -> Iterator[Desk]:
 @pytest.fixture
 def slow_desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     """Trains for as long as anybody looks, with snapshots as often as they are given back."""
-    monkeypatch.setattr(run, "SNAPSHOT_EVERY_S", 0.0)
-    monkeypatch.setattr(run, "SNAPSHOT_SHARE", 1.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_SHARE", 1.0)
     made = Desk(make_training=make_slow)
     yield made
     made.training.close()
@@ -58,12 +58,12 @@ def test_without_a_project_it_answers_and_trains_nothing(desk: Desk):
     training = desk.training
     training.train_next()
     assert training.train(0, is_confirmed=True) is None
-    for act in (training.pause, training.resume, training.stop, training.give_back_snapshot):
+    for act in (training.pause, training.resume, training.stop, training.give_back_snapshots):
         act()
     assert [notice.title for notice in desk.notices] == ["Nothing to train yet"] * 2
     assert (training.status(0).state, training.clip_states(), training.plan()) == ("idle", [], None)
     assert training.state_of(0) is None
-    assert (training.is_busy, training.unread_clip) == (False, None)
+    assert (training.is_busy, training.unread_clips) == (False, ())
 
 
 def test_clips_are_trained_one_after_the_other_and_the_user_hears_of_it(desk: Desk, make_opened):
@@ -109,15 +109,15 @@ def test_a_snapshot_waits_until_it_is_given_back(slow_desk: Desk, make_opened):
     training = slow_desk.training
     training.open(make_opened())
     training.train_next()
-    slow_desk.poll_until(lambda: training.unread_clip == 0)
+    slow_desk.poll_until(lambda: training.unread_clips == (0,))
     first = training.state_of(0)
     assert first is not None
     assert first.is_live
     for _ in range(20):
         training.poll()
     assert training.state_of(0) == first, "the next one is not written before that"
-    training.give_back_snapshot()
-    assert training.unread_clip is None
+    training.give_back_snapshots()
+    assert training.unread_clips == ()
     slow_desk.poll_until(lambda: training.state_of(0) != first)
 
 
@@ -125,11 +125,11 @@ def test_a_snapshot_that_could_not_be_read_is_replaced(slow_desk: Desk, make_ope
     training = slow_desk.training
     training.open(make_opened())
     training.train_next()
-    slow_desk.poll_until(lambda: training.unread_clip == 0)
+    slow_desk.poll_until(lambda: training.unread_clips == (0,))
     first = training.state_of(0)
     training.replace_snapshot(OSError("gone"))
-    assert training.unread_clip is None
-    slow_desk.poll_until(lambda: training.unread_clip == 0 and training.state_of(0) != first)
+    assert training.unread_clips == ()
+    slow_desk.poll_until(lambda: training.unread_clips == (0,) and training.state_of(0) != first)
     assert len(slow_desk.notices) == 0
 
 
@@ -137,10 +137,10 @@ def test_the_end_of_a_training_leaves_no_snapshot_unread(slow_desk: Desk, make_o
     training = slow_desk.training
     training.open(make_opened())
     training.train_next()
-    slow_desk.poll_until(lambda: training.unread_clip == 0)
+    slow_desk.poll_until(lambda: training.unread_clips == (0,))
     training.stop()
     slow_desk.poll_until(lambda: not training.is_busy)
-    assert training.unread_clip is None
+    assert training.unread_clips == ()
     state = training.state_of(0)
     assert state is not None
     assert not state.is_live

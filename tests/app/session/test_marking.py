@@ -35,15 +35,15 @@ def on_disk(session) -> tuple[GateRegion, ...]:
     return open_project(session.project.folder, is_writable=False).document.regions
 
 
-def building(job, report, *, monkeypatch, seen):
+def building(job, store, report, *, monkeypatch, seen):
     """Builds the training as the program does, but for the training itself: notes its regions, trains the fake."""
     with monkeypatch.context() as patch:
         patch.setattr("app.training.build.warm_up_reporting", lambda report: None)
         patch.setattr(
             "engine.training.clip_training.ClipTraining", lambda *_, regions, **__: seen.append(tuple(regions))
         )
-        build_training(job, report)
-    return make_fake(job, report)
+        build_training(job, store, report)
+    return make_fake(job, store, report)
 
 
 def test_a_mark_reaches_the_file_and_the_next_training(make_session, monkeypatch):

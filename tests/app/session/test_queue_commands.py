@@ -135,8 +135,8 @@ def test_a_clip_moved_before_what_it_needs_waits_no_more(session: Session) -> No
 
 
 def test_a_failed_clip_shows_its_reason_and_the_others_go_on(make_session: Make) -> None:
-    def fails(job, report):
-        training = make_fake(job, report)
+    def fails(job, store, report):
+        training = make_fake(job, store, report)
         training.fails_at = 1 if job.clip_index == 1 else None
         return training
 
@@ -207,8 +207,8 @@ def test_a_version_comes_back_and_dependants_are_out_of_date_as_after_training(s
 
 
 def test_the_reference_does_not_change_under_a_clip_that_trains(make_session: Make) -> None:
-    def slow_later(job, report):
-        return make_fake(job, report) if job.clip_index == 0 else make_slow(job, report)
+    def slow_later(job, store, report):
+        return make_fake(job, store, report) if job.clip_index == 0 else make_slow(job, store, report)
 
     session = make_session(make_training=slow_later)
     session.dispatch(c.SetClipLength(3))
@@ -269,7 +269,7 @@ def test_a_thousand_waiting_clips_are_queued_and_reordered_at_once(tmp_path, mon
 
     project = make_project(tmp_path, overrides={"field": "continue"})
     service = TrainingService(project, split_clips(1000, 1), holdout=(), catalog=ClipCatalog(project, 1000))
-    monkeypatch.setattr(service, "_start_next", lambda: None)
+    monkeypatch.setattr(service, "_start_waiting", lambda: None)
     calls = []
     config = type(project.settings).config
     monkeypatch.setattr(type(project.settings), "config", lambda settings: calls.append(1) or config(settings))
@@ -299,5 +299,5 @@ def test_closing_ends_the_clip_that_trains_and_starts_no_other(make_session: Mak
     session.poll()
     session.close()
     assert session.live_training.service is not None
-    assert session.live_training.service.worker is None
+    assert not session.live_training.is_busy
     assert [path.name for path in project_of(session).folder.glob("checkpoints/*")] == ["0000.safetensors"]

@@ -160,8 +160,8 @@ def test_stopping_keeps_what_was_learned_and_training_goes_on_there(make_session
     assert float(trained.arrays["value"][0]) == pytest.approx(expected, rel=1e-6)
 
 
-def _until(job, report, *, n_steps):
-    training = make_fake(job, report)
+def _until(job, store, report, *, n_steps):
+    training = make_fake(job, store, report)
     training.n_steps = n_steps
     return training
 
@@ -275,8 +275,8 @@ def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_fini
     assert not session.project.unfinished_metrics_path(0).exists()
 
 
-def _fails_at(job, report, *, step):
-    training = make_fake(job, report)
+def _fails_at(job, store, report, *, step):
+    training = make_fake(job, store, report)
     training.fails_at = step
     return training
 

@@ -12,11 +12,14 @@ from typing import Any
 import pytest
 
 from app.project.opening.opened_project import OpenedProject
-from app.training import run
+from app.training import keeper
+from app.training.folder_store import FolderStore
+from app.training.jobs import train_job
 from app.training.messages import ClipTrained, SnapshotWritten, TrainingFailed, TrainJob
 from app.training.own_settings import ALLOWED, offered, with_own
-from app.training.service import TrainingService
+from app.training.service import ClipEvent, TrainingService
 from app.training.train_queue import TrainQueue, needed_clips
+from app.training.training_status import ClipStatuses, training_status
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import NonFiniteLoss, ProjectError
 from tests.app.conftest import inline
@@ -32,17 +35,17 @@ def make_service(opened: OpenedProject, make_training=make_fake) -> TrainingServ
     return TrainingService(opened.project, opened.clips, holdout=opened.holdout, launch=launch)
 
 
-def run_out(service: TrainingService) -> list[object]:
+def run_out(service: TrainingService) -> list[ClipEvent]:
     """Poll until nothing trains. Returns all events."""
-    events, until_s = [], time.monotonic() + DEADLINE_S
-    while service.worker is not None:
+    events, until_s = list[ClipEvent](), time.monotonic() + DEADLINE_S
+    while service.is_busy:
         assert time.monotonic() < until_s
         events += service.poll()
     return events
 
 
-def trained_order(events: list[object]) -> list[str]:
-    return [event.path[-16:-12] for event in events if isinstance(event, ClipTrained)]
+def trained_order(events: list[ClipEvent]) -> list[int]:
+    return [clip_index for clip_index, event in events if isinstance(event, ClipTrained)]
 
 
 @pytest.fixture
@@ -81,7 +84,7 @@ def test_clips_are_trained_in_the_order_they_were_put_in(six: OpenedProject) -> 
     assert (service.running_clip, list(service.queue)) == (0, [1, 2, 3, 4, 5])
     service.queue.move(5, 0)
     service.queue.remove(3)
-    assert trained_order(run_out(service)) == ["0000", "0005", "0001", "0002", "0004"]
+    assert trained_order(run_out(service)) == [0, 5, 1, 2, 4]
     assert service.queue.n_done == 5
     assert service.enqueue_all([0, 1, 3]) == []
     assert service.running_clip == 3, "what is finished is not trained again"
@@ -107,16 +110,16 @@ def test_clips_that_go_on_from_each_other_need_the_one_before(tmp_path) -> None:
 
 
 def test_a_failed_clip_says_why_and_the_queue_goes_on_without_it(six: OpenedProject) -> None:
-    def fails_once(job: TrainJob, report) -> FakeTraining:
-        training = make_fake(job, report)
+    def fails_once(job: TrainJob, store, report) -> FakeTraining:
+        training = make_fake(job, store, report)
         training.fails_at = 2 if job.clip_index == 2 else None
         return training
 
     service = make_service(six, fails_once)
     service.enqueue_all(range(4))
     events = run_out(service)
-    assert trained_order(events) == ["0000", "0001", "0003"]
-    status = service.clip_statuses(None)[2]
+    assert trained_order(events) == [0, 1, 3]
+    status = ClipStatuses(service).all()[2]
     assert status.state == "failed"
     assert "nan at step 3" in status.reason
     assert "nan at step 3" in service.queue.failed[2]
@@ -124,17 +127,17 @@ def test_a_failed_clip_says_why_and_the_queue_goes_on_without_it(six: OpenedProj
     service.enqueue(2)
     assert service.queue.failed == {}
     run_out(service)
-    assert service.clip_statuses(None)[2].state == "trained"
+    assert ClipStatuses(service).all()[2].state == "trained"
 
 
 def test_clips_that_need_a_failed_one_leave_the_queue(six: OpenedProject) -> None:
-    def fails(job: TrainJob, report) -> FakeTraining:
+    def fails(job: TrainJob, store, report) -> FakeTraining:
         raise NonFiniteLoss("The loss became nan.")
 
     service = make_service(six, fails)
     service.enqueue_all(range(3))
     events = run_out(service)
-    assert [event.kind for event in events if isinstance(event, TrainingFailed)] == ["NonFiniteLoss"]
+    assert [event.kind for _, event in events if isinstance(event, TrainingFailed)] == ["NonFiniteLoss"]
     assert (list(service.queue), service.take_dropped(), service.take_dropped()) == ([], [1, 2], [])
 
 
@@ -144,11 +147,11 @@ def test_the_queue_is_held_after_a_clip_and_goes_on_when_told(six: OpenedProject
     service.stop_after_clip(True)
     service.stop_after_clip(False)
     service.stop_after_clip(True)
-    assert trained_order(run_out(service)) == ["0000"]
-    assert (service.queue.is_held, list(service.queue), service.state) == (True, [1, 2], "idle")
+    assert trained_order(run_out(service)) == [0]
+    assert (service.queue.is_held, list(service.queue), training_status(service).state) == (True, [1, 2], "idle")
     assert service.next_clip_index == 1, "what a button would start"
     service.go_on()
-    assert trained_order(run_out(service)) == ["0001", "0002"]
+    assert trained_order(run_out(service)) == [1, 2]
 
 
 @pytest.mark.parametrize("is_all", [False, True])
@@ -162,14 +165,14 @@ def test_whoever_trains_something_goes_on_with_a_held_queue(six: OpenedProject, 
     else:
         service.enqueue(4)
     assert (service.running_clip, service.queue.is_held) == (1, False)
-    assert trained_order(run_out(service)) == ["0001", "0002"] + ([] if is_all else ["0004"])
+    assert trained_order(run_out(service)) == [1, 2] + ([] if is_all else [4])
 
 
 def test_a_damaged_clip_and_those_that_need_it_are_left_out(six: OpenedProject) -> None:
     write_trained(six, 0).write_bytes(b"\xff" * 64)
     service = make_service(six)
     assert service.enqueue_all(range(6)) == [0, 1, 2, 3, 4, 5]
-    assert service.worker is None
+    assert not service.is_busy
     with pytest.raises(ProjectError, match="whose file is damaged"):
         service.enqueue(2)
 
@@ -187,7 +190,7 @@ def test_one_clip_has_settings_of_its_own(six: OpenedProject) -> None:
         service.enqueue(1, {"gaussians_per_anchor": 3})
     with pytest.raises(ProjectError, match="has to be"):
         service.enqueue(1, {"source_steps": -4})
-    assert service.worker is None
+    assert not service.is_busy
 
 
 def test_a_stopped_training_is_given_up_for_other_settings_and_goes_on_with_them(six: OpenedProject) -> None:
@@ -205,8 +208,8 @@ def test_a_stopped_training_is_given_up_for_other_settings_and_goes_on_with_them
     service.stop()
     run_out(service)
     service.enqueue(0)
-    assert service.worker is not None
-    assert service.worker.job.overrides == {"joint_steps": 50}
+    assert service.leading is not None
+    assert service.leading.worker.job.overrides == {"joint_steps": 50}
     service.close()
 
 
@@ -230,11 +233,9 @@ def test_how_often_snapshots_are_written(six: OpenedProject, mode: str, n_expect
     now_s = [0.0]
     commands: list[object] = []
     events: list[object] = []
-    job = TrainJob(
-        str(six.project.folder), str(six.capture.path), six.capture.scale, 1, 0, holdout=(0,), live_view=mode
-    )
     training = TrainingRun(
-        job,
+        train_job(six.project, six.clips[0], holdout=(0,), live_view=mode),
+        lambda: FolderStore(six.project.folder),
         receive=lambda wait_s: commands.pop(0) if commands else None,  # type: ignore[arg-type, return-value]
         send=events.append,
         make_training=make_slow,
@@ -259,7 +260,7 @@ def test_how_often_snapshots_are_written(six: OpenedProject, mode: str, n_expect
     assert advance(20) == 0
     commands.append(SetSnapshots("live"))
     assert advance(2) >= 1, "asked for again, it comes at once"
-    assert run.LOW_SNAPSHOT_EVERY_S > run.SNAPSHOT_EVERY_S
+    assert keeper.LOW_SNAPSHOT_EVERY_S > keeper.SNAPSHOT_EVERY_S
 
 
 def test_the_live_view_reaches_a_running_worker_and_the_next_one(six: OpenedProject) -> None:
@@ -268,12 +269,12 @@ def test_the_live_view_reaches_a_running_worker_and_the_next_one(six: OpenedProj
     service.poll()
     service.set_live_view("off")
     service.poll()
-    assert service.worker is not None
-    assert service.worker._run._live_view == "off"  # type: ignore[attr-defined]
+    assert service.leading is not None
+    assert service.leading.worker._run._keeper._live_view == "off"  # type: ignore[attr-defined]
     service.close()
     service.enqueue(0)
-    assert service.worker is not None
-    assert service.worker.job.live_view == "off"
+    assert service.leading is not None
+    assert service.leading.worker.job.live_view == "off"
     service.close()
     with pytest.raises(ValueError, match="off, low, live"):
         service.set_live_view("sometimes")

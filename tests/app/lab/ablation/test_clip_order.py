@@ -13,6 +13,8 @@ from app.document.project_settings import ProjectSettings
 from app.evaluation.headless import open_trained
 from app.project.opening.project_access import create_project, default_settings
 from app.project.project import Project
+from app.training.folder_store import FolderStore
+from app.training.jobs import train_job
 from app.training.messages import TrainJob
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state
@@ -41,8 +43,8 @@ def test_a_reference_clip_that_is_none_is_refused(capture_folder):
 
 
 @pytest.fixture
-def continued(tmp_path, built_once) -> Iterator[tuple[Project, TrainJob]]:
-    """A real project of the sample whose one field goes on: reference clip 1, then clip 0; and a job of it."""
+def continued(tmp_path, built_once) -> Iterator[tuple[Project, list[TrainJob]]]:
+    """A real project of the sample whose one field goes on: reference clip 1, then clip 0; and its jobs."""
     from engine.clip_files.clip_state import write_clip_state
     from tests.engine.training.tiny_training import SIZES, make_tiny
 
@@ -62,8 +64,7 @@ def continued(tmp_path, built_once) -> Iterator[tuple[Project, TrainJob]]:
     first = tiny.trained(0, reference=reference, previous=reference, field="continue")
     for i, state in ((0, first), (1, reference)):
         write_clip_state(project.clip_path(i), state)
-    job = TrainJob(str(project.folder), settings.capture, settings.scale, 4, 2, tuple(tiny.holdout))
-    yield project, replace(job, overrides=settings.overrides)
+    yield project, [train_job(project, clip, holdout=tiny.holdout) for clip in project.clips(tiny.capture.n_frames)]
     project.close()
 
 
@@ -73,7 +74,8 @@ def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(con
     from engine.training.clip_training import ClipTraining
 
     monkeypatch.setattr(build, "warm_up_reporting", lambda report: None)
-    project, job = continued
+    project, jobs = continued
+    store = FolderStore(project.folder)
     opened = open_trained(project)
     fields = []
     for i in (0, 1):
@@ -84,14 +86,14 @@ def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(con
     last = read_clip_state(project.clip_path(0)).arrays["field.hidden.weight"]
     assert np.array_equal(fields[0], last)
     assert np.array_equal(fields[1], last)  # not clip 1's own, though its number is higher
-    training = build.build_training(job, lambda _: None)
+    training = build.build_training(jobs[2], store, lambda _: None)
     assert isinstance(training, ClipTraining)
     assert training.previous is not None
     assert training.previous.header.clip_index == 0
     assert training.reference is not None
     assert training.reference.header.clip_index == 1
-    with pytest.raises(ProjectError, match="continues clip 2, which is not trained"):
-        build.build_training(replace(job, clip_index=3), lambda _: None)
-    alone = build.build_training(replace(job, clip_index=1), lambda _: None)
+    with pytest.raises(ProjectError, match="Clip 0002 is not trained"):
+        build.build_training(jobs[3], store, lambda _: None)
+    alone = build.build_training(jobs[1], store, lambda _: None)
     assert isinstance(alone, ClipTraining)
     assert (alone.reference, alone.previous) == (None, None)

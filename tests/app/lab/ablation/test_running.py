@@ -138,8 +138,8 @@ def test_a_figure_file_that_is_damaged_or_of_other_clips_is_measured_again(runne
 
 
 def test_it_goes_on_where_it_was_stopped(runner):
-    def fails_in_clip_1(job, report):
-        training = make_fake(job, report)
+    def fails_in_clip_1(job, store, report):
+        training = make_fake(job, store, report)
         training.fails_at = 2 if job.clip_index == 1 and "decoder" in job.overrides else None
         return training
 

@@ -1,0 +1,118 @@
+"""What is shown of the trainings of a project: values made of its service, one of the training, one of every clip."""
+
+from __future__ import annotations
+
+import math
+
+from app.status import ClipStatus, TrainingStatus
+from app.training.curves import Curves
+from app.training.messages import ClipTrained
+from app.training.service import TrainingService
+from app.training.stage_order import stage_number
+
+_WORDS = {"starting": "preparing", "preparing": "preparing", "paused": "paused"}
+"""States of a run that a clip has by another name; it is "training" in all others."""
+
+
+def training_status(service: TrainingService, viewed_clip: int | None = None) -> TrainingStatus:
+    """The leading training as one value, or the last one.
+
+    Args:
+        viewed_clip: Whose curves to show while nothing trains.
+    """
+    run, settings = service.shown_run, service.project.settings
+    state, step = ("idle", None) if run is None else (run.state, run.last_step)
+    stage = "" if run is None else run.stage.stage
+    clip_index = None if run is None else run.clip_index
+    curve_clip = clip_index if service.is_busy or viewed_clip is None else viewed_clip
+    curves = None if curve_clip is None else curves_of(service, curve_clip)
+    upcoming = service.next_clip_index
+    is_reference = clip_index == settings.reference_clip or settings.config().independent
+    number, n_stages = stage_number(stage, is_reference=is_reference) if step is None else (0, 0)
+    done = 0.0 if run is None else run.stage.done
+    return TrainingStatus(
+        state=state,
+        clip_index=clip_index,
+        n_running=len(service.runs),
+        step=0 if run is None else run.step,
+        n_steps=0 if run is None else run.n_steps,
+        progress=done if step is None else step.step / max(step.n_steps, 1),
+        stage=stage,
+        stage_number=number,
+        n_stages=n_stages,
+        message="" if run is None else run.message,
+        steps_per_s=step.steps_per_s if step is not None and state == "running" else 0.0,
+        eta_s=None if run is None else run.eta_s,
+        curve_clip_index=curve_clip,
+        gradient_norm=step.gradient_norm if step is not None and math.isfinite(step.gradient_norm) else None,
+        loss_history=() if curves is None else curves.loss,
+        psnr_history=() if curves is None else curves.psnr,
+        can_train_next=service.can_train_next,
+        next_clip_index=upcoming,
+        resume_step=None if upcoming is None else service.catalog[upcoming].resume_step,
+        queue=tuple(service.queue),
+    )
+
+
+def curves_of(service: TrainingService, clip_index: int) -> Curves | None:
+    """Of the training at hand once it has any; otherwise those on disk, None until they are read."""
+    run, last = service.runs.get(clip_index), service.last
+    if run is None and last is not None and last.clip_index == clip_index and isinstance(last.ending, ClipTrained):
+        run = last
+    if run is not None and (run.curves.loss or run.curves.psnr):
+        return run.curves
+    state, project = service.catalog[clip_index].state, service.project
+    return service.curves.curves(project.curve_path(clip_index, is_finished=state not in ("stopped", "untrained")))
+
+
+class ClipStatuses:
+    """One status per clip of a project. Only what has changed is remade: they are asked for at every change of the
+    picture, and clips may be thousands."""
+
+    def __init__(self, service: TrainingService) -> None:
+        self._service = service
+        self._statuses: list[ClipStatus] = []
+        self._made_of: tuple[object, ...] = ()
+
+    def all(self, live_counts: tuple[int, int, int] | None = None) -> list[ClipStatus]:
+        """All of them.
+
+        Args:
+            live_counts: A clip that trains, with its inherited and own anchors, if a state of it was loaded.
+        """
+        service = self._service
+        queue, runs = service.queue, service.runs
+        made_of = (service.catalog.revision, tuple(queue), tuple(runs), tuple(queue.failed))
+        if self._made_of != made_of:
+            self._statuses = [self._status(index, None) for index in range(len(service.clips))]
+            self._made_of = made_of
+        for clip_index in runs:
+            counts = live_counts[1:] if live_counts is not None and live_counts[0] == clip_index else None
+            self._statuses[clip_index] = self._status(clip_index, counts)
+        return list(self._statuses)
+
+    def _status(self, clip_index: int, live_counts: tuple[int, int] | None) -> ClipStatus:
+        record, run, queue = self._service.catalog[clip_index], self._service.runs.get(clip_index), self._service.queue
+        n_inherited, n_own = record.n_anchors if live_counts is None else live_counts
+        shown, step, n_steps, reason = record.state, record.step, record.n_steps, record.reason
+        psnr, is_whole = record.held_out_psnr, record.held_out_whole
+        if run is not None:
+            shown, step, n_steps = _WORDS.get(run.state, "training"), run.step, run.n_steps
+            if run.held_out_psnr is not None:
+                psnr, is_whole = run.held_out_psnr, False
+        elif clip_index in queue:
+            shown = "queued"
+        elif clip_index in queue.failed and shown in ("untrained", "stopped"):
+            shown, reason = "failed", queue.failed[clip_index]
+        share = step / n_steps if n_steps else 0.0
+        return ClipStatus(
+            state=shown,
+            progress=1.0 if shown == "trained" else min(share, 1.0),
+            held_out_psnr=psnr,
+            n_inherited=n_inherited,
+            n_own=n_own,
+            resume_step=record.resume_step,
+            reason=reason,
+            exposure_change=record.exposure_change,
+            held_out_whole=is_whole,
+        )
