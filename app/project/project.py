@@ -30,8 +30,8 @@ from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import BACKUP_FILE, PROJECT_FILE
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.history_file import HISTORY_FILE
-from app.project.clips.clip_files import LIVE, PREP, ClipFiles
 from app.project.clips.clip_names import clip_name, finished_files, index_of
+from app.project.clips.clip_paths import LIVE, PREP, ClipPaths
 from app.project.clips.header_cache import HeaderCache
 from app.project.folders import FOLDERS
 from app.project.lock import ProcessLock
@@ -119,9 +119,9 @@ class Project:
         """Index and file of every finished clip, damaged ones included, in order."""
         return finished_files(self.folder, self.settings.clip_bounds, self.settings.clip_length)
 
-    def files(self, clip_index: int) -> ClipFiles:
+    def files(self, clip_index: int) -> ClipPaths:
         """Where the files of a clip lie."""
-        return ClipFiles(self.folder, self.clip_name(clip_index))
+        return ClipPaths(self.folder, self.clip_name(clip_index))
 
     def clip_path(self, clip_index: int) -> Path:
         """A finished clip."""

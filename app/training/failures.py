@@ -1,4 +1,4 @@
-"""When a training fails: what is said of the error, and what is kept of the training."""
+"""When a training fails: the words for the error, and the progress that can be kept."""
 
 from __future__ import annotations
 

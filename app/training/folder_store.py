@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from app.project.clips.clip_files import ClipFiles
+from app.project.clips.clip_paths import ClipPaths
 from app.project.clips.clip_versions import read_finished
 from app.project.clips.metrics_file import read_metrics
 from app.project.opening.project_access import open_project
@@ -40,8 +40,8 @@ class FolderStore:
         """See `ClipStore`."""
         self._watch.check()
 
-    def _files(self, key: str) -> ClipFiles:
-        return ClipFiles(self.folder, key)
+    def _files(self, key: str) -> ClipPaths:
+        return ClipPaths(self.folder, key)
 
     # ---------------------------------------------------------------- what a training needs
 
@@ -91,7 +91,7 @@ class FolderStore:
         """See `ClipStore`."""
         discard(self._files(key).snapshot(revision))
 
-    # ---------------------------------------------------------------- what it can go on from
+    # ---------------------------------------------------------------- what it can continue from
 
     def checkpoint(self, key: str) -> Path | None:
         """See `ClipStore`."""

@@ -35,7 +35,7 @@ class StepRecord:
         self.n_clipped += stats.n_clipped
 
     def report(self, stats: StepStats, now_s: float) -> StepReported:
-        """What is said of the steps since the last report, which end with these."""
+        """The report of the steps since the last one, which end with these."""
         self.rate.update(stats.step, now_s)
         loss, gradient_norm = self._loss_sum / self._n_losses, max(self._norms[-self._n_losses :])
         self._loss_sum, self._n_losses = 0.0, 0

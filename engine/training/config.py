@@ -437,7 +437,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
 
     @property
     def follows_previous(self) -> bool:
-        """Whether a clip goes on from the one before, which has to be finished then."""
+        """Whether a clip continues the one before, which has to be finished then."""
         return self.field == "continue" or self.start == "previous"
 
     @property

@@ -1,4 +1,4 @@
-"""ClipFiles: where the files of one clip lie in a project folder. Paths only; nothing is read or written here."""
+"""ClipPaths: where the files of one clip lie in a project folder. Paths only; nothing is read or written here."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PREP = "prep"
 
 
 @dataclass(frozen=True, slots=True)
-class ClipFiles:
+class ClipPaths:
     """The files of a clip.
 
     Attributes:
