@@ -128,7 +128,7 @@ def test_an_example_edit_is_found_in_every_layer(tmp_path: Path) -> None:
         "words": "fade everything to 25% (light)",
         "command text": ["--fade", "0.25", "--of", "light"],
         "python text": "project.apply_edit(Fade(share=0.25, of='light'))",
-        "actions": ["Fade what is selected"],
+        "actions": ["Fade the selection"],
         "documents": [
             '| Fade | It is less opaque | `--fade SHARE`, `--of PART` | `"fade"`: `share` 0 to 1, `of` light, all |'
         ],

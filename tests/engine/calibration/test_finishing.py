@@ -27,7 +27,7 @@ def test_each_camera_that_something_speaks_against_has_a_reason() -> None:
     sightings[3] = 20
     doubts = _doubts(NAMES, sightings, agreed, np.arange(8) == 1)
     assert [row for row, doubt in enumerate(doubts) if doubt] == [1, 3, 6, 7]
-    assert "bent" in doubts[1]
+    assert "distorted" in doubts[1]
     assert doubts[3] == "only 20 points"
     assert doubts[6] == "one camera agrees with its position (cam5); 2 are needed"
     assert doubts[7] == "no camera agrees with its position; 150 of its 200 matches with cam3 are explained"

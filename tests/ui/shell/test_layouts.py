@@ -32,7 +32,7 @@ def test_layouts_of_the_program_are_shown(pilot: Pilot) -> None:
     usual = pilot.rects["timeline.track"]
     run(pilot, "layout tall timeline")
     assert pilot.rects["timeline.track"].height > usual.height + 40
-    run(pilot, "layout beginning")
+    run(pilot, "layout default")
     assert pilot.rects["timeline.track"].height == pytest.approx(usual.height, abs=2)
 
 
@@ -44,12 +44,12 @@ def test_a_layout_is_kept_by_name_shown_again_and_removed(open_pilot: Callable[.
     pilot.rest()
     wide = pilot.rects["viewport.canvas"].x0
     assert wide > canvas.x0 + 50
-    run(pilot, "keep the layout")
+    run(pilot, "save the layout")
     pilot.type("100 % ##mine")
     pilot.key(key.ENTER)
     pilot.rest()
     assert list(file.values.layouts) == ["100 % ##mine"]
-    run(pilot, "layout beginning")
+    run(pilot, "layout default")
     assert pilot.rects["viewport.canvas"].x0 == pytest.approx(canvas.x0, abs=2)
     pilot.studio.close()
 
@@ -70,7 +70,7 @@ def test_a_layout_of_other_panels_changes_nothing(open_pilot: Callable[..., Pilo
 
 
 def test_names_of_the_program_s_layouts_are_taken(pilot: Pilot) -> None:
-    run(pilot, "keep the layout")
+    run(pilot, "save the layout")
     pilot.type("Standard")
     pilot.key(key.ENTER)
     pilot.draw(2)

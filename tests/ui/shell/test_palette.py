@@ -71,7 +71,7 @@ def test_to_save_as_means_the_project(pilot: Pilot) -> None:
 def test_about_says_where_documents_and_log_are(pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
     copied: list[str] = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)  # a window without a screen has no clipboard
-    open_palette(pilot, "about the program")
+    open_palette(pilot, "about clipgstream")
     pilot.key(key.ENTER)
     pilot.draw(4)
     pilot.click("about.log")
