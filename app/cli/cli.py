@@ -7,21 +7,23 @@ go to standard output, progress and messages to standard error.
 from __future__ import annotations
 
 import contextlib
+import io
 import logging
 import signal
 import sys
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TextIO
 
 from app.background.logs import start_logging
 from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, PlainParser, add_backend, fail, parse
 from app.cli.commands import COMMANDS
-from app.cli.terminal.notes import notes_on_terminal
-from app.cli.terminal.printable_stream import PrintableStream
 from app.training.process import ProcessWorker
 from app.training.service import Launch
 from engine.backends.table import choose_backend
 from engine.errors import CaptureError, DiskError, EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
+from engine.text import printable
 
 logger = logging.getLogger(__name__)
 
@@ -104,3 +106,63 @@ def _terminating_like_ctrl_c() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+DOCUMENTS = "app.document"
+"""Warnings of this package are about what the user made, so that the log alone is not enough."""
+
+
+class _Notes(logging.Handler):
+    """Prints every warning once, however often the project is read."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self._said: set[str] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a record on standard error."""
+        note = record.getMessage()
+        if note not in self._said:
+            self._said.add(note)
+            sys.stderr.write(printable(f"Note: {note}") + "\n")
+
+
+@contextmanager
+def notes_on_terminal() -> Iterator[None]:
+    """In this block, say on standard error what is missing in projects that are read."""
+    handler, package = _Notes(), logging.getLogger(DOCUMENTS)
+    package.addHandler(handler)
+    try:
+        yield
+    finally:
+        package.removeHandler(handler)
+
+
+class PrintableStream(io.TextIOBase):
+    """A text stream in front of another, for results: what goes through it is printable.
+
+    Args:
+        stream: As sys.stdout. Characters that its encoding lacks are written out too.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+    def write(self, text: str, /) -> int:
+        """Write text; returns its length."""
+        self._stream.write(printable(text))
+        return len(text)
+
+    def flush(self) -> None:
+        """Hand on what waits."""
+        self._stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether a terminal shows it."""
+        return self._stream.isatty()
+
+    def writable(self) -> bool:
+        """It is."""
+        return True

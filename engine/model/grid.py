@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
+from numba import njit
 from torch import Tensor
-
-from engine.model.corner_kernel import fill_corners
 
 _PRIMES = (1, 2654435761, 805459861, 3674653429)
 """The usual hash primes, of x, y, z and time (Teschner et al. 2003; Mueller et al. 2022)."""
@@ -125,3 +124,38 @@ def encode(table: Tensor, rows: Tensor, corners: CornerTable, keys: Tensor | Non
     levels = torch.arange(table.shape[0], device=table.device)[None, :, None]
     values = table[levels, indices.long()]  # [n, L, 8, C]
     return (values * weights[..., None]).sum(2).flatten(1)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_corners(unit_positions, cells, n_entries, primes, indices, weights):
+    """Corners and weights of positions; written bit for bit as `corner_table_reference` gives them.
+
+    Args:
+        unit_positions: In 0..1, finite. [A, 3] float64
+        cells: Cells per axis of each level. [L] int64
+        n_entries: Table entries per level, a power of two.
+        primes: Of the hash. [4] uint64
+        indices: [A, L, 8] int32, written.
+        weights: [A, L, 8] float32, written.
+    """
+    corner, fraction = np.empty(3, np.int64), np.empty(3)
+    for row in range(len(unit_positions)):
+        for level in range(len(cells)):
+            n_cells = cells[level]
+            for axis in range(3):
+                scaled = unit_positions[row, axis] * n_cells
+                corner[axis] = min(np.int64(scaled), n_cells - 1)
+                fraction[axis] = scaled - corner[axis]
+            n_knots = n_cells + 1
+            is_dense = n_knots * n_knots * n_knots <= n_entries
+            for bits in range(8):
+                weight = 1.0
+                x, y, z = corner[0] + (bits & 1), corner[1] + (bits >> 1 & 1), corner[2] + (bits >> 2 & 1)
+                for axis in range(3):
+                    weight *= fraction[axis] if bits >> axis & 1 else 1.0 - fraction[axis]
+                if is_dense:
+                    indices[row, level, bits] = x + n_knots * (y + n_knots * z)
+                else:
+                    mixed = np.uint64(x) * primes[0] ^ np.uint64(y) * primes[1] ^ np.uint64(z) * primes[2]
+                    indices[row, level, bits] = np.int32(mixed & np.uint64(n_entries - 1))
+                weights[row, level, bits] = weight

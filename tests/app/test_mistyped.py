@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.cli.arguments import suggestion
-from app.cli.terminal.printable_stream import PrintableStream
+from app.cli.cli import PrintableStream
 from app.csv_text import csv_text
 from app.project.opening.project_access import create_project, default_settings
 from engine.capture.capture import open_capture

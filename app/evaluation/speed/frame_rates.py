@@ -10,7 +10,7 @@ import importlib.metadata
 import logging
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,7 @@ from typing import Any
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS
-from app.evaluation.speed.laps import RenderRate, camera_of, enough, frames_of, rate_of
-from app.evaluation.speed.rasterizing import rasterized_laps, rasterizing
+from app.evaluation.speed.laps import Lap, RenderRate, camera_of, enough, frames_of, rate_of
 from app.evaluation.speed.window_drawing import WindowLaps, drawn_laps
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
 from engine.storage.typed_json import to_type
@@ -155,3 +154,37 @@ def _read(opened: TrainedProject, key: dict[str, Any]) -> FrameRates | None:
         return to_type(content["rates"], FrameRates) if content.get("key") == key else None
     except (OSError, JsonError, KeyError, TypeError, ValueError):
         return None
+
+
+def rasterizing(n_threads: int) -> str:
+    """What draws, in words."""
+    return f"CPU rasterizer, {n_threads} thread{'' if n_threads == 1 else 's'}"
+
+
+def rasterized_laps(opened: TrainedProject, clock: Callable[[], float]) -> Iterator[Lap]:
+    """Render on all cores; yields the laps that count.
+
+    Raises:
+        ProjectError: A clip is damaged.
+    """
+    use_threads(None)
+    import torch
+
+    from engine.model.clip_view import render_gaussians, visible_rows
+    from engine.model.host_array import host_array
+
+    camera = camera_of(opened)
+    for clip_index, frames in frames_of(opened).items():
+        trained = opened.load(clip_index)
+        view = trained.view(opened.capture.rig, camera)
+        for number, frame in enumerate(frames):
+            with torch.no_grad():
+                start = clock()
+                clip_time = trained.clip.clip_time(frame)
+                rows = visible_rows(trained.model, view, clip_time, reach=trained.reach)
+                gaussians = trained.model.decode(clip_time, rows)
+                middle = clock()
+                host_array(render_gaussians(gaussians, view, backend=trained.model.backend).image[0])
+                end = clock()
+            if number:
+                yield Lap(middle - start, end - middle, len(gaussians.means))

@@ -14,12 +14,11 @@ from engine.backends.phase import PhasePlan
 from engine.backends.reference.adam import ReferenceAdam
 from engine.backends.reference.decode import decode_reference, join_reference
 from engine.backends.reference.loss import photometric_loss_reference, tile_squares_reference, volume_sum_reference
-from engine.backends.reference.raster import rasterize_reference
-from engine.backends.reference.tile_boxes import tile_boxes_reference
+from engine.backends.reference.raster import drawable_rows, pixel_boxes, project, rasterize_reference
 from engine.model.decoder import Decoder
 from engine.model.field import SpatioTemporalField
 from engine.raster.gaussians import Gaussians
-from engine.raster.pinhole_view import PinholeView
+from engine.raster.pinhole_view import TILE_PX, PinholeView, n_tiles
 from engine.raster.rendering import Rendering
 from engine.raster.tile_boxes import TileBoxes
 
@@ -120,3 +119,16 @@ class ReferenceBackend:
 
     def phase(self, plan: PhasePlan) -> None:
         """See Backend. Its operations are what another way is compared with."""
+
+
+def tile_boxes_reference(gaussians: Gaussians, view: PinholeView) -> TileBoxes:
+    """Boxes of checked Gaussians, any dtype and device."""
+    gaussians = gaussians.detach()
+    packed = torch.ones(len(gaussians), 2, dtype=torch.int32, device=gaussians.means.device)
+    rows = drawable_rows(gaussians, view)
+    drawn = gaussians[rows]
+    centers, covariances, _ = project(drawn, view)
+    first, last, _ = pixel_boxes(centers, covariances, drawn.opacities, view)
+    tiles = [(pixels / TILE_PX).floor().to(torch.int32) for pixels in (first, last)]
+    packed[rows] = tiles[0] | tiles[1] << 16
+    return TileBoxes(packed, n_tiles(view.width, view.height))

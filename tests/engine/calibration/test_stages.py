@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from engine.calibration.child import STAGES, StageProgress
 from engine.calibration.matching.pictures import N_BACKGROUND_FRAMES, read_pictures
-from engine.calibration.stages import STAGES, StageProgress
 from engine.calibration.videos import find_videos
 from engine.progress import Progress
 from tests.engine.calibration.test_room_corner import write_corner

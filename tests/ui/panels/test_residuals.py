@@ -17,8 +17,16 @@ from app.status import CELL_RANGES, ResidualStatus, SeamStatus
 from engine.text import camera_text
 from tests.ui.pilot import Pilot
 from ui.panels.picture.heat_overlay import heat_words
-from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, worst_of
-from ui.panels.residuals.matrix import NAME_HEIGHT, cell_colors, matrix_picture, named_rows
+from ui.panels.residuals.matrix import (
+    NAME_HEIGHT,
+    cell_at,
+    cell_colors,
+    frames_per_column,
+    matrix_picture,
+    named_rows,
+    pixel_cells,
+    worst_of,
+)
 from ui.panels.residuals.panel import listed_seams, progress_text
 from ui.panels.state import RESIDUALS
 from ui.panels.timeline.rows.columns import provisional_text

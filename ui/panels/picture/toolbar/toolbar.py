@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.playback.modes.view_modes import ALL, COLOR, CONTENTS, MODES
 from app.playback.views.views import COUNTS
-from app.session.commands import LookThrough, ShowViews, ToggleOverlay
+from app.residuals.heat_map import HEAT_KINDS
+from app.session.commands import LookThrough, SetContent, SetMode, ShowHeat, ShowViews, ToggleOverlay
 from app.session.session_view import SessionView
 from ui.panels.actions.viewing.compare import cloud_overlay
+from ui.panels.actions.viewing.modes import mode_key
 from ui.panels.picture.toolbar.compare_box import compare_words, draw_compare_box
-from ui.panels.picture.toolbar.heat_box import draw_heat_box, heat_words
-from ui.panels.picture.toolbar.mode_box import draw_mode_box, mode_words
 from ui.panels.picture.toolbar.navigation import ViewPopup
 from ui.panels.picture.toolbar.row_fit import fit_row
 from ui.panels.pieces.slider import slider
 from ui.panels.pieces.widgets import MOST_BOX, box_flags, box_width, box_words, segment
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
+from ui.style import theme
 from ui.style.theme import Icon
 
 TOOLBAR_HEIGHT = 38.0
@@ -218,3 +220,73 @@ def _draw_overlay_menu(session: SessionView, dispatch: Dispatch, ui: UiState) ->
     imgui.separator()
     imgui.text_disabled("Tab hides or shows cameras and anchors")
     imgui.end_popup()
+
+
+_CLAMPED = imgui.SliderFlags_.always_clamp
+
+
+def heat_words(session: SessionView) -> str:
+    """What the box says."""
+    return HEAT_KINDS[session.overlays.heat].label if session.overlays.heat else "Heat"
+
+
+def draw_heat_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: float) -> None:
+    """Which residual is shown over the picture, and how strongly. width: Units."""
+    overlays = session.overlays
+    imgui.set_next_item_width(width)
+    if imgui.begin_combo("##heat", box_words(heat_words(session), width), box_flags(width)):
+        if imgui.selectable("None", not overlays.heat)[0]:
+            dispatch(ShowHeat(""))
+        ui.mark("viewport.heat.none")
+        for kind in HEAT_KINDS.values():
+            if imgui.selectable(kind.label, overlays.heat == kind.name)[0]:
+                dispatch(ShowHeat(kind.name))
+            ui.mark(f"viewport.heat.{kind.name}")
+            imgui.set_item_tooltip(kind.meaning)
+        imgui.separator()
+        imgui.set_next_item_width(150)
+        percent = slider("Opacity", overlays.heat_opacity * 100.0, 10.0, 100.0, "%.0f %%", _CLAMPED)[1]
+        overlays.heat_opacity = percent / 100.0
+        ui.mark("viewport.heat.opacity")
+        imgui.end_combo()
+    ui.mark("viewport.heat")
+    imgui.set_item_tooltip("Where the render differs from the previous frame or from the captured picture (7)")
+
+
+def mode_words(session: SessionView) -> str:
+    """What the box says: the mode, or the part of a clip and then the mode."""
+    overlays = session.overlays
+    words = MODES[overlays.mode].label
+    if overlays.content == ALL:
+        return words
+    return CONTENTS[overlays.content].label + ("" if overlays.mode == COLOR else f", {words.lower()}")
+
+
+def draw_mode_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: float) -> None:
+    """A box of modes, and below them of parts of a clip. width: Units."""
+    overlays = session.overlays
+    imgui.set_next_item_width(width)
+    is_plain = overlays.mode == COLOR and overlays.content == ALL
+    if not is_plain:  # what is seen is not the scene: that should be noticed
+        imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.YELLOW))
+    is_open = imgui.begin_combo("##mode", box_words(mode_words(session), width), box_flags(width))
+    if not is_plain:
+        imgui.pop_style_color()
+    ui.mark("viewport.mode")
+    if not is_open:
+        imgui.set_item_tooltip("View mode (Shift and a number), and which part of a clip is drawn")
+        return
+    imgui.text_disabled("View mode")
+    for mode in MODES.values():
+        if imgui.menu_item(mode.label, mode_key(mode.name), overlays.mode == mode.name, True)[0]:
+            dispatch(SetMode(mode.name))
+        ui.mark(f"viewport.mode.{mode.name}")
+        imgui.set_item_tooltip(mode.explanation)
+    imgui.separator()
+    imgui.text_disabled("Drawn")
+    for content in CONTENTS.values():
+        if imgui.menu_item(content.label, "", overlays.content == content.name, True)[0]:
+            dispatch(SetContent(content.name))
+        ui.mark(f"viewport.content.{content.name}")
+        imgui.set_item_tooltip(content.explanation)
+    imgui.end_combo()
