@@ -113,7 +113,7 @@ def tiny_capture(tmp_path_factory: pytest.TempPathFactory, built_once: BuiltOnce
     Eight cameras of 96x72, two clips of five frames; the second clip has the object that appears. Takes a few seconds.
     """
     pytest.importorskip("open3d", reason="the generator needs Open3D and its system libraries", exc_type=ImportError)
-    from engine.synthetic import write_capture
+    from app.lab.synthetic import write_capture
 
     def build(folder: Path) -> None:
         write_capture(folder, size=(96, 72), n_cameras=8, n_frames=10, clip_length=5, supersampling=2)

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.lab.synthetic.scene import SyntheticScene, make_scene
 from engine.capture.capture import open_capture
-from engine.synthetic.scene import SyntheticScene, make_scene
 
 pytest.importorskip("open3d", reason="the ray caster needs Open3D and its system libraries", exc_type=ImportError)
 
-from engine.synthetic.raycast import SceneCamera, make_truth
+from app.lab.synthetic.raycast import SceneCamera, make_truth
 from tests.long_captures.changes import CHANGES, DAYLIGHT_END, Change, make_change
 from tests.long_captures.scene import make_long_scene
 from tests.long_captures.writing import NOISE, CameraFootage, write_long_captures

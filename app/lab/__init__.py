@@ -1,1 +1,1 @@
-"""Benchmarks, ablations and reports; the product never imports them."""
+"""Benchmarks, ablations, reports, and the generator of synthetic captures; the product never imports them."""

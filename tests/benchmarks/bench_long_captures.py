@@ -36,14 +36,14 @@ from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
 from app.export.video.views import camera_view
 from app.lab.flicker import flicker_figures
+from app.lab.synthetic.raycast import make_truth
+from app.lab.synthetic.scene import SyntheticScene
+from app.lab.synthetic.writing import cameras_document
 from app.project.opening.project_access import open_project
 from engine.images.psnr import psnr
 from engine.metrics.clips.summary import mean_of
 from engine.metrics.pictures.colors import to_levels
 from engine.storage.json_files import json_text
-from engine.synthetic.raycast import make_truth
-from engine.synthetic.scene import SyntheticScene
-from engine.synthetic.writing import cameras_document
 from tests.benchmarks.options import ending_on_bad_input, names
 from tests.long_captures.changes import CHANGES, make_change
 from tests.long_captures.scene import make_long_scene

@@ -33,14 +33,14 @@ import numpy as np
 from app.background.kernels import use_threads
 from app.cli.cli import main as clipgstream
 from app.evaluation.headless import open_trained
+from app.lab.synthetic.scene import SyntheticScene
+from app.lab.synthetic.writing import cameras_document, write_json, write_video
 from app.project.opening.project_access import open_project
 from app.training.build import clip_training
 from engine.capture.capture import open_capture
 from engine.clip_files.compact import write_compact_clip
 from engine.gate.regions import sphere_region
 from engine.mending.figures import ENOUGH, MAX_PSNR_LOSS_DB
-from engine.synthetic.scene import SyntheticScene
-from engine.synthetic.writing import cameras_document, write_json, write_video
 from engine.training.config import config_of, parse_overrides
 from tests.long_captures.changes import Change, make_change
 from tests.long_captures.scene import make_long_scene

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from engine.synthetic.rigs import make_rig
-from engine.synthetic.writing import write_video
+from app.lab.synthetic.rigs import make_rig
+from app.lab.synthetic.writing import write_video
 from tests.ui.desk import Desk, missing_programs
 
 SIZE = (320, 240)

@@ -22,6 +22,8 @@ import numpy as np
 import torch
 from PIL import Image
 
+from app.lab.synthetic.raycast import make_truth
+from app.lab.synthetic.scene import make_scene
 from engine.backends.table import backend_called
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
@@ -34,8 +36,6 @@ from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_view import REACH_SPACINGS, View, render_model
 from engine.model.reading import load_clip_model
 from engine.progress import Progress
-from engine.synthetic.raycast import make_truth
-from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig, config_of, parse_overrides
 from engine.training.variants.variant_method import method_of

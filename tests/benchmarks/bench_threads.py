@@ -45,8 +45,8 @@ def measure_here(seconds: float) -> list[float]:
     import torch
 
     from app.background.kernels import use_threads
+    from app.lab.synthetic.gaussian_scenes import layered_scene
     from engine.raster import Gaussians, rasterize
-    from engine.synthetic.gaussian_scenes import layered_scene
 
     use_threads(None)
     scene = layered_scene(N_GAUSSIANS, WIDTH, HEIGHT, 2.0)

@@ -45,8 +45,8 @@ _PLACE = "put-the-odd-number-here"
 
 def make_video_capture(folder: Path) -> None:
     """Three cameras with a video each."""
-    from engine.synthetic.rigs import make_rig
-    from engine.synthetic.writing import write_video
+    from app.lab.synthetic.rigs import make_rig
+    from app.lab.synthetic.writing import write_video
 
     folder.mkdir(parents=True)
     rig = make_rig(3, SIZE)
@@ -61,7 +61,7 @@ def make_video_capture(folder: Path) -> None:
 
 def make_panoptic_capture(folder: Path) -> None:
     """Four cameras with an image per frame."""
-    from engine.synthetic.rigs import make_rig
+    from app.lab.synthetic.rigs import make_rig
 
     rig = make_rig(4, SIZE)
     for name, ids in (("train_meta.json", (0, 1, 2)), ("test_meta.json", (3,))):

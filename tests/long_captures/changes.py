@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.synthetic.scene import SyntheticScene
+from app.lab.synthetic.scene import SyntheticScene
 from tests.long_captures.scene import inside_clip
 
 Light = Callable[[int, np.ndarray], np.ndarray]

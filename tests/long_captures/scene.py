@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.lab.synthetic.rigs import FOCUS, RING_HEIGHTS, RING_RADIUS, looking_at
+from app.lab.synthetic.scene import SyntheticScene, make_parts, placed, still
+from app.lab.synthetic.textures import Texture
 from engine.camera.rig import CameraRig
-from engine.synthetic.rigs import FOCUS, RING_HEIGHTS, RING_RADIUS, looking_at
-from engine.synthetic.scene import SyntheticScene, make_parts, placed, still
-from engine.synthetic.textures import Texture
 
 MOTION_FRAMES = 18
 """Frames in which the ball flies 84 degrees round the room and the sculpture turns by 80: it takes 77 to come round."""

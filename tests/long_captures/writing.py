@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.synthetic.raycast import SceneCamera
-from engine.synthetic.scene import SyntheticScene
-from engine.synthetic.writing import cameras_document, write_json, write_video
+from app.lab.synthetic.raycast import SceneCamera
+from app.lab.synthetic.scene import SyntheticScene
+from app.lab.synthetic.writing import cameras_document, write_json, write_video
 from tests.long_captures.changes import Change
 
 NOISE = 1.0 / 255.0

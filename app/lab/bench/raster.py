@@ -20,9 +20,9 @@ from app.lab.bench.compared import COMPARED, EXACT, FAST
 from app.lab.bench.rows import KernelRow, SpeedError, kernel_row
 from app.lab.bench.scenes import RECIPES, Recipe
 from app.lab.bench.timing import interleaved, peak_extra_mb
+from app.lab.synthetic.gaussian_scenes import GaussianScene
 from engine.raster import Gaussians, Rendering, rasterize
 from engine.raster.rasterizer import Rasterizer
-from engine.synthetic.gaussian_scenes import GaussianScene
 
 FORWARD_OPERATIONS, BACKWARD_OPERATIONS = 20, 43
 """Instructions on the multiply-add ports per block of sixteen pairs, counted in the two inner loops: exponent 3,

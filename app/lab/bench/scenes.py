@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
+from app.lab.synthetic.gaussian_scenes import GaussianScene, layered_scene
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from engine.synthetic.writing import write_video
+from app.lab.synthetic.writing import write_video
 from tests.engine.capture.made_videos import write_video_of_kind
 from tests.engine.synchronisation.made_recordings import FPS, made_recordings, ring
 

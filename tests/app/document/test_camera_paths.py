@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from app.document.camera_paths import camera_path_named, check_paths, stored_path, to_path
+from app.lab.synthetic.rigs import make_rig
 from engine.camera.camera_path import CameraPath
 from engine.camera.path_presets import fly_through, turntable
 from engine.errors import ProjectError
-from engine.synthetic.rigs import make_rig
 
 TURN = turntable(np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 0.3, (0, 29), name='<b>100 %s ##1\n"é"</b>')
 FLIGHT = fly_through(make_rig(5, (80, 60)), (0.5, 29))

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 import torch
 
+from app.lab.synthetic.gaussian_scenes import layered_scene
 from engine.backends.backend import Backend
 from engine.backends.reference.backend import ReferenceBackend
 from engine.backends.table import BACKENDS, BackendEntry, backend_called
 from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.joining import join_frozen
 from engine.raster import Gaussians, rasterize, tile_boxes
-from engine.synthetic.gaussian_scenes import layered_scene
 from engine.training.step.losses import photometric_loss
 from tests.decode_scenes import ODD, Scene, backward
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.lab.synthetic.rigs import looking_at
 from engine.calibration.solving.bundle import Observations
 from engine.calibration.solving.cameras import N_LENS, Cameras, rotation_of
-from engine.synthetic.rigs import looking_at
 
 SIZE = (640, 480)
 LENS_PARAMS = {

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import make_rig
 from engine.camera.depth_range import (
     FOCUS_RANGE,
     MIN_POINTS,
@@ -13,7 +14,6 @@ from engine.camera.depth_range import (
     near_plane,
 )
 from engine.camera.projection import unproject
-from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(6, (80, 60))
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import make_rig
 from engine.camera.path_presets import fly_through, turntable, visiting_order
 from engine.camera.projection import camera_center
 from engine.camera.rig import CameraRig
-from engine.synthetic.rigs import make_rig
 
 CENTER, UP = np.array([1.0, -2.0, 0.5]), np.array([0.0, 0.0, 2.0])
 RIG = make_rig(12, (80, 60))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import make_rig
 from engine.camera.projection import (
     is_in_picture,
     pinhole_K,
@@ -12,7 +13,6 @@ from engine.camera.projection import (
     unproject,
     vertical_fov,
 )
-from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(3, (8, 6))
 

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.lab.synthetic.rigs import FOCUS, looking_at, make_rig
 from engine.camera.rig import CameraRig
-from engine.synthetic.rigs import FOCUS, looking_at, make_rig
 
 
 def project(K: np.ndarray, world_to_camera: np.ndarray, point: np.ndarray) -> np.ndarray:

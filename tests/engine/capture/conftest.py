@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from engine.synthetic.rigs import make_rig
-from engine.synthetic.writing import write_video
+from app.lab.synthetic.rigs import make_rig
+from app.lab.synthetic.writing import write_video
 
 SIZE = (48, 32)
 Document = dict[str, Any]

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.lab.synthetic.writing import write_video
 from engine.capture.came_along import came_along
 from engine.capture.capture import open_capture
 from engine.capture.clip import Clip
 from engine.capture.layout.format_result import Layout
-from engine.synthetic.writing import write_video
 from engine.training.config import TrainConfig
 from engine.training.preparation.cloud_preparation import key_of_corrected
 

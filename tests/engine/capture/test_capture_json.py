@@ -125,7 +125,7 @@ def test_the_view_of_a_fisheye_is_a_correction(described: Path) -> None:
 def test_cameras_of_different_sizes_share_one_picture_size(
     described: Path, pictures: Callable[..., np.ndarray]
 ) -> None:
-    from engine.synthetic.writing import write_video
+    from app.lab.synthetic.writing import write_video
 
     write_video(described / "cam01.mp4", (pictures(1, t, (48, 48)) for t in range(6)), fps=30.0)
     edited(described, lambda document: document["cameras"][1].update(width=48, height=48))

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import make_rig
 from engine.camera.rig import CameraRig
 from engine.capture.cameras.rig_checks import check_rig, rig_extent, rig_warnings
-from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(8, (80, 60))
 

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.lab.synthetic import make_scene
+from app.lab.synthetic.writing import cameras_document
 from engine.capture.capture import Capture, open_capture
 from engine.capture.files.sound import SoundReader, sound_source
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
 from engine.errors import CaptureError
-from engine.synthetic import make_scene
-from engine.synthetic.writing import cameras_document
 from tests.engine.synchronisation.made_recordings import write_sound_video
 
 RATE = 48_000

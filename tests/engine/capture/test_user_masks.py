@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.lab.synthetic.writing import write_video
 from engine.capture.capture import open_capture
 from engine.capture.writers.capture_json import Corrections, capture_document, write_capture_json, write_corrections
 from engine.errors import CaptureError
-from engine.synthetic.writing import write_video
 
 MakeCapture = Callable[..., Path]
 

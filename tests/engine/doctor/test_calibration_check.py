@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import forward_facing_rig, make_rig
 from engine.camera.rig import CameraRig
 from engine.doctor.checks.calibration import check_calibration, find_suspects
 from engine.doctor.epipolar import fundamental_matrices, pair_errors, sampson_px
 from engine.doctor.finding import PairEvidence
 from engine.features.matching import PairMatches
-from engine.synthetic.rigs import forward_facing_rig, make_rig
 from tests.engine.doctor.conftest import with_focal, with_turn
 
 RIGS = {"ring": make_rig(20, (320, 240)), "forward": forward_facing_rig(12, (320, 240))}

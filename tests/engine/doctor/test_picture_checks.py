@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, shift
 
+from app.lab.synthetic.rigs import make_rig
 from engine.camera.rig import CameraRig
 from engine.doctor.alignment import align
 from engine.doctor.checks.black import check_black
 from engine.doctor.checks.frozen import check_frozen
 from engine.doctor.checks.movement import check_movement
 from engine.doctor.picture_survey import CameraLook, PictureSurvey, frames_to_look_at, median_picture
-from engine.synthetic.rigs import make_rig
 
 N_FRAMES = 24
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import forward_facing_rig, half_dome_rig, make_rig
 from engine.camera.rig import CameraRig
 from engine.capture.capture import open_capture
 from engine.doctor.checks.coverage import check_coverage, measure_coverage
@@ -15,7 +16,6 @@ from engine.doctor.checks.twins import check_twins
 from engine.doctor.finding import Finding, in_order
 from engine.doctor.neighbours import neighbour_pairs
 from engine.doctor.quick import quick_findings
-from engine.synthetic.rigs import forward_facing_rig, half_dome_rig, make_rig
 from tests.engine.capture.conftest import *  # noqa: F403  its fixtures
 
 RIGS = [make_rig(20, (320, 240)), forward_facing_rig(12, (320, 240)), half_dome_rig(16, (320, 240))]

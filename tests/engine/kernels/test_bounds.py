@@ -43,10 +43,10 @@ def rasterize_cases(memory: GuardedMemory) -> Iterator[str]:
     """Forward and backward, masks, frozen rows, depth, and without gradients."""
     import torch
 
+    from app.lab.synthetic.gaussian_scenes import layered_scene
     from engine.backends.cpu.raster.rasterize import POOL
     from engine.backends.table import backend_called
     from engine.raster import Gaussians, rasterize, tile_boxes
-    from engine.synthetic.gaussian_scenes import layered_scene
 
     sizes = ((0, 40, 33), (1, 1, 1), (15, 31, 65), (16, 64, 32), (17, 33, 5), (161, 70, 50))
     background = memory.tensor(torch.ones(3))

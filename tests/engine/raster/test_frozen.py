@@ -7,10 +7,10 @@ import dataclasses
 import pytest
 import torch
 
+from app.lab.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from engine.backends.cpu.raster import blend_backward
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")

@@ -11,9 +11,9 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.lab.synthetic.gaussian_scenes import GaussianScene, camera, gaussians_of, layered_scene, simple_scene
 from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, rasterize
-from engine.synthetic.gaussian_scenes import GaussianScene, camera, gaussians_of, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradients
 
 pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole

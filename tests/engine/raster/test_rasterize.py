@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import torch
 
+from app.lab.synthetic.gaussian_scenes import GaussianScene, camera, layered_scene, simple_scene
 from engine.backends.cpu.raster import rasterize as cpu_backend
 from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.synthetic.gaussian_scenes import GaussianScene, camera, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")

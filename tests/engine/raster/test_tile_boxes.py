@@ -8,10 +8,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.lab.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, TileBoxes, rasterize, tile_boxes
 from engine.raster.pinhole_view import n_tiles
-from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 
 BACKENDS = ("cpu", "reference")
 

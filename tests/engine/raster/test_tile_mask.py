@@ -10,9 +10,9 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.lab.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, Rendering, rasterize
-from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
 from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")

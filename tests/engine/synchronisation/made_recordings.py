@@ -10,10 +10,10 @@ from typing import Any
 import av
 import numpy as np
 
+from app.lab.synthetic.rigs import looking_at
 from engine.camera.projection import to_camera
 from engine.camera.rig import CameraRig
 from engine.synchronisation.recording import Recording
-from engine.synthetic.rigs import looking_at
 
 SIZE = (160, 120)
 FPS = 30.0

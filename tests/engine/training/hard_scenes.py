@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from engine.synthetic import textures
+from app.lab.synthetic import textures
 from tests.engine.training.hard_stage import CLIP_LENGTH, HardScene, Place, Thing
 
 CRATE = Thing(lambda _: (0.65, -0.6, 0.2), (0.22, 0.18, 0.2), ("307050", "80c0a0"))

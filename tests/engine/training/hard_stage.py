@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from app.lab.synthetic import textures
+from app.lab.synthetic.rigs import looking_at
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
 from engine.capture.layout.format_result import Layout
-from engine.synthetic import textures
-from engine.synthetic.rigs import looking_at
 
 WIDTH, HEIGHT, FOCAL = 96, 72, 100.0
 N_CAMERAS = 9

@@ -28,6 +28,8 @@ import pytest
 import torch
 from PIL import Image
 
+from app.lab.synthetic.scene import make_scene
+from app.lab.synthetic.writing import cameras_document, write_json, write_video
 from engine.backends.table import backend_called
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture, open_capture
@@ -41,8 +43,6 @@ from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.model.reading import load_clip_model
-from engine.synthetic.scene import make_scene
-from engine.synthetic.writing import cameras_document, write_json, write_video
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import add_residual

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from app.lab.synthetic.writing import write_video
 from engine.assets import asset_path
 from engine.backends.table import backend_called
 from engine.capture.capture import open_capture
@@ -16,7 +17,6 @@ from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.reading import load_clip_model
-from engine.synthetic.writing import write_video
 from tests.built_once import BuiltOnce
 from tests.engine.training.tiny_training import CLIP_LENGTH, Tiny, finish, make_training, same_arrays
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from app.lab.synthetic.rigs import make_rig
+from app.lab.synthetic.writing import write_video
 from engine.camera.lens import Lens
 from engine.capture.capture import Capture, open_capture
-from engine.synthetic.rigs import make_rig
-from engine.synthetic.writing import write_video
 
 NAMES = ("cam1", "cam2", "cam10", "cam11")
 """In the order in which people count, which is not that of text."""

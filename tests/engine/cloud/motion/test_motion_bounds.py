@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import make_rig
 from engine.cloud.motion.moving_cloud import hull_votes, motion_bounds
-from engine.synthetic.rigs import make_rig
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.lab.synthetic.raycast import SceneCamera, make_truth
+from app.lab.synthetic.scene import make_scene
 from engine.camera.projection import unproject
 from engine.camera.rig import CameraRig
 from engine.capture.layout.format_result import Layout
@@ -16,8 +18,6 @@ from engine.capture.points import CapturePoints
 from engine.capture.writers.point_files import write_ply
 from engine.cloud.stereo import static_cloud as clouds
 from engine.cloud.stereo.given_points import true_points
-from engine.synthetic.raycast import SceneCamera, make_truth
-from engine.synthetic.scene import make_scene
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import rig_at
+from app.lab.synthetic.textures import noise
 from engine.camera.projection import pixel_rays, project, projection_matrices, to_world, unproject
 from engine.camera.rig import CameraRig
 from engine.cloud.stereo.depth import slanted
 from engine.cloud.stereo.depth.slanted import refine_slanted
 from engine.cloud.stereo.depth.sweep import GREY_TRUNCATION, GREY_WEIGHT, STD_FLOOR, UNKNOWN_COST
-from engine.synthetic.rigs import rig_at
-from engine.synthetic.textures import noise
 
 SIZE = (48, 36)
 LOW, HIGH = 1 / 6.0, 1 / 1.5

@@ -7,11 +7,11 @@ import pytest
 
 pytest.importorskip("open3d", exc_type=ImportError)  # the generator casts its rays with it
 
+from app.lab.synthetic import SceneCamera, make_scene, make_truth
 from engine.camera.projection import is_in_picture, project, projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud, estimate_depth_maps
 from engine.errors import PreparationError
-from engine.synthetic import SceneCamera, make_scene, make_truth
 
 pytestmark = pytest.mark.slow
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import make_rig
 from engine.camera.depth_range import depth_ranges
 from engine.camera.projection import project, projection_matrices
 from engine.camera.rig import CameraRig
@@ -15,7 +16,6 @@ from engine.cloud.stereo.depth.sweep import (
     preferred_angle_deg,
     relative_homography,
 )
-from engine.synthetic.rigs import make_rig
 
 
 def cone_rig(angle_deg: float, n_cameras: int = 8) -> CameraRig:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from app.lab.synthetic.rigs import looking_at, rig_at
 from engine.camera.projection import is_in_picture, project, projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.stereo.unseen import backdrop, unseen_points
-from engine.synthetic.rigs import looking_at, rig_at
 
 SIZE = (40, 30)
 SPACING = 0.1

@@ -5,13 +5,13 @@ import pytest
 import torch
 from torch import Tensor
 
+from app.lab.synthetic.gaussian_scenes import GaussianScene, layered_scene
+from app.lab.synthetic.rigs import looking_at
 from engine.backends.table import backend_called
 from engine.camera.corrections import LOG_FOCAL, N_VALUES, corrected, corrected_camera
 from engine.camera.rig import CameraRig
 from engine.model.clip_view import View, render_gaussians
 from engine.raster.gaussians import Gaussians
-from engine.synthetic.gaussian_scenes import GaussianScene, layered_scene
-from engine.synthetic.rigs import looking_at
 from engine.training.step.training_cameras import TrainingCameras, correction_gradient
 
 WIDTH, HEIGHT = 48, 40

@@ -19,9 +19,9 @@ from typing import Any
 import av
 import numpy as np
 
+from app.lab.synthetic.raycast import SceneCamera, make_truth
+from app.lab.synthetic.scene import SAMPLE_CAMERAS, SyntheticScene, make_scene
 from engine.storage.files import atomic_path
-from engine.synthetic.raycast import SceneCamera, make_truth
-from engine.synthetic.scene import SAMPLE_CAMERAS, SyntheticScene, make_scene
 
 logger = logging.getLogger(__name__)
 

@@ -1,4 +1,4 @@
-"""Command line of the generator: `python -m engine.synthetic --out assets/sample`."""
+"""Command line of the generator: `python -m app.lab.synthetic --out assets/sample`."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import argparse
 import logging
 from pathlib import Path
 
-from engine.synthetic.scene import SAMPLE_CAMERAS
-from engine.synthetic.writing import write_capture
+from app.lab.synthetic.scene import SAMPLE_CAMERAS
+from app.lab.synthetic.writing import write_capture
 
 
 def main() -> None:
     """Write the sample capture, or a smaller one."""
-    parser = argparse.ArgumentParser(prog="python -m engine.synthetic", description="Write the sample capture.")
+    parser = argparse.ArgumentParser(prog="python -m app.lab.synthetic", description="Write the sample capture.")
     parser.add_argument("--out", type=Path, required=True, help="folder for cameras.json and the videos")
     parser.add_argument("--truth", type=Path, help="folder for ground-truth depth and part indices")
     parser.add_argument("--width", type=int, default=320)

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.lab.synthetic import meshes, textures
+from app.lab.synthetic.rigs import FOCUS, forward_facing_rig, half_dome_rig
+from app.lab.synthetic.scene import SyntheticScene, make_scene
+from app.lab.synthetic.writing import cameras_document, to_yuv444, write_capture, write_scene
 from engine.capture.capture import open_capture
-from engine.synthetic import meshes, textures
-from engine.synthetic.rigs import FOCUS, forward_facing_rig, half_dome_rig
-from engine.synthetic.scene import SyntheticScene, make_scene
-from engine.synthetic.writing import cameras_document, to_yuv444, write_capture, write_scene
 
 pytest.importorskip("open3d", reason="the ray caster needs Open3D and its system libraries", exc_type=ImportError)
 
-from engine.synthetic.raycast import SceneCamera, make_truth
+from app.lab.synthetic.raycast import SceneCamera, make_truth
 
-SAMPLE = Path(__file__).parents[2] / "assets" / "sample"
+SAMPLE = Path(__file__).parents[3] / "assets" / "sample"
 SHIPPED = make_scene()
 
 

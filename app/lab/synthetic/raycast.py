@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.synthetic.meshes import Mesh
-from engine.synthetic.scene import LIGHT_POSITION, LIGHT_RADIUS, Part, SyntheticScene
+from app.lab.synthetic.meshes import Mesh
+from app.lab.synthetic.scene import LIGHT_POSITION, LIGHT_RADIUS, Part, SyntheticScene
 
 AMBIENT = 0.42
 """Light that reaches a surface whatever its direction."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.lab.synthetic import meshes, textures
+from app.lab.synthetic.meshes import Mesh
+from app.lab.synthetic.rigs import make_rig
+from app.lab.synthetic.textures import Texture
 from engine.camera.rig import CameraRig
-from engine.synthetic import meshes, textures
-from engine.synthetic.meshes import Mesh
-from engine.synthetic.rigs import make_rig
-from engine.synthetic.textures import Texture
 
 ROOM_SIZE = (6.0, 6.0, 2.8)
 """Inner width, depth and height."""
@@ -100,7 +100,7 @@ def make_scene(
         n_frames: Length of the capture.
         clip_length: Frames per clip.
         fps: Frames per second.
-        rig: Cameras of another kind (engine.synthetic.rigs), in place of `size` and `n_cameras`.
+        rig: Cameras of another kind (app.lab.synthetic.rigs), in place of `size` and `n_cameras`.
         surroundings: One of SURROUNDINGS.
     Raises:
         ValueError: A number is below 1, or there are no such surroundings.
