@@ -12,7 +12,7 @@ from ui.panels.timeline.marker_box import draw_marker_box
 from ui.panels.timeline.menu import draw_clip_menu
 from ui.panels.timeline.pointer import handle_track
 from ui.panels.timeline.rows.clip_lane import draw_clip_lane
-from ui.panels.timeline.rows.gutter import JUMP_WIDTH as GUTTER_WIDTH
+from ui.panels.timeline.rows.gutter import WIDTH as GUTTER_WIDTH
 from ui.panels.timeline.rows.gutter import draw_gutter
 from ui.panels.timeline.rows.overview import draw_overview
 from ui.panels.timeline.rows.path_lane import draw_path_lane
