@@ -21,7 +21,7 @@ class ExportChoices(msgspec.Struct, frozen=True):
     """The value.
 
     Attributes:
-        kind: One of the kinds of app.export.export_jobs.
+        kind: One of the kinds of app.export.queue.export_jobs.
         answers: Chosen values by "kind.option", of every kind that was looked at.
         frames: All that are trained, those from in to out of the timeline, this clip, or this frame.
         out: The file or folder that is written; empty to have one suggested.

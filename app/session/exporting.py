@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple
 from app.background.jobs import JobContext, Jobs
 from app.background.latest import LatestWorker, nothing
 from app.export.export_choices import ExportChoices, ExportContext
-from app.export.export_jobs import ExportTask
 from app.export.export_plan import ExportPlan, plan_export, suggested_out
-from app.export.export_process import Exporter, ExportProcess
-from app.export.export_queue import ExportQueue
-from app.export.export_status import ExportStatus
 from app.export.jobs.answers import Answers
 from app.export.jobs.table import KINDS
+from app.export.queue.export_jobs import ExportTask
+from app.export.queue.export_process import Exporter, ExportProcess
+from app.export.queue.export_queue import ExportQueue
+from app.export.queue.export_status import ExportStatus
 from app.export.show_in_folder import show_in_folder
 from app.playback.timeline import Timeline
 from app.project.opening.opened_project import OpenedProject

@@ -13,7 +13,7 @@ import numpy as np
 from app.background.log_reader import LogLine
 from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
-from app.export.export_status import ExportStatus
+from app.export.queue.export_status import ExportStatus
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.modes.coverage import CoveredSpace
 from app.playback.modes.trails import Trails

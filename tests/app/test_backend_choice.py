@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from app.export.export_jobs import ExportTask
+from app.export.queue.export_jobs import ExportTask
 from app.mending.request import MendJob, MendRequest
 from app.session.projects.preferences import Preferences
 from app.training.messages import TrainJob

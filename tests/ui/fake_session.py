@@ -16,7 +16,7 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
-from app.export.export_status import ExportStatus
+from app.export.queue.export_status import ExportStatus
 from app.playback.markers import Markers
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.modes.coverage import CoveredSpace

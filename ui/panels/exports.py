@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.export.export_status import ExportStatus
+from app.export.queue.export_status import ExportStatus
 from app.session.commands import (
     AskExport,
     CancelExport,

@@ -34,7 +34,7 @@ class GaussiansJob(ExportJob, frozen=True):
     about: ClassVar[str] = (
         "A folder with a file per frame, for viewers, editors and engines. Each export is read back and measured."
     )
-    work: ClassVar[str] = "app.export.gaussians_job"
+    work: ClassVar[str] = "app.export.gaussians.gaussians_job"
     needs_trained: ClassVar[bool] = True
 
     format: Annotated[

@@ -19,8 +19,8 @@ import pytest
 from app.document.history import DocumentHistory
 from app.evaluation.headless import TrainedProject, open_trained
 from app.export.export_progress import ExportProgress
-from app.export.gaussians_job import GaussiansJob
-from app.export.gaussians_job import run as export_gaussians
+from app.export.gaussians.gaussians_job import GaussiansJob
+from app.export.gaussians.gaussians_job import run as export_gaussians
 from app.export.jobs.video import VideoJob
 from app.export.picked_frames import PickedFrames
 from app.export.player_job import PlayerJob

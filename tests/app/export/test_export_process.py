@@ -9,11 +9,7 @@ from typing import Any
 
 import pytest
 
-from app.export.export_jobs import ExportTask
-from app.export.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn, ExportStopped
-from app.export.export_process import ExportProcess
 from app.export.export_progress import ExportProgress
-from app.export.export_worker import reporting
 from app.export.jobs.cameras import CamerasJob
 from app.export.jobs.gaussians import GaussiansJob
 from app.export.jobs.job import ExportJob
@@ -22,6 +18,10 @@ from app.export.jobs.player import PlayerJob
 from app.export.jobs.table import KINDS
 from app.export.jobs.video import Turntable, VideoJob
 from app.export.picked_frames import PickedFrames
+from app.export.queue.export_jobs import ExportTask
+from app.export.queue.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn, ExportStopped
+from app.export.queue.export_process import ExportProcess
+from app.export.queue.export_worker import reporting
 from app.project.opening.project_access import open_project
 from engine.children.kind import Unwanted
 from engine.children.messages import decoded, encoded

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from app.export.export_jobs import ExportTask
-from app.export.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn, ExportStopped
 from app.export.export_progress import ExportProgress, ExportResult
-from app.export.export_queue import MAX_ENDED, ExportQueue
 from app.export.metrics_job import MetricsJob
+from app.export.queue.export_jobs import ExportTask
+from app.export.queue.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn, ExportStopped
+from app.export.queue.export_queue import MAX_ENDED, ExportQueue
 
 
 class FakeExporter:

@@ -16,10 +16,10 @@ from msgspec import structs
 
 from app.document.changes import world_changes
 from app.evaluation.headless import TrainedProject, open_trained
-from app.export import gaussian_sequence, gaussians_job, read_back
 from app.export.export_progress import ExportProgress
-from app.export.gaussian_files import GaussianFile, base_name, moment_files, static_file
-from app.export.gaussians_job import GaussiansJob, estimate, run
+from app.export.gaussians import gaussian_sequence, gaussians_job, read_back
+from app.export.gaussians.gaussian_files import GaussianFile, base_name, moment_files, static_file
+from app.export.gaussians.gaussians_job import GaussiansJob, estimate, run
 from app.export.picked_frames import PickedFrames
 from app.export.scene_frames import Part, SceneFrames
 from app.project.opening.project_access import open_project
@@ -252,7 +252,7 @@ def test_a_disk_that_fills_up_leaves_nothing(opened: TrainedProject, tmp_path: P
 
     full: dict[str, Format] = {"ply": FORMATS["ply"]._replace(write=write, read=lambda file: SAMPLE)}
     SAMPLE = Splats.of(SceneFrames(opened).gaussians(0))
-    monkeypatch.setattr("app.export.gaussians_job.FORMATS", full)
+    monkeypatch.setattr("app.export.gaussians.gaussians_job.FORMATS", full)
     with pytest.raises(DiskError, match="No space left on device"):
         run(opened, GaussiansJob(tmp_path / "out"), quiet)
     assert names(tmp_path) == before
@@ -329,7 +329,7 @@ def test_a_file_that_does_not_look_like_the_scene_is_a_warning(
         found.colors[:] += 0.1
         return found
 
-    monkeypatch.setattr("app.export.gaussians_job.FORMATS", {"ply": FORMATS["ply"]._replace(read=pale)})
+    monkeypatch.setattr("app.export.gaussians.gaussians_job.FORMATS", {"ply": FORMATS["ply"]._replace(read=pale)})
     result = run(opened, GaussiansJob(tmp_path / "out", frames=PickedFrames.of(range(1))), quiet)
     assert result.psnr_db is not None
     assert 10 < result.psnr_db < 50

@@ -12,11 +12,11 @@ import pytest
 
 from app.evaluation.headless import open_trained
 from app.export.export_choices import ExportChoices, ExportContext
-from app.export.export_messages import ExportDone, ExportFailed
 from app.export.export_plan import TAKEN, ExportPlan, plan_export
 from app.export.export_progress import ExportResult
 from app.export.jobs.answers import Answers
 from app.export.jobs.table import KINDS
+from app.export.queue.export_messages import ExportDone, ExportFailed
 from app.playback.timeline import Timeline
 from app.project.opening.opened_project import OpenedProject, opened_project
 from app.project.opening.project_access import open_project

@@ -12,9 +12,9 @@ from pyglet.window import key
 from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_plan import ExportPlan
 from app.export.export_progress import ExportProgress, ExportResult
-from app.export.export_status import ExportStatus
 from app.export.jobs.answers import Answers
 from app.export.jobs.video import Turntable
+from app.export.queue.export_status import ExportStatus
 from app.session import commands
 from app.session.exporting import ExportPage
 from tests.ui.pilot import CTRL, Pilot

@@ -10,8 +10,8 @@ import time
 
 from app.background.kernels import use_threads
 from app.background.logs import start_logging
-from app.export.export_jobs import ExportTask, run_task
 from app.export.export_progress import ExportProgress, ExportResult, Report
+from app.export.queue.export_jobs import ExportTask, run_task
 from engine.backends.table import choose_backend
 from engine.children.child import Parent
 from engine.children.priority import IDLE_NICENESS, lower_process

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from app.export.export_progress import ExportProgress, Report
-from app.export.gaussian_files import GaussianFile, WrittenPart, base_name, moment_files, static_file
-from app.export.read_back import ReadBack
+from app.export.gaussians.gaussian_files import GaussianFile, WrittenPart, base_name, moment_files, static_file
+from app.export.gaussians.read_back import ReadBack
 from app.export.scene_frames import SceneFrames
 from engine.export.formats.table import Format
 from engine.export.splats import Splats

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from app.export.export_jobs import ExportTask
-from app.export.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn
 from app.export.export_plan import TAKEN, overlap
-from app.export.export_process import Exporter, ExportProcess
-from app.export.export_status import ExportStatus
+from app.export.queue.export_jobs import ExportTask
+from app.export.queue.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn
+from app.export.queue.export_process import Exporter, ExportProcess
+from app.export.queue.export_status import ExportStatus
 from app.training.rate import SmoothedRate
 from engine.errors import ProjectError
 

@@ -10,9 +10,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
-from app.export.export_jobs import ExportTask
-from app.export.export_messages import Ending, Event, ExportDone, ExportFailed, ExportGoesOn, ExportStopped
 from app.export.export_progress import ExportProgress, ExportResult
+from app.export.queue.export_jobs import ExportTask
+from app.export.queue.export_messages import Ending, Event, ExportDone, ExportFailed, ExportGoesOn, ExportStopped
 from engine.children.kind import ChildFailed, ChildKind
 from engine.children.process import ChildProcess
 from engine.errors import EngineError
@@ -20,8 +20,8 @@ from engine.storage.files import PARTIAL_PREFIX, discard
 
 HINT = "Nothing was left behind. Try again; the log may say more."
 EXPORTING: ChildKind[ExportTask, ExportProgress, ExportResult] = ChildKind(
-    place="app.export.export_process:EXPORTING",
-    work="app.export.export_worker:main",
+    place="app.export.queue.export_process:EXPORTING",
+    work="app.export.queue.export_worker:main",
     what="The process that exports",
     job=ExportTask,
     event=ExportProgress,

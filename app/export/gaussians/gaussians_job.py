@@ -12,8 +12,8 @@ from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
-from app.export.gaussian_files import SIDECAR
-from app.export.gaussian_sequence import GaussianSequence
+from app.export.gaussians.gaussian_files import SIDECAR
+from app.export.gaussians.gaussian_sequence import GaussianSequence
 from app.export.jobs.gaussians import GaussiansJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder

@@ -1,0 +1,1 @@
+"""Frames as files of Gaussians, read back and compared."""

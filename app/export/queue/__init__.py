@@ -1,0 +1,1 @@
+"""Exports that wait, run in a process and have ended."""
