@@ -159,18 +159,6 @@ while not (Path(sys.argv[1]).is_file() and sys.argv[2] in Path(sys.argv[1]).read
 """
 
 
-def test_the_worker_loads_nothing_that_draws():
-    code = "import json, sys, app.training.worker, app.training.build, engine.training.clip_training\n"
-    code += "print(json.dumps(sorted(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    loaded = {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
-    assert "torch" in loaded  # so that the list is of the right process
-    assert loaded.isdisjoint({"pyglet", "moderngl", "imgui_bundle", "ui", "glcontext"})
-
-
 @pytest.mark.parametrize(
     ("cores", "is_window_open", "expected"), [(1, True, 1), (2, True, 2), (3, True, 2), (16, True, 15), (16, False, 16)]
 )

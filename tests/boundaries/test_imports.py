@@ -101,12 +101,6 @@ def test_importing_ui_main_loads_no_torch_and_no_window_library() -> None:
     assert not loaded_modules("import ui.main") & (WINDOW_LIBRARIES | {"torch"})
 
 
-def test_importing_the_worker_loads_no_window_library() -> None:
-    loaded = loaded_modules("import app.training.worker")
-    assert not loaded & WINDOW_LIBRARIES
-    assert "engine" in loaded, "the worker is expected to load the engine; otherwise this test looks at nothing"
-
-
 def test_importing_the_command_line_loads_no_window_library() -> None:
     assert not loaded_modules("import app.cli.cli") & WINDOW_LIBRARIES
 

@@ -102,14 +102,6 @@ def test_a_cancelled_process_ends_and_leaves_nothing(start: Start, tmp_path: Pat
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_ending_it_leaves_nothing(start: Start, tmp_path: Path):
-    process = start()
-    process.end()
-    process.end()
-    assert isinstance(until(process, is_over)[-1], ExportStopped)
-    assert list((tmp_path / "out").iterdir()) == []
-
-
 def test_what_cannot_be_written_is_told_in_words(start: Start, tmp_path: Path):
     (tmp_path / "file").write_text("x")
     ending = until(start(out=tmp_path / "file" / "m.csv"), is_over)[-1]

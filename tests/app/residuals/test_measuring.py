@@ -392,17 +392,6 @@ def test_a_capture_that_disappears_is_told(open_residuals, project):
     assert status.n_done == 0
 
 
-def test_a_process_that_is_not_wanted_any_more_while_it_starts_is_ended(project):
-    process = MeasuringProcess(job_of(project, rows=np.zeros((6, 4), bool), pairs=np.zeros((6, 4), bool)))
-    process.end()
-    process.end()
-    until_s = time.monotonic() + DEADLINE_S
-    while not process.child.is_over:
-        assert time.monotonic() < until_s
-        time.sleep(0.01)
-    assert process.poll() == []
-
-
 def test_a_process_that_cannot_be_started_is_told(project, monkeypatch):
     def refuse(*_, **__) -> None:
         raise OSError(12, "Cannot allocate memory")
