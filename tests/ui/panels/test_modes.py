@@ -93,7 +93,7 @@ def test_words_of_the_toolbar_are_whole_or_in_the_menu(
         cut.extend([words] if shown != words else [])
         return shown
 
-    for module in ("toolbar", "mode_box", "compare_box", "heat_box"):
+    for module in ("toolbar", "compare_box"):
         monkeypatch.setattr(f"ui.panels.picture.toolbar.{module}.box_words", watched)
     pilot = open_pilot(FakeSession(), size=size)
     pilot.studio.frame.ui.scale.chosen = scale
