@@ -1,4 +1,4 @@
-"""ClipTraining from pixels: learning, freezing, resuming, stopping on bad numbers. The sample at half size."""
+"""ClipTraining from pixels: learning, freezing, resuming, stopping on bad numbers. The sample at a quarter of its size."""
 
 import json
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from msgspec import structs, to_builtins
+from msgspec import to_builtins
 
 from engine.assets import asset_path
 from engine.backends.table import backend_called
@@ -25,9 +25,9 @@ from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.preparation.method import Method
-from engine.training.variants.variant_method import method_of
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
+from tests.engine.training.tiny_training import finish, take_steps
 
 pytestmark = pytest.mark.slow
 
@@ -63,15 +63,9 @@ def start(capture: Capture, clip_index: int, prep_dir: Path, **changes) -> ClipT
     return ClipTraining(capture, clip, **(arguments | changes), backend=backend_called("cpu"))
 
 
-def finish(training: ClipTraining) -> ClipState:
-    while not training.is_finished:
-        training.step()
-    return training.state()
-
-
 @pytest.fixture(scope="module")
 def setting(tmp_path_factory, built_once) -> Setting:
-    capture = open_capture(asset_path("sample"), scale=0.5)
+    capture = open_capture(asset_path("sample"), scale=0.25)
 
     def train(folder: Path) -> None:
         training = start(capture, 0, folder / "prep")
@@ -116,20 +110,17 @@ def test_cameras_that_do_not_differ_get_no_gains(setting):
     assert (gains == 1.0).all()
 
 
-def test_gains_learn_in_the_reference_clip_and_are_kept_in_the_next(setting, tmp_path):
+def test_gains_learn_in_the_reference_clip_and_are_kept_in_the_next(tiny, tmp_path):
     said: list[str] = []
-    config = structs.replace(CONFIG, color="gain", static_steps=4, joint_steps=2, max_static_points=1000)
-    training = start(setting.capture, 0, tmp_path, config=config, report=lambda progress: said.append(progress.message))
-    training.prepare()
+    settings = {"color": "gain", "static_steps": 4, "joint_steps": 2, "prep_dir": tmp_path}
+    training = tiny.prepared(0, is_source=False, report=lambda progress: said.append(progress.message), **settings)
     assert any("White balance: color=gain, gains of the cameras spread by" in line for line in said)
     estimated = training.gains.detach().clone()
     reference = finish(training)
     learned = reference.arrays["gains"]
     assert (learned != estimated.numpy()).any()
     assert np.median(np.log(learned), axis=0) == pytest.approx(0.0, abs=1e-7)  # the gauge; float32 rounds at 6e-8
-    source = start(setting.capture, 1, tmp_path, config=config, reference=reference)
-    source.prepare()
-    source.step()
+    source = take_steps(tiny.prepared(1, reference=reference, **settings), 1)
     assert np.array_equal(source.gains.detach().numpy(), learned)
 
 
@@ -227,14 +218,11 @@ def test_a_fault_among_many_steps_leaves_what_was_before_it(source, tmp_path):
     assert kept[0] == kept[1]
 
 
-def test_resuming_in_the_static_phase_goes_through_the_change_of_phase(setting, tmp_path):
-    config = TrainConfig(static_steps=4, joint_steps=4, max_static_points=800, max_moving_points=300)
-    stopped = start(setting.capture, 0, tmp_path, config=config)
-    stopped.prepare()
-    stopped.step()
-    stopped.step()
+def test_resuming_in_the_static_phase_goes_through_the_change_of_phase(tiny, tmp_path):
+    settings = {"is_source": False, "static_steps": 4, "joint_steps": 4, "prep_dir": tmp_path}
+    stopped = take_steps(tiny.prepared(0, **settings), 2)
     stopped.write_checkpoint(tmp_path / "kept.safetensors")
-    resumed = start(setting.capture, 0, tmp_path, config=config)
+    resumed = tiny.training(0, **settings)
     resumed.restore_checkpoint(tmp_path / "kept.safetensors")
     assert finish(stopped).fingerprint == finish(resumed).fingerprint
     assert "moving" in resumed.model.roles()
@@ -336,14 +324,12 @@ def test_holding_out_almost_everything_is_refused(setting, tmp_path):
         start(setting.capture, 0, tmp_path, holdout=everything_but_one)
 
 
-def test_gate_off_gives_every_anchor_a_dynamic_feature_at_every_time(setting, tmp_path):
-    config = TrainConfig(static_steps=2, joint_steps=2, max_static_points=500, max_moving_points=200, gate="off")
-    training = start(setting.capture, 0, tmp_path, config=config, method=method_of(config, previous=None))
-    training.prepare()
+def test_gate_off_gives_every_anchor_a_dynamic_feature_at_every_time(tiny, tmp_path):
+    training = tiny.prepared(0, is_source=False, static_steps=2, joint_steps=2, gate="off", prep_dir=tmp_path)
     state = finish(training)
     model = load_clip_model(state, None, backend=backend_called("cpu"))
     n_anchors = sum(len(model.anchor_set(role)) for role in model.roles())
-    assert len(model.decode(0.0)) == n_anchors * config.gaussians_per_anchor
+    assert len(model.decode(0.0)) == n_anchors * training.config.gaussians_per_anchor
     assert torch.isfinite(model.decode(0.0).means).all()
 
 
