@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import count
 from pathlib import Path
 
 from app.session.projects.settings import Settings
@@ -14,6 +15,7 @@ from tests.app.inline_worker import InlineWorker
 from tests.ui.pilot import Pilot
 from ui.viewport.hud_text import HudText
 
+REDRAWN_EVERY, PAUSE_S = 8, 0.005
 WAIT_S = 300.0
 """Only a hang takes longer, or the first start, which compiles the kernels."""
 
@@ -44,8 +46,13 @@ def hud(pilot: Pilot) -> HudText:
 
 
 def draw_until(pilot: Pilot, is_done: Callable[[], bool], what: str) -> None:
-    """Draw until something is so."""
+    """Turn the window's loop until something is so; what has not changed is drawn now and then only."""
     until_s = time.monotonic() + WAIT_S
-    while not is_done():
+    for turn in count():
+        if is_done():
+            return
         assert time.monotonic() < until_s, f"{what} did not come: {list(pilot.session.notices)}"
-        pilot.draw()
+        if pilot.studio.frame.update(1 / 60) or turn % REDRAWN_EVERY == 0:
+            pilot.studio.draw()
+        else:
+            time.sleep(PAUSE_S)

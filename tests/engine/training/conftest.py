@@ -1,7 +1,8 @@
-"""Fixtures of the training tests: a tiny capture with a trained reference clip, made once."""
+"""Fixtures of the training tests: a tiny capture with a trained reference clip, made once; depth maps, found once."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -9,6 +10,19 @@ import pytest
 if TYPE_CHECKING:
     from tests.built_once import BuiltOnce
     from tests.engine.training.tiny_training import Tiny
+
+DEPTH_MAPS: dict[bytes, object] = {}
+"""See tests.engine.depth_maps_once."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def depth_maps_once() -> Iterator[None]:
+    """Depth maps of the same pictures are found once: most of what preparing a reference clip takes."""
+    from tests.engine.depth_maps_once import remember_depth_maps
+
+    with pytest.MonkeyPatch.context() as patch:
+        remember_depth_maps(patch, DEPTH_MAPS)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -54,10 +56,17 @@ def arguments_of(tiny: Tiny, name: str) -> dict:
 
 
 @pytest.fixture(scope="module")
-def source_trainings(tiny) -> dict[str, ClipTraining]:
+def checkpoints(tmp_path_factory) -> Path:
+    """Folder of a checkpoint of clip 1 with each switch, from halfway; see source_trainings."""
+    return tmp_path_factory.mktemp("checkpoints")
+
+
+@pytest.fixture(scope="module")
+def source_trainings(tiny, checkpoints) -> dict[str, ClipTraining]:
     """Clip 1 with each switch, at its end."""
-    trainings = {name: tiny.prepared(1, **arguments_of(tiny, name)) for name in SWITCHES}
-    for training in trainings.values():
+    trainings = {name: take_steps(tiny.prepared(1, **arguments_of(tiny, name)), 3) for name in SWITCHES}
+    for name, training in trainings.items():
+        training.write_checkpoint(checkpoints / f"{name}.safetensors")
         finish(training)
     return trainings
 
@@ -112,11 +121,10 @@ def test_every_switch_gives_a_clip_of_its_own(source_clips):
 
 
 @pytest.mark.parametrize("name", SWITCHES)
-def test_a_checkpoint_goes_on_exactly(tiny, source_clips, tmp_path, name):
-    stopped = take_steps(tiny.prepared(1, **arguments_of(tiny, name)), 3)
-    stopped.write_checkpoint(tmp_path / "kept.safetensors")
+def test_a_checkpoint_goes_on_exactly(tiny, source_clips, checkpoints, name):
     resumed = tiny.training(1, **arguments_of(tiny, name))
-    resumed.restore_checkpoint(tmp_path / "kept.safetensors")
+    resumed.restore_checkpoint(checkpoints / f"{name}.safetensors")
+    assert resumed.steps_done == 3
     chosen = named_parameters(resumed.model, resumed.gains, resumed.config)
     assert learned_parts(chosen) == LEARNS[name]
     assert finish(resumed).fingerprint == source_clips[name].fingerprint
@@ -328,8 +336,8 @@ def test_merging_makes_residual_anchors_moving_ones(streamed):
     ("settings", "expected"),
     [
         ({"independent": True, "field": "continue"}, "cannot continue"),
-        ({"independent": True, "decoder": "new", "inherit": "off"}, "decoder=new, inherit=off would change nothing"),
-        ({"independent": True, "residual": "full"}, "residual=full would change nothing"),
+        ({"independent": True, "decoder": "new", "inherit": "off"}, "decoder=new, inherit=off would have no effect"),
+        ({"independent": True, "residual": "full"}, "residual=full would have no effect"),
         ({"inherit": "off", "residual": "none"}, "with nothing that moves"),
         ({"start": "previous"}, "needs independent=true"),
         ({"decoder": "fresh"}, "'frozen', 'finetune' or 'new'"),

@@ -19,9 +19,9 @@ from tests.engine.training.tiny_training import Tiny, make_training, take_steps
 pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole
 
 SIZES: dict[str, Any] = {
-    "static_steps": 5,
-    "joint_steps": 4,
-    "source_steps": 5,
+    "static_steps": 2,
+    "joint_steps": 2,
+    "source_steps": 3,
     "max_static_points": 60,
     "max_moving_points": 40,
     "gaussians_per_anchor": 2,
@@ -102,7 +102,7 @@ def test_a_training_in_plain_torch_goes_on_from_a_checkpoint(tiny, by_kernels, t
     backend = ReferenceBackend(dtype=dtype)
     straight = make_training(tiny.capture, tiny.holdout, backend=backend, **given)
     straight.prepare()
-    take_steps(straight, 3)
+    take_steps(straight, 1)
     straight.write_checkpoint(tmp_path / "kept.safetensors")
     resumed = make_training(tiny.capture, tiny.holdout, backend=backend, **given)
     resumed.restore_checkpoint(tmp_path / "kept.safetensors")

@@ -1,4 +1,4 @@
-"""ClipTraining from pixels: learning, freezing, resuming, stopping on bad numbers. The sample at a quarter of its size."""
+"""ClipTraining from pixels: learning, freezing, resuming, stopping on bad numbers. The sample at quarter size."""
 
 import json
 from collections.abc import Callable

@@ -17,6 +17,11 @@ from tests.engine.training.tiny_training import finish, same_arrays
 pytestmark = pytest.mark.slow
 
 
+@pytest.fixture(scope="module")
+def depth_maps_once() -> None:
+    """Here they are found each time: they are among what is kept."""
+
+
 class Killed(BaseException):
     """In place of a kill: nothing handles it."""
 
