@@ -168,7 +168,7 @@ def test_other_settings_in_the_same_folder_are_refused(runner):
     ("overrides", "names", "expected"),
     [
         ({"field": "continue"}, ["independent"], "cannot continue each other's field"),
-        ({"decoder": "new"}, ["independent"], "decoder=new would change nothing"),
+        ({"decoder": "new"}, ["independent"], "decoder=new would have no effect"),
         ({"residual": "none"}, ["inherit-off"], "with nothing that moves"),
         ({"field": "joint"}, None, "field=joint leaves no clips"),
     ],
