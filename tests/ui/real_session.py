@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -24,7 +23,7 @@ def make_session(folder: Path) -> Session:
     """With a project of its own in a folder; trains in this process."""
     return Session(
         project_dir=folder / "project",
-        launch=partial(lambda job, project: InlineWorker(job, make_fake)),
+        launch=lambda job, project: InlineWorker(job, project.folder, make_fake),
         settings=Settings(folder / "settings.json"),
         is_preloading=False,
     )
