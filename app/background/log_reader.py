@@ -29,7 +29,7 @@ class LogLine:
         time: As logged; of the line before where a line has none of its own, as those of a traceback.
         level: One of LEVELS; that of the line before likewise.
         source: "program", or "clip 3" for the training of a clip.
-        text: What was said, with where in the program.
+        text: The message, with its place in the program.
     """
 
     time: str

@@ -36,7 +36,7 @@ MIN_SHARE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class CalibrationRequest:
-    """What is asked for.
+    """The request.
 
     Attributes:
         videos: Folder with one video, or one folder of images, per camera.
@@ -57,7 +57,7 @@ class CalibrationRequest:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOutcome:
-    """What came of it.
+    """The result.
 
     Attributes:
         capture: The folder to open.
@@ -80,7 +80,7 @@ def run_calibration(
     """Calibrate and write capture.json, unless the calibration has failed; on this thread.
 
     Args:
-        request: What is asked for.
+        request: The request.
         report: Told stage, share of the whole and detail.
         alive: Called several times a second; what it raises ends the work.
     Raises:

@@ -81,7 +81,7 @@ def _help(setting: Setting, flag: Flag) -> str:
 def given_entries(
     options: argparse.Namespace, job: type[ExportJob], opened: TrainedProject | None = None
 ) -> dict[str, Any]:
-    """What was given of a job's options, by name.
+    """Options given to a job, by name.
 
     Args:
         opened: Has the cameras that options name.

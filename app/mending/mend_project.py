@@ -37,7 +37,7 @@ MENDING: ChildKind[MendJob, Progress, MendResult] = ChildKind(
 
 @dataclass(frozen=True, slots=True)
 class MendOutcome:
-    """What came of it.
+    """The result.
 
     Attributes:
         record: With figures before and after.

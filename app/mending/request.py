@@ -66,7 +66,7 @@ class MendResult(msgspec.Struct, frozen=True):
     """What the process leaves.
 
     Attributes:
-        record: What came of it.
+        record: The result.
         drafts: Files of the clips that changed, by index.
     """
 

@@ -387,7 +387,7 @@ class CorrectCapture:
 
 
 DoctorCommand = ExamineCapture | StopExamining | CorrectCapture
-"""What the capture doctor does."""
+"""Commands of the capture doctor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -415,10 +415,10 @@ class StopCalibration:
 
 
 MarkCommand = MarkRegion | MarkBox | RemoveRegion
-"""What changes the marked regions, and can be taken back."""
+"""Commands that change the marked regions and can be undone."""
 
 SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset
-"""What changes settings that all clips share."""
+"""Commands that change settings shared by all clips."""
 
 QueueCommand = (
     TrainClip
@@ -432,7 +432,7 @@ QueueCommand = (
     | RestoreVersion
     | RemoveVersion
 )
-"""What is trained when, how it is shown meanwhile, and which version of it counts."""
+"""Commands on training: order, live view and versions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -511,7 +511,7 @@ class ShowExport:
 ExportCommand = (
     AskExport | StartExport | CancelExport | RetryExport | MoveExport | RemoveExport | ClearExports | ShowExport
 )
-"""What leaves the project for other programs."""
+"""Commands that export from the project."""
 
 ProjectCommand = NewProject | LeaveTraining | AskStartOver | StartOver | SetProjectsFolder
 """Which project is trained, and where projects lie."""

@@ -14,7 +14,7 @@ from engine.editing.reach import UNKNOWN, ClipAnchors, Reach
 
 @dataclass(frozen=True, slots=True)
 class HistoryStatus:
-    """What can be taken back and done again.
+    """Steps that can be undone and redone.
 
     Attributes:
         undo, redo: What that would be, as a word or two; empty where there is nothing.

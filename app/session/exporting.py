@@ -165,7 +165,7 @@ class Exporting:
         return None
 
     def plan(self, choices: ExportChoices) -> ExportPlan | None:
-        """What would be written; None until that was looked at."""
+        """The estimated export; None until it was estimated."""
         wish = self._wish(choices)
         if wish is None:
             return None

@@ -120,7 +120,7 @@ class SessionFace:
 
     @property
     def residual_status(self) -> ResidualStatus:
-        """What is measured of every picture."""
+        """Measurements of every picture."""
         return self.residuals.status
 
     @property

@@ -68,7 +68,7 @@ Points = Sequence[tuple[int, float]]
 
 
 class CaptureFacts(Protocol):
-    """What is shown of a capture."""
+    """A capture as the window shows it."""
 
     @property
     def path(self) -> Path: ...

@@ -36,7 +36,7 @@ class KnownDistance:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOptions:
-    """What is asked for.
+    """The request.
 
     Attributes:
         lens: Name of the lens model, see LENSES.

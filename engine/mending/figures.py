@@ -68,7 +68,7 @@ class Attempt(msgspec.Struct, frozen=True):
     Attributes:
         method: One of METHODS.
         words: What was done, as a sentence without its full stop.
-        figures: What came of it.
+        figures: The result.
         is_kept: Whether it is part of the result.
         seconds: What it took.
     """

@@ -55,7 +55,7 @@ class Target:
 
     @property
     def framebuffer(self) -> moderngl.Framebuffer:
-        """What is drawn into: premultiplied colour and depth. Replaced by resize()."""
+        """The texture drawn into: premultiplied colour and depth. Replaced by resize()."""
         assert self._framebuffer is not None, "the target was released"
         return self._framebuffer
 

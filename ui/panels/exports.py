@@ -68,7 +68,7 @@ def progress_text(status: ExportStatus) -> str:
 
 
 def ending_text(status: ExportStatus) -> str:
-    """What came of an export that has ended."""
+    """Result of an export that has ended."""
     if status.state == "cancelled":
         return "Cancelled; no files were left."
     if status.state == "failed" or status.result is None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 @dataclass
 class UiRequests:
-    """What is asked for.
+    """The request.
 
     Attributes:
         is_palette: Open the palette.

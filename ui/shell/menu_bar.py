@@ -186,11 +186,11 @@ _AFTER: dict[str, Callable[[SessionView, Dispatch, UiState], None]] = {
     "window.open": _draw_recent_menu,
     "window.save_layout": _draw_layouts,
 }
-"""What is added behind an action, by its id."""
+"""Text added behind an action, by its id."""
 
 
 def _draw_name(session: SessionView, ui: UiState) -> None:
-    """What is open: name, how far it is trained and where it lies, as much of it as there is room for."""
+    """The open project: name, progress and folder, as far as there is room."""
     opened = session.project_status
     name = "no project open" if opened is None else f"{one_line(opened.name)} - {opened.trained_text}"
     room = imgui.get_window_width() - imgui.get_cursor_pos_x() - 40

@@ -13,7 +13,7 @@ import zlib
 from imgui_bundle import imgui
 
 FRAMES_AFTER_INPUT = 3
-"""What was just opened is first measured and not drawn: two frames that are the same do not mean that it is done."""
+"""A new capture is first measured and not drawn: two frames that are the same do not mean that it is done."""
 FRAMES_AFTER_CHANGE = 2
 """Each frame that differs from the one before asks for this many more."""
 MAX_SETTLING = 24

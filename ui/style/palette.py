@@ -167,7 +167,7 @@ THEMES: dict[Literal["dark", "light", "system"], str] = {
     "light": "light",
     "system": "as the desktop",
 }
-"""What can be chosen, and its words."""
+"""Choices and their words."""
 PALETTES = {palette.name: palette for palette in (DARK, LIGHT)}
 
 

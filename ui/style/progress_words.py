@@ -28,7 +28,7 @@ def job_words(job: JobStatus | None, now_s: float) -> str:
 
 
 def stage_words(training: TrainingStatus) -> str:
-    """What is done at the moment: "stage 2 of 3, Looking for what stands still"."""
+    """The present stage: "stage 2 of 3, Looking for what stands still"."""
     if not training.n_stages:
         return training.stage
     return f"stage {training.stage_number} of {training.n_stages}, {training.stage}"

@@ -29,7 +29,7 @@ _STANDS_IN = {
     CAPTURED: "captured picture",
     MARKS: "cameras only",
 }
-"""What is seen where there is no rendered picture."""
+"""Stand-in pictures where there is no rendered picture."""
 PARTS = "   "
 """Between parts of a label; each stays whole where lines break."""
 
@@ -214,7 +214,7 @@ def _pending_text(
 
 
 def _pending_beside(shown: ShownPicture, wanted: WantedFrame) -> str:
-    """What is on its way while no rendered picture is there."""
+    """Pending work while no rendered picture is there."""
     if wanted.revision and not wanted.is_loaded:
         return f"loading clip {wanted.clip_index}"
     if wanted.revision:

@@ -15,7 +15,7 @@ LEAST_S = 0.5
 
 @dataclass(frozen=True)
 class ShownRate:
-    """What was seen of the last seconds.
+    """Pictures of the last seconds.
 
     Attributes:
         per_s: Pictures per second; None before there was time to count.
@@ -65,7 +65,7 @@ class PictureRate:
             self._frame = frame_index
 
     def rate(self, now_s: float, *, is_every_frame: bool = False) -> ShownRate:
-        """What was counted up to now."""
+        """The counts so far."""
         recent = self._changes
         while recent and recent[0][0] <= now_s - WINDOW_S:
             self._before_s = recent.popleft()[0]

@@ -104,7 +104,7 @@ class RegionTool:
 
     @property
     def sphere(self) -> GateRegion | None:
-        """What would be marked; None before there is anything."""
+        """The region to mark; None before there is any."""
         if not self.is_active or self.center is None:
             return None
         return sphere_region(self.treat, self.center.tolist(), self.radius)

@@ -79,7 +79,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def synchronisation_lines(found: Synchronisation) -> list[str]:
-    """What was found, as a table and sentences."""
+    """The findings, as a table and sentences."""
     width = max([len(printable(camera.name)) for camera in found.cameras] + [6])
     lines = [f"{'camera':>{width}}   offset, frames        ms  certain  by"]
     for camera in found.cameras:

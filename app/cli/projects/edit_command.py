@@ -83,7 +83,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def _check_options(options: argparse.Namespace, chosen: str) -> None:
-    """What was asked for and would be passed over is an error."""
+    """A given option that would be ignored is an error."""
     takes_edit = chosen in ("", "replace")
     given = {
         "what an edit does": has_action(options),

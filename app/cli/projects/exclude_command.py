@@ -77,7 +77,7 @@ def _changed(document: ProjectDocument, options: argparse.Namespace, capture: Ca
 
 
 def describe_exclusions(document: ProjectDocument) -> dict[str, Any]:
-    """What is excluded as plain data.
+    """Exclusions as plain data.
 
     Returns:
         schema; cameras (names); frames, each with camera (null for all), first and stop; masks, each with camera,

@@ -106,7 +106,7 @@ def _document(project: Project, outcome: MendOutcome) -> dict[str, Any]:
 
 
 def lines_of(project: Project, outcome: MendOutcome) -> list[str]:
-    """What came of it, as lines of text."""
+    """The result, as lines of text."""
     record = outcome.record
     lines = [f"{record.words[0].upper()}{record.words[1:]}: {record.diagnosis}"]
     for attempt in record.attempts:

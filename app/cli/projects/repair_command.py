@@ -39,7 +39,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def described(found: Recovery | None, missing: Sequence[str]) -> dict[str, Any]:
-    """What is left, as plain data.
+    """Remaining steps, as plain data.
 
     Args:
         found: None where nothing is damaged.

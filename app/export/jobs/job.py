@@ -64,7 +64,7 @@ class JobModule(Protocol):
 
 
 class ExportJob(Declared, frozen=True, tag=True):
-    """What is asked for. Raises ProjectError for a value that an option may not have.
+    """The request. Raises ProjectError for a value that an option may not have.
 
     Attributes:
         out: The file or folder to write.

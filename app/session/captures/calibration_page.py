@@ -23,7 +23,7 @@ class VideoFacts:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationResult:
-    """What came of a calibration.
+    """Result of a calibration.
 
     Attributes:
         capture: The folder to open.

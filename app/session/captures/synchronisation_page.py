@@ -9,7 +9,7 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True)
 class OffsetRow:
-    """What was found of one camera.
+    """Result of one camera.
 
     Attributes:
         name: Of the camera.

@@ -74,6 +74,6 @@ class ApplyDeletions:
 
 
 CutCommand = SplitClip | MergeClips | SetReferenceClip
-"""What changes the document, and can be taken back."""
+"""Commands that change the document and can be undone."""
 ClipCommand = TrainStale | CompareVersion | CutCommand | AskFreeSpace | FreeSpace | AskAboutDamage | ApplyDeletions
-"""What is done about clips beside training them."""
+"""Commands on clips other than training them."""

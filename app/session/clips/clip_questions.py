@@ -1,4 +1,4 @@
-"""What is asked before clips or their files change: plain values with all that the answer depends on."""
+"""Questions before clips or their files change: plain values with all that the answer depends on."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class RoomQuestion:
 
 @dataclass(frozen=True, slots=True)
 class DamagedQuestion:
-    """What is to become of a clip whose file is damaged?
+    """How to continue with a clip whose file is damaged?
 
     Attributes:
         reason: What is wrong with it.

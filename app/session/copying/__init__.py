@@ -1,1 +1,1 @@
-"""What was done, or could be done, as commands to copy."""
+"""Steps, done or possible, as commands to copy."""

@@ -77,7 +77,7 @@ class KeptDocument:
         return None if self._project is None else self._project.document
 
     def status(self) -> HistoryStatus:
-        """What can be taken back and done again."""
+        """Steps that can be undone and redone."""
         if self._project is None:
             return HistoryStatus()
         history = self._project.history

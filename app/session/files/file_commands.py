@@ -31,4 +31,4 @@ class ShowProjectFolder:
 
 
 FileCommand = AskSaveAs | SaveProjectAs | CancelSaveAs | ShowProjectFolder
-"""What is done with the files of a project, beside opening it."""
+"""Commands on the files of a project, other than opening it."""

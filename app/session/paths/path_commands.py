@@ -136,7 +136,7 @@ PathEdit = (
     | MakeTurntable
     | MakeFlyThrough
 )
-"""What changes camera paths."""
+"""Commands that change camera paths."""
 
 PathCommand = PathEdit | ChooseCameraPath | ChooseCameraKey | LookAlongPath
-"""What is done with camera paths."""
+"""Commands on camera paths."""

@@ -1,4 +1,4 @@
-"""What is being worked on in the picture: the chosen edit, or the box or sphere that the user has drawn."""
+"""The subject of editing in the picture: the chosen edit, or the box or sphere that the user has drawn."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def with_label(session: SessionView, kind: Literal["clip", "camera"], name: str,
 def draw_label_field(
     session: SessionView, dispatch: Dispatch, ui: UiState, kind: Literal["clip", "camera"], name: str
 ) -> None:
-    """What is typed counts at once, as one step of the history."""
+    """Typed text counts at once, as one step of the history."""
     imgui.set_next_item_width(WIDTH)
     imgui.begin_disabled(not session.edits.can_edit)
     hint = f"your own name for this {kind}"

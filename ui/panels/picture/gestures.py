@@ -128,7 +128,7 @@ def modifier_words(*, is_ctrl: bool, is_shift: bool, is_alt: bool) -> str:
 
 
 def gesture_rows(preset: Preset) -> tuple[tuple[str, str], ...]:
-    """What is done and what it does, a row each; alike next to each other."""
+    """Gestures and their effects, a row each; similar ones next to each other."""
     wheel = "Two fingers" if preset.name == "touchpad" else "Wheel"
     done = [(f"{button} drag", modifiers, gesture) for (button, modifiers), gesture in preset.drags.items()]
     done += [(wheel, modifiers, gesture) for modifiers, gesture in preset.wheel.items()]

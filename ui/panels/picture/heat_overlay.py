@@ -131,7 +131,7 @@ class HeatOverlay:
 
 
 def heat_words(kind: HeatKind, heat: HeatMap | None) -> str:
-    """What is shown, of which frame, and its mean; or why it is not."""
+    """Kind, frame and mean of the map, or why there is none."""
     if heat is None:
         return f"{kind.label}: being measured"
     if heat.note and heat.values is None:

@@ -1,4 +1,4 @@
-"""What is drawn over the viewport's picture: what it is of, what is on its way, and a legend of the marks."""
+"""Text over the viewport's picture: its content, pending work, and a legend of the marks."""
 
 from __future__ import annotations
 

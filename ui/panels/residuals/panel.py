@@ -67,7 +67,7 @@ def _draw_seam_menu(seam: SeamStatus, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def seam_words(seam: SeamStatus, rig: CameraRig) -> str:
-    """What is known of a seam, and what a click does."""
+    """Figures of a seam, and the effect of a click."""
     lines = []
     if seam.ratio is not None:
         lines.append(f"Change of static parts at the seam, relative to inside the clips: {seam.ratio:.2f}")

@@ -64,7 +64,7 @@ def draw_transport(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
 
 
 def played_words(timeline: Timeline) -> str:
-    """What is played where that is not the whole capture."""
+    """The played range, unless it is the whole capture."""
     if timeline.around is not None:
         return f"around frames {timeline.around[0]} to {timeline.around[1]}"
     ends = (("in", timeline.in_frame), ("out", timeline.out_frame))

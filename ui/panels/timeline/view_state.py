@@ -80,7 +80,7 @@ class TimelineView:
         return self.gesture
 
     def range_of(self, n_frames: int) -> TimeRange:
-        """What is shown of so many frames."""
+        """The shown range of so many frames."""
         return whole_range(n_frames) if self.shown is None else self.shown
 
     @property

@@ -27,7 +27,7 @@ LEAST_CHANGE_PERCENT = 0.1
 
 @dataclass(frozen=True)
 class ClipQuality:
-    """What is known of the measured clips. All [n], rising clips.
+    """Figures of the measured clips. All [n], rising clips.
 
     Attributes:
         clips: Clip indices. float64

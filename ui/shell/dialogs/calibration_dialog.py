@@ -117,7 +117,7 @@ class CalibrationDialog:
         return CalibrateVideos(self.request(page)) if is_possible and (is_clicked or is_agreed) else None
 
     def request(self, page: CalibrationPage) -> CalibrationRequest:
-        """What was chosen."""
+        """The chosen options."""
         distance = None
         if self._has_distance:
             first, second = (page.cameras[row].name for row in self._pair)

@@ -12,7 +12,7 @@ MAX_TRIES = 8
 
 @dataclass(frozen=True, slots=True)
 class ModalKeys:
-    """What was pressed in this frame.
+    """Keys pressed in this frame.
 
     Attributes:
         is_agreed: Enter.

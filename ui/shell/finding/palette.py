@@ -39,7 +39,7 @@ class ActionPalette:
 
     @property
     def shown(self) -> list[PaletteEntry]:
-        """What is listed, best first."""
+        """The listed entries, best first."""
         return [hit.entry for hit in self._shown]
 
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:

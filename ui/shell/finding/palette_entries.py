@@ -72,7 +72,7 @@ def entries(session: SessionView, ui: UiState) -> list[PaletteEntry]:
 
 
 def found(typed: str, offered: Sequence[PaletteEntry], used: Sequence[str]) -> list[Found]:
-    """What was typed as entries, best first; without anything typed, those used lately come first.
+    """Entries that match the typed text, best first; without anything typed, those used lately come first.
 
     Args:
         used: Ids of entries used lately, newest first.

@@ -54,7 +54,7 @@ class Remembering:
             take_layout(self._memory.layout)
 
     def restore_marks(self, session: WindowSession) -> None:
-        """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline, and what
+        """Settings shared by all projects: size and opacity of anchor marks, unit and lanes of the timeline, and what
         mouse and keys do."""
         if self._memory is None:
             return

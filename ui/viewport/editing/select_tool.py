@@ -164,7 +164,7 @@ class SelectTool:
             self.points.append((x, y))
 
     def shape(self, low: tuple[float, float], density: float) -> Shape | None:
-        """What was drawn over the picture, in its pixels; None for other tools.
+        """The shape drawn over the picture, in its pixels; None for other tools.
 
         Args:
             low: Upper left corner of the picture, logical pixels.

@@ -1,1 +1,1 @@
-"""What is drawn over the picture, one layer per thing."""
+"""Layers drawn over the picture, one per thing."""

@@ -28,7 +28,7 @@ DARK = np.array([0.03, 0.04, 0.05, 1.0], np.float32)
 
 @dataclass(frozen=True)
 class ShownRegions:
-    """What is to be drawn.
+    """Content to draw.
 
     Attributes:
         marked: Regions of the project.

@@ -1,1 +1,1 @@
-"""What clips are made of: training, versions and cuts, mending."""
+"""Actions on clips: training, versions and cuts, mending."""

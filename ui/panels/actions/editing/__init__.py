@@ -1,1 +1,1 @@
-"""What the user draws, selects and edits."""
+"""Actions that draw, select and edit."""

@@ -1,1 +1,1 @@
-"""What is shown, and from where."""
+"""Actions on content and viewpoint of the picture."""

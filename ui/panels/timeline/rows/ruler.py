@@ -35,7 +35,7 @@ def draw_ruler(stage: TimelineStage, timeline: Timeline) -> None:
 
 
 def draw_played(stage: TimelineStage, timeline: Timeline) -> None:
-    """What is played, where that is not everything: a bar with an end on either side, and the rest dimmed."""
+    """The played range, unless it is everything: a bar with an end on either side, and the rest dimmed."""
     if timeline.around is None and timeline.in_frame is None and timeline.out_frame is None:
         return
     row, scale, draw, track = stage.rows[RULER], stage.scale, stage.draw, stage.track

@@ -1,1 +1,1 @@
-"""What is asked and said when a folder is opened."""
+"""Questions and messages when a folder is opened."""

@@ -1,4 +1,4 @@
-"""What is asked about a capture that is opened: frames, size, clip length, held-out cameras; and a forecast."""
+"""Questions about a capture that is opened: frames, size, clip length, held-out cameras; and a forecast."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class AnswersForm:
 
     @property
     def answers(self) -> OpeningAnswers:
-        """What is answered now."""
+        """The present answers."""
         assert self._page is not None
         report, offered = self._page.report, self._page.answers
         frames = self._first, self._last + 1

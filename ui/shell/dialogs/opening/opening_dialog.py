@@ -201,7 +201,7 @@ class OpeningDialog:
 
 
 def _draw_findings(findings: Sequence[Finding] | None, ui: UiState) -> None:
-    """What is wrong as far as numbers tell, and what to do; nothing before that is known."""
+    """Problems found in the numbers, with advice; nothing before they are known."""
     if findings is None:
         return
     for index, finding in enumerate(findings):
