@@ -129,9 +129,9 @@ def test_steps_are_taken_back_by_another_program_run(run, folder):
     assert run("edit", folder, "--redo")[0] == 0
     assert [edit.name for edit in edits(folder)] == ["a", "b"]
     out = run("edit", folder, "--history")[1]
-    assert out.splitlines()[-4:] == ["Steps: 2", "  a", "  b", "  c (taken back)"]
+    assert out.splitlines()[-4:] == ["Steps: 2", "  a", "  b", "  c (undone)"]
     code, _, err = run("edit", folder, "--redo", 2)
-    assert (code, "2 steps cannot be done again: there are 1" in err) == (2, True)
+    assert (code, "2 steps cannot be redone: there are 1" in err) == (2, True)
 
 
 def test_the_stack_is_changed_and_steps_are_taken_back(run, folder):
@@ -223,11 +223,11 @@ def test_a_name_is_shown_in_one_line(run, folder):
         (("--off", 4, "--hide"), "--off is given with what an edit does"),
         (("--move-to", 4, 0), "no edit 4"),
         (("--rename", "x", "y"), "not the number of an edit"),
-        (("--undo",), "1 steps cannot be taken back: there are 0."),
-        (("--redo", 0), "0 steps cannot be done again"),
+        (("--undo",), "1 steps cannot be undone: there are 0."),
+        (("--redo", 0), "0 steps cannot be redone"),
         (("--put", "{"), "--put is not JSON"),
         (("--put", "[]"), "not an object"),
-        (("--put", '{"edit": []}'), "makes no sense (it has an entry 'edit', which is not known)"),
+        (("--put", '{"edit": []}'), "is not valid (it has an entry 'edit', which is not known)"),
         (("--hide", "--target", '{"type": "cone"}'), "--target is not valid"),
         (("--hide", "--target", "{"), "--target is not valid"),
     ],

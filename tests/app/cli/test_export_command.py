@@ -75,7 +75,7 @@ def test_it_names_what_is_wrong_with_its_arguments(run, project: Path, tmp_path:
         (("--scale", 0), "Scale is 0.0; it has to be a number between 0.000001 and 1000000"),
         (("--out", tmp_path / "file"), "already taken"),
         (("--out", tmp_path / "file" / "x"), "is a file"),
-        (("--out", project), "inside of the project"),
+        (("--out", project), "inside the project"),
     ):
         code, out, err = run(*export, *extra)
         assert (code, out, expected in err) == (2, "", True), err
@@ -134,7 +134,7 @@ def test_the_project_itself_is_no_place_for_an_export(run, project: Path):
     before = (project / "project.json").read_bytes()
     code, _, err = run("export", project, "--format", "metrics-json", "--out", project / "project.json")
     assert code == 2
-    assert "inside of the project" in err
+    assert "inside the project" in err
     assert (project / "project.json").read_bytes() == before
 
 

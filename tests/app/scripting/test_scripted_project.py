@@ -125,7 +125,7 @@ def test_what_cannot_be_an_edit(trained):
             (("expose",), {"stops": 99.0}, "stops is 99.0; it has to be a number between -16 and 16"),
             (("expose",), {"stops": "much"}, "not a number"),
             (("hide",), {"stops": 1.0}, "not known"),
-            ((Delete(),), {"stops": 1.0}, "Delete is given with 'stops' beside it"),
+            ((Delete(),), {"stops": 1.0}, "Delete is given together with 'stops'"),
             ((Delete(), Sphere(flat, 1.0)), {}, "is not valid"),
             ((Delete(), 3), {}, "is not valid"),
         )
