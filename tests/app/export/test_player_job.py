@@ -175,7 +175,7 @@ def test_bad_targets_and_frames_are_named_before_any_work(opened: TrainedProject
         (tmp_path / "scene.mp4", "HTML page"),
         (tmp_path / "folder.html", "folder"),
         (tmp_path / "file" / "scene.html", "is a file"),
-        (opened.project.folder / "scene.html", "inside of the project"),
+        (opened.project.folder / "scene.html", "inside the project"),
     ):
         with pytest.raises(ProjectError, match=said):
             run(opened, PlayerJob(out), ignore)

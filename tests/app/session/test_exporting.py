@@ -174,9 +174,9 @@ def test_the_plan_tells_files_bytes_and_room(bench: Bench):
     [
         ("", "Say where"),
         ("relative.csv", "full path"),
-        ("{folder}/p/m.csv", "inside of the project"),
-        ("{folder}/ring/m.csv", "inside of the capture"),
-        ("{folder}/p/project.json/m.csv", "inside of the project"),
+        ("{folder}/p/m.csv", "inside the project"),
+        ("{folder}/ring/m.csv", "inside the capture"),
+        ("{folder}/p/project.json/m.csv", "inside the project"),
         ("{folder}/settings.json/m.csv", "is a file"),
         ("{folder}", "folder, not a file"),
         ("{folder}/a\0b.csv", "cannot be written to"),
