@@ -235,7 +235,7 @@ def test_a_damaged_version_is_a_notice_and_the_clip_stays(session: Session) -> N
     assert session.version_state(0, 1) is None
     session.dispatch(c.RestoreVersion(0, 1))
     poll_until(session, lambda: not session.jobs)
-    assert "could not be brought back" in titles(session)[-1]
+    assert "could not be restored" in titles(session)[-1]
     assert session.clip_states[0].state == "trained"
 
 
