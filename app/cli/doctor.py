@@ -12,7 +12,7 @@ import sys
 from dataclasses import dataclass
 
 from app.background.kernels import use_threads
-from app.training.worker import n_training_threads
+from app.training.worker.worker import n_training_threads
 from engine.kernels.cache import UNWRITABLE, cache_state
 from engine.parallel import n_cores
 from engine.user_folders import cache_dir, data_dir

@@ -12,7 +12,7 @@ from app.project.clips.clip_versions import read_finished
 from app.project.mends.record import MendedClip, MendRecord, now_text
 from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.training.build import clip_training
+from app.training.worker.build import clip_training
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.compact import write_compact_clip

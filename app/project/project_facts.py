@@ -31,7 +31,7 @@ class ClipFacts:
         n_steps: Optimiser steps.
         fingerprint: Of its arrays.
         storage: Bytes per component, see app.project.clips.clip_bytes.
-        stages_s: Wall seconds per stage, see app.training.stage_watch; empty when not recorded.
+        stages_s: Wall seconds per stage, see app.training.worker.stage_watch; empty when not recorded.
         preparation_s, training_s: Together all of it; None when not recorded.
         coverage: Of a clip that inherits: what moves and how much of it has an anchor near it, see
             engine.clip_files.clip_header.Coverage; None when not recorded.

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from app.project.clips.finished_clip import take_in
 from app.project.project import Project
-from app.training.disk_retries import Retries
+from app.training.worker.disk_retries import Retries
 from engine.errors import DiskError, ProjectError
 from engine.training.preparation.stages import remove_stages
 

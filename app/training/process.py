@@ -14,7 +14,7 @@ from engine.children.kind import ChildFailed, ChildKind
 from engine.children.process import MAX_EVENTS_PER_POLL, ChildProcess
 from engine.errors import EngineError
 
-BUILD = "app.training.build:build_training"
+BUILD = "app.training.worker.build:build_training"
 
 
 class TrainTask(Struct, frozen=True):
@@ -34,7 +34,7 @@ class TrainTask(Struct, frozen=True):
 
 TRAINING: ChildKind[TrainTask, Event, None] = ChildKind(
     place="app.training.process:TRAINING",
-    work="app.training.worker:main",
+    work="app.training.worker.worker:main",
     what="The training process",
     job=TrainTask,
     event=Event,

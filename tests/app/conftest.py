@@ -17,8 +17,8 @@ from app.project.project import Project
 from app.session.commands import OpenCapture
 from app.session.projects.settings import Settings
 from app.session.session import Session
-from app.training.interface import MakeTraining
 from app.training.messages import TrainJob
+from app.training.worker.interface import MakeTraining
 from engine.capture.capture import open_capture
 from tests.app.fakes import make_fake, write_capture
 from tests.app.inline_worker import InlineWorker

@@ -6,11 +6,11 @@ import time
 from collections import deque
 from pathlib import Path
 
-from app.training.build import build_training
-from app.training.folder_store import FolderStore
-from app.training.interface import MakeTraining
 from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob
-from app.training.run import TrainingRun
+from app.training.worker.build import build_training
+from app.training.worker.folder_store import FolderStore
+from app.training.worker.interface import MakeTraining
+from app.training.worker.run import TrainingRun
 from engine.children.messages import decoded, encoded
 
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from app.training import disk_retries
 from app.training import messages as m
 from app.training.messages import Pause, SnapshotConsumed, Stop
+from app.training.worker import disk_retries
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import CaptureError
 from tests.app.fakes import make_fake

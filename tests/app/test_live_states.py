@@ -7,7 +7,7 @@ import pytest
 from msgspec import to_builtins
 
 from app.session import commands as c
-from app.training import keeper
+from app.training.worker import keeper
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
 from engine.model.reading import load_clip_model

@@ -10,12 +10,12 @@ import pytest
 from app.project.clips.metrics_file import read_metrics
 from app.project.opening.project_access import create_project, default_settings
 from app.training import messages as m
-from app.training.cadence import Cadence
-from app.training.folder_store import FolderStore
 from app.training.jobs import train_job
-from app.training.keeper import CHECKPOINT_EVERY_S
 from app.training.rate import SmoothedRate
-from app.training.run import TrainingRun
+from app.training.worker.cadence import Cadence
+from app.training.worker.folder_store import FolderStore
+from app.training.worker.keeper import CHECKPOINT_EVERY_S
+from app.training.worker.run import TrainingRun
 from engine.capture.capture import open_capture
 from engine.children.kind import Unwanted
 from engine.clip_files.clip_state import ClipState, read_clip_state
@@ -185,7 +185,7 @@ def test_a_full_disk_costs_the_snapshot_not_the_training(bench, monkeypatch):
     def full(*_args):
         raise ProjectError("The clip could not be written (No space left on device).", hint="Free some space.")
 
-    monkeypatch.setattr("app.training.folder_store.write_clip_state", full)
+    monkeypatch.setattr("app.training.worker.folder_store.write_clip_state", full)
     it.steps(1)
     assert it.of(m.WarningRaised)[0].hint == "Free some space."
     monkeypatch.undo()
@@ -285,7 +285,7 @@ def test_a_clip_with_numbers_that_are_none_is_not_kept(store, bad):
 def test_a_clip_that_reads_back_differently_is_not_handed_over(store, monkeypatch):
     good = ClipState({"value": np.ones(2, np.float32)}, HEADER)
     other = ClipState({"value": np.zeros(2, np.float32)}, good.header)
-    monkeypatch.setattr("app.training.folder_store.read_clip_state", lambda _path: good)
+    monkeypatch.setattr("app.training.worker.folder_store.read_clip_state", lambda _path: good)
     with pytest.raises(ProjectError, match="differs"):
         store.put_clip("0000", compact_clip(other))
     assert not list((store.folder / "live").iterdir())
@@ -381,7 +381,7 @@ def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_w
 
 def test_the_most_memory_of_a_training_is_kept_across_its_runs(bench, monkeypatch):
     held = iter([700.0, 700.0])
-    monkeypatch.setattr("app.training.keeper.peak_mb", lambda: next(held, 650.0))
+    monkeypatch.setattr("app.training.worker.keeper.peak_mb", lambda: next(held, 650.0))
     it = bench(n_steps=6)
     it.steps(4)
     it.commands.append(m.Stop(keep=True))
@@ -394,7 +394,7 @@ def test_the_most_memory_of_a_training_is_kept_across_its_runs(bench, monkeypatc
 
 
 def test_memory_that_the_system_does_not_say_is_unknown(bench, monkeypatch):
-    monkeypatch.setattr("app.training.keeper.peak_mb", lambda: None)
+    monkeypatch.setattr("app.training.worker.keeper.peak_mb", lambda: None)
     it = bench(n_steps=3)
     assert it.steps(10) is False
     assert read_clip_state(it.handed_over).header.figures.memory_mb is None

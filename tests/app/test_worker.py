@@ -12,7 +12,7 @@ import pytest
 from app.session import commands as c
 from app.training.process import ProcessWorker
 from app.training.service import TrainingService
-from app.training.worker import n_training_threads
+from app.training.worker.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
 from engine.kernels.cache import kernel_folder
 from engine.kernels.threads import SPIN_COUNT

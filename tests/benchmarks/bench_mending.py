@@ -36,7 +36,7 @@ from app.evaluation.headless import open_trained
 from app.lab.synthetic.scene import SyntheticScene
 from app.lab.synthetic.writing import cameras_document, write_json, write_video
 from app.project.opening.project_access import open_project
-from app.training.build import clip_training
+from app.training.worker.build import clip_training
 from engine.capture.capture import open_capture
 from engine.clip_files.compact import write_compact_clip
 from engine.gate.regions import sphere_region

@@ -43,7 +43,6 @@ BANNED_ATTRIBUTES = {("torch", "save"), ("torch", "load"), ("os", "system"), ("o
 
 MAX_FILES = 15
 LARGE_FOLDERS = {
-    "app/training": "",
     "engine/capture/formats": "a reader per format: whoever adds one looks for the others in one place",
 }
 """Folders that may hold more Python files, and why."""

@@ -148,7 +148,7 @@ def exchanged(project: Any) -> None:
 
 def trained(project: Any) -> None:
     """What a training leaves beside its clip: log, curves, snapshots."""
-    from app.training.folder_store import FolderStore
+    from app.training.worker.folder_store import FolderStore
     from engine.clip_files.clip_state import read_clip_state
     from engine.errors import ProjectError
     from engine.storage.files import open_to_append

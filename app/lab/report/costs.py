@@ -10,7 +10,7 @@ from app.lab.report.page.spans import spans_text
 from app.lab.report.page.tables import Table, TableColumn
 from app.project.clips.clip_bytes import COMPONENT_NAMES
 from app.project.project_facts import ProjectFacts
-from app.training.stage_watch import KEEPING, TRAINING
+from app.training.worker.stage_watch import KEEPING, TRAINING
 
 
 def storage_section(facts: ProjectFacts) -> Section:

@@ -12,10 +12,10 @@ import torch
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.project_access import open_project
 from app.project.project import Project
-from app.training.build import build_training
 from app.training.curves import read_curves
-from app.training.folder_store import FolderStore
 from app.training.jobs import train_job
+from app.training.worker.build import build_training
+from app.training.worker.folder_store import FolderStore
 from engine.assets import asset_path
 from engine.backends.table import backend_called
 from engine.capture.capture import open_capture

@@ -11,7 +11,7 @@ from app.document.storing.stored_document import plain_document
 from app.project.opening.project_access import open_project
 from app.session import commands as c
 from app.session.marking import effect_text, region_text
-from app.training.build import build_training
+from app.training.worker.build import build_training
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion, sphere_region
 from tests.app.conftest import inline, poll_until
@@ -38,7 +38,7 @@ def on_disk(session) -> tuple[GateRegion, ...]:
 def building(job, store, report, *, monkeypatch, seen):
     """Builds the training as the program does, but for the training itself: notes its regions, trains the fake."""
     with monkeypatch.context() as patch:
-        patch.setattr("app.training.build.warm_up_reporting", lambda report: None)
+        patch.setattr("app.training.worker.build.warm_up_reporting", lambda report: None)
         patch.setattr(
             "engine.training.clip_training.ClipTraining", lambda *_, regions, **__: seen.append(tuple(regions))
         )

@@ -253,11 +253,11 @@ def test_the_live_view_is_kept_for_the_next_time(session: Session, tmp_path) -> 
 def test_the_log_holds_what_program_and_training_said(session: Session) -> None:
     path = project_of(session).log_path(0)
     path.parent.mkdir(exist_ok=True)
-    path.write_text("2026-01-02 03:04:05,678 WARNING app.training.run: the disk is full\n  more of it\n")
+    path.write_text("2026-01-02 03:04:05,678 WARNING app.training.worker.run: the disk is full\n  more of it\n")
     poll_until(session, lambda: any(line.source == "clip 0" for line in session.log_lines()))
     lines = [line for line in session.log_lines() if line.source == "clip 0"]
     assert [(line.level, line.text) for line in lines] == [
-        ("WARNING", "app.training.run: the disk is full"),
+        ("WARNING", "app.training.worker.run: the disk is full"),
         ("WARNING", "  more of it"),
     ]
 

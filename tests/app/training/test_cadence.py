@@ -1,6 +1,6 @@
 """What costs time is done at a bounded rate."""
 
-from app.training.cadence import Cadence
+from app.training.worker.cadence import Cadence
 
 
 def test_the_first_is_due_one_interval_after_the_first_question():

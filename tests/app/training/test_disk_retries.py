@@ -5,7 +5,8 @@ import shutil
 import pytest
 
 from app.document.storing.document_file import PROJECT_FILE
-from app.training.disk_retries import (
+from app.training.messages import WarningRaised
+from app.training.worker.disk_retries import (
     PATIENCE_S,
     PATIENCE_UNKEPT_S,
     RETRY_AFTER_S,
@@ -14,7 +15,6 @@ from app.training.disk_retries import (
     Refusals,
     Retries,
 )
-from app.training.messages import WarningRaised
 from engine.errors import ProjectError
 
 

@@ -11,7 +11,7 @@ from app.project.opening.opened_project import OpenedProject
 from app.training.messages import ClipTrained
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses, training_status
-from app.training.worker import n_training_threads
+from app.training.worker.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import NonFiniteLoss
 from tests.app.conftest import inline

@@ -14,13 +14,13 @@ from app.project.clips.clip_versions import list_versions
 from app.project.clips.finished_clip import take_in
 from app.project.opening.opened_project import OpenedProject
 from app.project.opening.project_access import open_project
-from app.training import disk_retries
-from app.training.folder_store import FolderStore
 from app.training.jobs import train_job
 from app.training.messages import ClipTrained, Pause, Resume, TrainingFailed, TrainingStopped, WarningRaised
-from app.training.run import TrainingRun
 from app.training.service import TrainingService
 from app.training.store import ClipStore
+from app.training.worker import disk_retries
+from app.training.worker.folder_store import FolderStore
+from app.training.worker.run import TrainingRun
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError
 from tests.app.conftest import inline

@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 
 from app.project.opening.opened_project import OpenedProject
-from app.training import keeper
-from app.training.folder_store import FolderStore
 from app.training.jobs import train_job
 from app.training.messages import ClipTrained, SnapshotWritten, TrainingFailed, TrainJob
 from app.training.own_settings import ALLOWED, offered, with_own
 from app.training.service import ClipEvent, TrainingService
 from app.training.train_queue import TrainQueue, needed_clips
 from app.training.training_status import ClipStatuses, training_status
+from app.training.worker import keeper
+from app.training.worker.folder_store import FolderStore
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import NonFiniteLoss, ProjectError
 from tests.app.conftest import inline
@@ -228,7 +228,7 @@ def test_settings_of_one_clip_are_those_that_leave_the_others_alone(six: OpenedP
 
 @pytest.mark.parametrize(("mode", "n_expected"), [("off", 0), ("low", 2), ("live", 6)])
 def test_how_often_snapshots_are_written(six: OpenedProject, mode: str, n_expected: int) -> None:
-    from app.training.run import TrainingRun
+    from app.training.worker.run import TrainingRun
 
     now_s = [0.0]
     commands: list[object] = []

@@ -13,9 +13,9 @@ from app.document.project_settings import ProjectSettings
 from app.evaluation.headless import open_trained
 from app.project.opening.project_access import create_project, default_settings
 from app.project.project import Project
-from app.training.folder_store import FolderStore
 from app.training.jobs import train_job
 from app.training.messages import TrainJob
+from app.training.worker.folder_store import FolderStore
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError
@@ -70,7 +70,7 @@ def continued(tmp_path, built_once) -> Iterator[tuple[Project, list[TrainJob]]]:
 
 @pytest.mark.slow
 def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(continued, monkeypatch):
-    from app.training import build
+    from app.training.worker import build
     from engine.training.clip_training import ClipTraining
 
     monkeypatch.setattr(build, "warm_up_reporting", lambda report: None)

@@ -11,7 +11,7 @@ from app.project.clips.clip_paths import ClipPaths
 from app.project.clips.clip_versions import read_finished
 from app.project.clips.metrics_file import read_metrics
 from app.project.opening.project_access import open_project
-from app.training.disk_retries import FolderWatch
+from app.training.worker.disk_retries import FolderWatch
 from engine.capture.capture import Capture, open_capture
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.clip_files.compact import CompactClip, write_compact_clip

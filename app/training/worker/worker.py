@@ -13,10 +13,10 @@ from pathlib import Path
 
 from app.background.kernels import use_threads
 from app.background.logs import FORMAT, PrintableFormatter
-from app.training.folder_store import FolderStore
 from app.training.messages import Event, TrainJob, WarningRaised
 from app.training.process import TrainTask
-from app.training.run import TrainingRun
+from app.training.worker.folder_store import FolderStore
+from app.training.worker.run import TrainingRun
 from engine.backends.table import choose_backend
 from engine.children.child import Parent
 from engine.children.kind import Unwanted, find

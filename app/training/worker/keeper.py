@@ -10,12 +10,12 @@ from typing import Any
 
 from app.background.memory import peak_mb
 from app.project.clips.stage_seconds import memory_of, stages_of
-from app.training.cadence import Cadence
-from app.training.disk_retries import Refusals
-from app.training.interface import Training
 from app.training.messages import Event, HeldOutMeasured, SnapshotWritten, TrainJob
-from app.training.stage_watch import StageWatch
 from app.training.store import ClipStore
+from app.training.worker.cadence import Cadence
+from app.training.worker.disk_retries import Refusals
+from app.training.worker.interface import Training
+from app.training.worker.stage_watch import StageWatch
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import ProjectError
 

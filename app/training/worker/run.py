@@ -11,11 +11,6 @@ import time
 import traceback
 from collections.abc import Callable
 
-from app.training.cadence import Cadence
-from app.training.disk_retries import ProjectGone, Retries
-from app.training.failures import keep_last_good, words_of
-from app.training.interface import MakeTraining, Training
-from app.training.keeper import Keeper
 from app.training.messages import (
     ClipTrained,
     Command,
@@ -35,9 +30,14 @@ from app.training.messages import (
     WarningRaised,
     WorkerReady,
 )
-from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch
-from app.training.step_record import StepRecord, nothing_yet
 from app.training.store import ClipStore, OpenStore
+from app.training.worker.cadence import Cadence
+from app.training.worker.disk_retries import ProjectGone, Retries
+from app.training.worker.failures import keep_last_good, words_of
+from app.training.worker.interface import MakeTraining, Training
+from app.training.worker.keeper import Keeper
+from app.training.worker.stage_watch import KEEPING, STARTING, TRAINING, StageWatch
+from app.training.worker.step_record import StepRecord, nothing_yet
 from engine.children.kind import Unwanted
 from engine.clip_files.clip_header import ClipFigures
 from engine.clip_files.compact import CompactClip

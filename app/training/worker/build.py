@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.background.kernels import warm_up_reporting
-from app.training.interface import Training
 from app.training.messages import TrainJob
 from app.training.store import ClipStore
+from app.training.worker.interface import Training
 from engine.backends.table import process_backend
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.training.interface import Training
-from app.training.keeper import Keeper
+from app.training.worker.interface import Training
+from app.training.worker.keeper import Keeper
 from engine.clip_files.clip_state import ClipState
 from engine.errors import EngineError
 
