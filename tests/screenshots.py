@@ -31,10 +31,14 @@ from app.playback.modes.view_modes import COLOR  # noqa: E402
 from app.project.project_picture import fitted  # noqa: E402
 from app.project.recents import RecentProject  # noqa: E402
 from app.session.captures.calibration_page import CalibrationPage, VideoFacts  # noqa: E402
-from app.session.commands import (  # noqa: E402
+from app.session.projects.preferences import PreferencesFile  # noqa: E402
+from app.session.projects.project_commands import OpenCapture  # noqa: E402
+from app.session.projects.settings import Settings  # noqa: E402
+from app.session.projects.window_memory import WindowMemory  # noqa: E402
+from app.session.session import Session  # noqa: E402
+from app.session.showing.look_commands import (  # noqa: E402
     ActivateView,
     LookThrough,
-    OpenCapture,
     SetCompare,
     SetFrame,
     SetMode,
@@ -42,10 +46,6 @@ from app.session.commands import (  # noqa: E402
     ShowViews,
     ToggleOverlay,
 )
-from app.session.projects.preferences import PreferencesFile  # noqa: E402
-from app.session.projects.settings import Settings  # noqa: E402
-from app.session.projects.window_memory import WindowMemory  # noqa: E402
-from app.session.session import Session  # noqa: E402
 from engine.assets import asset_path  # noqa: E402
 from tests.ui.pilot import CTRL, Pilot  # noqa: E402
 from ui.panels.state import RESIDUALS  # noqa: E402

@@ -163,8 +163,8 @@ def _serve_window(options: argparse.Namespace) -> int:
     # Sizes are pixels of the screen, of which ui.style.ui_scale makes units; on macOS they are the system's points.
     pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
     from app.project.opening.project_choices import ProjectChoices
-    from app.session.commands import OpenCapture
     from app.session.projects.preferences import PreferencesFile
+    from app.session.projects.project_commands import OpenCapture
     from app.session.projects.window_memory import read_window_memory
     from app.session.session import Session
     from ui.shell.window import StudioWindow

@@ -4,46 +4,64 @@ from __future__ import annotations
 
 from typing import get_args
 
-from app.session import commands
+from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
+from app.session.editing.edit_commands import EditCommand, GoToStep, Redo, Undo
+from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
+from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
+from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
+from app.session.paths.path_commands import PathCommand
+from app.session.projects.project_commands import AskStartOver, StartOver
+from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SetTrainSetting
+from app.session.training.train_commands import (
+    AskTrainSettings,
+    RemoveVersion,
+    RestoreVersion,
+    TrainAll,
+    TrainClip,
+    TrainClips,
+    TrainNextClip,
+    TrainStale,
+)
 
 SETTING_NAMES: dict[type, str] = {
-    commands.SetHoldout: "choose held-out cameras",
-    commands.SetClipLength: "change the clip length",
-    commands.SetTrainSetting: "change a setting",
-    commands.SetPreset: "choose a preset",
+    SetHoldout: "choose held-out cameras",
+    SetClipLength: "change the clip length",
+    SetTrainSetting: "change a setting",
+    SetPreset: "choose a preset",
 }
 """Steps of the history."""
 TITLES: dict[type, str] = {
-    commands.TrainClip: "The clip cannot be trained",
-    commands.TrainNextClip: "The clip cannot be trained",
-    commands.TrainClips: "The clips cannot be trained",
-    commands.TrainAll: "The clips cannot be trained",
-    commands.AskTrainSettings: "The clip cannot be trained",
+    TrainClip: "The clip cannot be trained",
+    TrainNextClip: "The clip cannot be trained",
+    TrainClips: "The clips cannot be trained",
+    TrainStale: "The clips cannot be trained",
+    TrainAll: "The clips cannot be trained",
+    AskTrainSettings: "The clip cannot be trained",
     **dict.fromkeys(get_args(ExclusionCommand), "The exclusion cannot be changed"),
     **dict.fromkeys(get_args(MendCommand), "Mending cannot start"),
     **dict.fromkeys(get_args(ClipCommand), "The clips cannot be changed"),
-    commands.RestoreVersion: "The version cannot be restored",
-    commands.RemoveVersion: "The version cannot be removed",
-    commands.SetHoldout: "These cameras cannot be held out",
-    commands.SetClipLength: "The clip length cannot be changed",
-    commands.SetTrainSetting: "The setting cannot be changed",
-    commands.SetPreset: "The preset cannot be chosen",
-    commands.SynchroniseCameras: "The cameras cannot be synchronised",
-    **dict.fromkeys(get_args(commands.SelectionCommand), "The selection cannot be made"),
-    commands.MarkRegion: "The region cannot be marked",
-    commands.MarkBox: "The region cannot be marked",
-    commands.RemoveRegion: "The region cannot be removed",
-    commands.Undo: "The last step cannot be undone",
-    commands.Redo: "The step cannot be redone",
-    commands.GoToStep: "That step of the history cannot be reached",
-    **dict.fromkeys(get_args(commands.EditCommand), "The edit cannot be made"),
-    **dict.fromkeys(get_args(commands.PathCommand), "The camera path cannot be changed"),
-    commands.AskStartOver: "Training cannot start over",
-    commands.StartOver: "Training cannot start over",
-    commands.CorrectCapture: "The capture cannot be corrected",
-    **dict.fromkeys(get_args(commands.FileCommand), "The project cannot be changed"),
+    RestoreVersion: "The version cannot be restored",
+    RemoveVersion: "The version cannot be removed",
+    SetHoldout: "These cameras cannot be held out",
+    SetClipLength: "The clip length cannot be changed",
+    SetTrainSetting: "The setting cannot be changed",
+    SetPreset: "The preset cannot be chosen",
+    SynchroniseCameras: "The cameras cannot be synchronised",
+    **dict.fromkeys(get_args(SelectionCommand), "The selection cannot be made"),
+    MarkRegion: "The region cannot be marked",
+    MarkBox: "The region cannot be marked",
+    RemoveRegion: "The region cannot be removed",
+    Undo: "The last step cannot be undone",
+    Redo: "The step cannot be redone",
+    GoToStep: "That step of the history cannot be reached",
+    **dict.fromkeys(get_args(EditCommand), "The edit cannot be made"),
+    **dict.fromkeys(get_args(PathCommand), "The camera path cannot be changed"),
+    AskStartOver: "Training cannot start over",
+    StartOver: "Training cannot start over",
+    CorrectCapture: "The capture cannot be corrected",
+    **dict.fromkeys(get_args(FileCommand), "The project cannot be changed"),
 }
 """Titles of notices, where a command was refused."""

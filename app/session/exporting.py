@@ -21,8 +21,18 @@ from app.export.show_in_folder import show_in_folder
 from app.playback.timeline import Timeline
 from app.project.opening.opened_project import OpenedProject
 from app.project.projects_folder import project_name
-from app.session import commands
+from app.session.export_commands import (
+    CancelExport,
+    ClearExports,
+    ExportCommand,
+    MoveExport,
+    RemoveExport,
+    RetryExport,
+    ShowExport,
+    StartExport,
+)
 from app.session.notices import Notices
+from app.session.part import Part
 from app.session.projects.settings import Settings
 from engine.capture.frames import VideoFrames
 from engine.errors import EngineError, ProjectError
@@ -61,7 +71,7 @@ class _Wish(NamedTuple):
     folder: str = ""
 
 
-class Exporting:
+class Exporting(Part):
     """For one thread, which does not wait.
 
     Attributes:
@@ -72,6 +82,7 @@ class Exporting:
         settings: Keeps what was chosen last.
         launch: Starts an export; a process by default.
         show: Shows a file in the system's file manager; called on a thread.
+        is_training: Whether cores are for a training now.
     """
 
     def __init__(
@@ -81,9 +92,11 @@ class Exporting:
         *,
         launch: Callable[[ExportTask], Exporter] = ExportProcess,
         show: Callable[[Path], None] = show_in_folder,
+        is_training: Callable[[], bool] = lambda: False,
     ) -> None:
         self.page: ExportPage | None = None
         self._notices, self._settings, self._show = notices, settings, show
+        self._is_training = is_training
         self._queue = ExportQueue(launch=launch)
         self._jobs = Jobs()
         self._planner: LatestWorker[_Wish, ExportPlan] = LatestWorker("export plan", self._plan)
@@ -192,22 +205,22 @@ class Exporting:
 
     # ---- the queue
 
-    def apply(self, command: commands.ExportCommand) -> None:
+    def apply(self, command: ExportCommand) -> None:
         """Carry out a command on the queue; asking is `ask`."""
         match command:
-            case commands.StartExport(choices=choices):
+            case StartExport(choices=choices):
                 self.start(choices)
-            case commands.CancelExport(export_id=export_id):
+            case CancelExport(export_id=export_id):
                 self.cancel(export_id)
-            case commands.RetryExport(export_id=export_id):
+            case RetryExport(export_id=export_id):
                 self.retry(export_id)
-            case commands.MoveExport(export_id=export_id, place=place):
+            case MoveExport(export_id=export_id, place=place):
                 self.move(export_id, place)
-            case commands.RemoveExport(export_id=export_id):
+            case RemoveExport(export_id=export_id):
                 self.remove(export_id)
-            case commands.ClearExports():
+            case ClearExports():
                 self.clear()
-            case commands.ShowExport(export_id=export_id):
+            case ShowExport(export_id=export_id):
                 self.show(export_id)
 
     def start(self, choices: ExportChoices) -> None:
@@ -270,10 +283,10 @@ class Exporting:
 
         self._jobs.start("Show in folder", work, lambda _: None, fail)
 
-    def poll(self, *, is_training: bool) -> bool:
+    def poll(self) -> bool:
         """Take in what was finished, and begin what is next. Whether anything changed."""
         has_news = self._jobs.poll()
-        ended = self._queue.poll(n_threads=1 if is_training else None)
+        ended = self._queue.poll(n_threads=1 if self._is_training() else None)
         for status in ended:
             if status.state == "failed":
                 self._notices.add("error", f"{status.title} was not exported", status.message, status.hint)

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from app.session.commands import MarkBox, MarkCommand, MarkRegion, RemoveRegion
 from app.session.editing.kept_document import KeptDocument
+from app.session.editing.mark_commands import MarkBox, MarkCommand, MarkRegion, RemoveRegion
 from app.status import ClipStatus, RegionsStatus
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion, parse_region, sphere_region

@@ -208,3 +208,28 @@ def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:
         outdated_seconds=None if average is None else sum(time for time in times if time is not None),
         resume_step=record.resume_step,
     )
+
+
+class Asked:
+    """The question that the user has to answer now.
+
+    Attributes:
+        question: None while there is nothing to ask.
+    """
+
+    def __init__(self) -> None:
+        self.question: Question | None = None
+
+    def put(self, question: Question | None) -> None:
+        """Ask this and nothing else; None withdraws what is asked."""
+        self.question = question
+
+    def put_if_free(self, question: Question) -> None:
+        """Ask something that came up by itself: what is asked already comes first."""
+        if self.question is None:
+            self.question = question
+
+    def take(self) -> Question | None:
+        """The question, which is withdrawn."""
+        taken, self.question = self.question, None
+        return taken

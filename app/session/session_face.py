@@ -14,6 +14,7 @@ from app.playback.modes.trails import Trails
 from app.playback.modes.view_modes import MODES, ShownAs
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.views.bookmarks import Bookmarks
 from app.playback.views.orbit_view import OrbitView
 from app.playback.views.views import Views
 from app.project.disk.use import DiskUse
@@ -27,6 +28,10 @@ from app.session.captures.doctor_status import DoctorStatus
 from app.session.clips.clip_work import ClipWork
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import ProjectSelecting
+from app.session.projects.projects import Projects
+from app.session.projects.recent_projects import RecentProjects
+from app.session.questions import Asked, Question
+from app.session.showing.showing import Showing
 from app.session.training.clip_versions import Versions
 from app.session.training.live_training import LiveTraining
 from app.status import (
@@ -51,12 +56,9 @@ from engine.editing.selection.seen_from import SeenFrom
 class SessionFace:
     """The reading half of a Session, see there."""
 
-    opened: OpenedProject | None
-    timeline: Timeline
-    views: Views
+    projects: Projects
+    showing: Showing
     training: TrainingStatus
-    playback: Playback
-    residuals: Residuals
     document: KeptDocument
     doctor: CaptureDoctor
     live_training: LiveTraining
@@ -64,9 +66,15 @@ class SessionFace:
     clip_work: ClipWork
     selecting: ProjectSelecting
     log: LogView
+    asked: Asked
     _jobs: Jobs
 
     # ---------------------------------------------------------------- what is open
+
+    @property
+    def opened(self) -> OpenedProject | None:
+        """What is open; None before."""
+        return self.projects.opened
 
     @property
     def capture(self) -> Capture | None:
@@ -99,18 +107,51 @@ class SessionFace:
         return 0 if self.opened is None else self.opened.reference_index
 
     @property
+    def recent(self) -> RecentProjects:
+        """What was opened lately."""
+        return self.projects.recent
+
+    @property
+    def question(self) -> Question | None:
+        """What the user has to answer; None while there is nothing to ask."""
+        return self.asked.question
+
+    # ---------------------------------------------------------------- what is looked at
+
+    @property
+    def timeline(self) -> Timeline:
+        """Which frame; the window may change it directly, and so with views and bookmarks."""
+        return self.showing.timeline
+
+    @property
+    def views(self) -> Views:
+        """From where."""
+        return self.showing.views
+
+    @property
+    def bookmarks(self) -> Bookmarks:
+        """Places to go back to."""
+        return self.showing.bookmarks
+
+    @property
     def view(self) -> OrbitView:
         """From where the current view looks."""
-        return self.views.current.view
+        return self.showing.view
 
     @property
     def overlays(self) -> Overlays:
         """What the current view shows."""
-        return self.views.current.overlays
+        return self.showing.overlays
 
     @property
-    def _shown_as(self) -> ShownAs:
-        return ShownAs(self.overlays.mode, self.overlays.content)
+    def playback(self) -> Playback:
+        """Prepares what is shown."""
+        return self.showing.playback
+
+    @property
+    def residuals(self) -> Residuals:
+        """Compares with what the cameras took."""
+        return self.showing.residuals
 
     @property
     def exclusions(self) -> Exclusions:
@@ -169,12 +210,12 @@ class SessionFace:
 
     def wanted_frame(self) -> WantedFrame | None:
         """What ought to be on screen; None without a capture. What is there says itself what it is."""
-        return self.playback.wanted(self.timeline, self.view, self._shown_as, view_id=self.views.current_index)
+        return self.playback.wanted(self.timeline, self.view, self.showing.shown_as, view_id=self.views.current_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
         trained."""
-        shown = self.playback.frame(self.timeline, self._shown_as)
+        shown = self.playback.frame(self.timeline, self.showing.shown_as)
         return None if shown is None else shown.gaussians
 
     def selected(self, gaussians: GaussianArrays) -> np.ndarray:
@@ -191,7 +232,7 @@ class SessionFace:
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
-        shown = self.playback.frame(self.timeline, self._shown_as)
+        shown = self.playback.frame(self.timeline, self.showing.shown_as)
         return None if shown is None else shown.anchors
 
     def shown_coverage(self) -> CoveredSpace | None:
@@ -210,7 +251,13 @@ class SessionFace:
         """The rasterizer's picture of the frame and view; see Playback.render."""
         view_id = self.views.current_index
         return self.playback.render(
-            self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
+            self.timeline,
+            self.view,
+            width,
+            height,
+            full_size=full_size,
+            shown_as=self.showing.shown_as,
+            view_id=view_id,
         )
 
     def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:

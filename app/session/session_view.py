@@ -136,7 +136,7 @@ class RecentView(Protocol):
 
 
 class SessionView(Protocol):
-    """What is open, what is shown of it, what runs, and what is asked."""
+    """The project that is open, what is shown of it, what runs, and what is asked."""
 
     # ---- what is open
     @property

@@ -14,7 +14,7 @@ from app.plan import speed
 from app.project.opening.opened_project import OpenedProject, opened_project
 from app.project.opening.project_access import create_project, default_settings
 from app.project.project import Project
-from app.session.commands import OpenCapture
+from app.session.projects.project_commands import OpenCapture
 from app.session.projects.settings import Settings
 from app.session.session import Session
 from app.training.messages import TrainJob

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from msgspec import to_builtins
 
-from app.session import commands as c
-from app.training.worker import keeper
+from app.session.projects.setting_commands import SetClipLength
+from app.session.showing.look_commands import SetFrame
+from app.session.training.train_commands import TrainClip, TrainNextClip
+from app.training.worker.worker import keeper
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
 from engine.model.reading import load_clip_model
@@ -21,7 +23,7 @@ def live_session(make_session, monkeypatch):
     monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
     monkeypatch.setattr(keeper, "SNAPSHOT_SHARE", 1.0)
     session = make_session(make_training=make_slow)
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     return session
 
 
@@ -35,9 +37,9 @@ def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
 
     assert decoder.HEADS == HEADS
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     for index in (0, 1):
-        session.dispatch(c.TrainClip(index))
+        session.dispatch(TrainClip(index))
     poll_until(session, lambda: all(state.state == "trained" for state in session.clip_states))
     reference, source = (read_clip_state(session.project.clip_path(i)) for i in (0, 1))
     assert to_builtins(reference.header.decoder) == DECODER
@@ -73,9 +75,9 @@ def test_a_live_state_is_shown_and_given_back(live_session, caplog):
 def test_a_live_state_is_given_back_when_nobody_looks_at_its_clip(make_session, monkeypatch):
     monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
     session = make_session(make_training=make_slow)
-    session.dispatch(c.SetClipLength(3))
-    session.dispatch(c.SetFrame(4))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(SetClipLength(3))
+    session.dispatch(SetFrame(4))
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: revision_of(session) == "live-1-3", what="snapshots that nobody waits for")
     assert session.playback.decoder.worker.newest is None
 
@@ -94,7 +96,7 @@ def test_a_live_state_that_is_gone_costs_no_notice_and_the_next_one_is_shown(liv
 
 def test_a_trained_state_that_is_gone_is_told(make_session):
     session = make_session()
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.clip_states[0].state == "trained")
     session.playback.decoder.clear()
     session.project.clip_path(0).unlink()
@@ -106,10 +108,10 @@ def test_a_trained_state_that_is_gone_is_told(make_session):
 def test_states_of_a_clip_that_is_trained_again_have_names_of_their_own(make_session):
     """Each worker counts its snapshots from one; the picture of an old state must not pass for the new one."""
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     names: list[set[str]] = []
     for _ in range(2):
-        session.dispatch(c.TrainClip(0, is_confirmed=True))
+        session.dispatch(TrainClip(0, is_confirmed=True))
         seen: set[str] = set()
 
         def is_done(seen: set[str] = seen) -> bool:

@@ -12,9 +12,10 @@ from app.cli.cli import main
 from app.evaluation.evaluation import boundary_maps
 from app.evaluation.headless import open_trained
 from app.project.opening.project_access import open_project
-from app.session import commands as c
+from app.session.projects.project_commands import OpenProject
 from app.session.projects.settings import Settings
 from app.session.session import Session
+from app.session.showing.look_commands import LookThrough, SetFrame
 from engine.assets import asset_path
 from engine.backends import table
 from engine.backends.table import AUTO, BackendEntry, backend_called
@@ -154,10 +155,10 @@ def test_render_follows_the_camera_across_clips(trained, tmp_path):
 def test_the_session_shows_what_was_trained(trained, tmp_path):
     session = Session(settings=Settings(tmp_path / "settings.json"), is_preloading=False)
     try:
-        session.dispatch(c.OpenProject(trained))
+        session.dispatch(OpenProject(trained))
         poll_until(session, lambda: session.capture is not None)
         assert [state.state for state in session.clip_states] == ["trained", "trained", "untrained"]
-        session.dispatch(c.SetFrame(13))
+        session.dispatch(SetFrame(13))
         poll_until(session, lambda: _shows(session, 13))
         gaussians, anchors = session.shown_gaussians(), session.shown_anchors()
         assert gaussians is not None
@@ -165,7 +166,7 @@ def test_the_session_shows_what_was_trained(trained, tmp_path):
         assert session.capture is not None
         assert np.isfinite(gaussians.means).all()
         assert len(anchors.inherited_positions) == len(np.unique(anchors.inherited_positions, axis=0)) > 0
-        session.dispatch(c.LookThrough(0))
+        session.dispatch(LookThrough(0))
         poll_until(session, lambda: (p := session.request_render(80, 60)) is not None and not p.is_stale)
         shown = session.request_render(80, 60)
         assert shown is not None
@@ -175,7 +176,7 @@ def test_the_session_shows_what_was_trained(trained, tmp_path):
         error = np.abs(picture.astype(float) - truth).mean()
         flipped = np.abs(picture[::-1].astype(float) - truth).mean()
         assert error < flipped  # the right way up, seen from the right place
-        session.dispatch(c.SetFrame(25))  # clip 2 is not trained: the cloud
+        session.dispatch(SetFrame(25))  # clip 2 is not trained: the cloud
         assert session.shown_gaussians() is None
         poll_until(session, lambda: (p := session.shown_points()) is not None and not p.is_hint)
     finally:

@@ -16,10 +16,22 @@ import pytest
 from app.background.jobs import Jobs
 from app.project.opening.opening import Opened, open_for_window
 from app.project.opening.opening_answers import default_answers
-from app.session import commands as c
+from app.session.commands import CloseQuestion
+from app.session.projects.project_commands import (
+    AskStartOver,
+    ForgetRecent,
+    NewProject,
+    OpenCapture,
+    OpenProject,
+    SetProjectsFolder,
+    StartOver,
+)
+from app.session.projects.setting_commands import SetClipLength, SetPreset
 from app.session.projects.settings import Settings
 from app.session.questions import ProjectQuestion, RetrainQuestion, StartOverQuestion
 from app.session.session import Session
+from app.session.showing.look_commands import SetFrame
+from app.session.training.train_commands import StopTraining, TrainClip, TrainNextClip
 from engine.capture.capture import open_capture
 from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.user_folders import data_dir
@@ -28,7 +40,7 @@ from tests.app.fakes import make_fake, make_slow, write_capture
 
 
 def train_next(session: Session) -> None:
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.state in ("idle", "failed"), what="the end of the training")
 
 
@@ -42,7 +54,7 @@ def open_session(tmp_path: Path):
         session = Session(launch=partial(inline, make_training=make_fake), settings=settings, is_preloading=False)
         made.append(session)
         if path is not None:
-            session.dispatch(c.OpenCapture(path))
+            session.dispatch(OpenCapture(path))
             poll_until(session, lambda: session.capture is not None or session.question is not None, what="opening")
         return session
 
@@ -53,14 +65,14 @@ def open_session(tmp_path: Path):
 
 def test_recent_lists_the_project_and_how_far_it_is_trained(open_session, make_session, capture_folder, tmp_path):
     session = make_session(name="own")
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     train_next(session)
     assert (session.project_status.name, session.project_status.trained_text) == ("own", "1 of 2 clips trained")
     session.close()
     again = open_session(None)
     (entry,) = again.recent.entries
     assert (entry.folder, entry.n_trained, entry.n_clips) == (tmp_path / "own", 1, 2)
-    again.dispatch(c.OpenProject(entry.folder))
+    again.dispatch(OpenProject(entry.folder))
     poll_until(again, lambda: again.capture is not None, what="the project")
     assert [state.state for state in again.clip_states] == ["trained", "untrained"]
 
@@ -74,8 +86,8 @@ def test_of_two_captures_the_one_asked_for_last_is_opened_however_long_the_other
         return open_for_window(path, **options)
 
     session = Session(settings=Settings(tmp_path / "settings.json"), opener=opener, is_preloading=False)
-    session.dispatch(c.OpenCapture(first))
-    session.dispatch(c.OpenCapture(second))
+    session.dispatch(OpenCapture(first))
+    session.dispatch(OpenCapture(second))
     poll_until(session, lambda: session.capture is not None, what="the second capture")
     go_on.set()
     poll_until(session, lambda: not session.jobs, what="the first capture")
@@ -96,7 +108,7 @@ def test_what_is_said_of_frames_of_another_shape_is_kept_in_the_capture(open_ses
     before = open_capture(folder)
     answers = replace(default_answers(before), fit="cropped_start")
     session = open_session(None)
-    session.dispatch(c.OpenCapture(folder, is_new_project=True, answers=answers))
+    session.dispatch(OpenCapture(folder, is_new_project=True, answers=answers))
     poll_until(session, lambda: session.capture is not None, what="the capture")
     assert json.loads((folder / "capture.json").read_text())["fit"] == "cropped_start"
     after = open_capture(folder)
@@ -113,7 +125,7 @@ def test_frames_of_quite_another_shape_are_asked_about_before_anything_is_made_o
         row["height"] += 6
     write_capture_json(folder, document)
     session = open_session(None)
-    session.dispatch(c.OpenCapture(folder))  # as from the command line
+    session.dispatch(OpenCapture(folder))  # as from the command line
     poll_until(session, lambda: session.opening.page is not None, what="the question")
     page = session.opening.page
     assert page is not None
@@ -121,14 +133,14 @@ def test_frames_of_quite_another_shape_are_asked_about_before_anything_is_made_o
     assert "scaled or cropped" in session.opening.problem(page.answers)
     answers = replace(page.answers, fit="scaled")
     assert session.opening.problem(answers) == ""
-    session.dispatch(c.OpenCapture(folder, is_new_project=True, answers=answers))
+    session.dispatch(OpenCapture(folder, is_new_project=True, answers=answers))
     poll_until(session, lambda: session.capture is not None, what="the capture")
     assert json.loads((folder / "capture.json").read_text())["fit"] == "scaled"
 
 
 def test_a_capture_that_has_a_project_offers_it_and_a_new_one(open_session, make_session, capture_folder, tmp_path):
     session = make_session(name="own")
-    session.dispatch(c.SetPreset("toy"))
+    session.dispatch(SetPreset("toy"))
     train_next(session)
     session.close()
     again = open_session(capture_folder)
@@ -137,39 +149,39 @@ def test_a_capture_that_has_a_project_offers_it_and_a_new_one(open_session, make
     assert (choice.folder, choice.preset, choice.trained_text) == (tmp_path / "own", "toy", "1 of 1 clips trained")
     assert choice.opened
     assert not (data_dir() / "projects").exists()
-    again.dispatch(c.OpenProject(choice.folder))
+    again.dispatch(OpenProject(choice.folder))
     poll_until(again, lambda: again.capture is not None, what="the project")
-    again.dispatch(c.NewProject())
+    again.dispatch(NewProject())
     poll_until(again, lambda: again.opening.page is not None, what="the dialog")
     page = again.opening.page
     assert page.folder.parent == data_dir() / "projects"
-    again.dispatch(c.OpenCapture(page.report.path, is_new_project=True, answers=page.answers))
+    again.dispatch(OpenCapture(page.report.path, is_new_project=True, answers=page.answers))
     poll_until(again, lambda: again.project.folder == page.folder, what="the new project")
     assert len(again.recent.entries) == 2
 
 
 def test_projects_go_where_the_user_wants_them(open_session, capture_folder, tmp_path):
     session = open_session(None)
-    session.dispatch(c.SetProjectsFolder(str(tmp_path / "mine")))
-    session.dispatch(c.OpenCapture(capture_folder))
+    session.dispatch(SetProjectsFolder(str(tmp_path / "mine")))
+    session.dispatch(OpenCapture(capture_folder))
     poll_until(session, lambda: session.capture is not None, what="the project")
     assert session.project.folder.parent == tmp_path / "mine"
 
 
 def test_settings_change_while_no_clip_is_finished_and_say_what_goes(make_session):
     session = make_session(make_training=make_slow)
-    session.dispatch(c.SetPreset("toy"))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(SetPreset("toy"))
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.step >= 2, what="steps")
-    session.dispatch(c.SetPreset("small"))
+    session.dispatch(SetPreset("small"))
     assert "Stop the training first." in session.notices[-1].hint
-    session.dispatch(c.StopTraining())
+    session.dispatch(StopTraining())
     poll_until(session, lambda: session.training.state == "idle", what="the end")
     poll_until(session, lambda: session.plan is not None, what="the plan")
     assert session.plan.can_edit
     assert session.plan.discards.startswith("the progress of clip 0 (step ")
     assert session.project.checkpoint_path(0).is_file()
-    session.dispatch(c.SetPreset("small"))
+    session.dispatch(SetPreset("small"))
     assert session.project.settings.overrides == {}
     assert session.notices[-1].detail.startswith("The progress of clip 0 (step ")
     assert not session.project.checkpoint_path(0).exists()
@@ -178,17 +190,17 @@ def test_settings_change_while_no_clip_is_finished_and_say_what_goes(make_sessio
 
 def test_starting_over_says_what_it_costs_and_frees_the_settings(make_session):
     session = make_session()
-    session.dispatch(c.SetPreset("toy"))
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetPreset("toy"))
+    session.dispatch(SetClipLength(3))
     for _ in range(2):
         train_next(session)
-    session.dispatch(c.AskStartOver())
+    session.dispatch(AskStartOver())
     poll_until(session, lambda: isinstance(session.question, StartOverQuestion), what="the question")
     words = session.question.discards
     assert re.fullmatch(r"2 trained clips \(\d+:\d\d of training\), \d+(\.\d)? [kM]B", words)
     assert (session.question.preset, "paper" in session.question.presets) == ("toy", True)
     folder = session.project.folder
-    session.dispatch(c.StartOver("medium"))
+    session.dispatch(StartOver("medium"))
     assert session.question.is_working
     poll_until(session, lambda: session.question is None, what="the end")
     assert [state.state for state in session.clip_states] == ["untrained", "untrained"]
@@ -209,7 +221,7 @@ def test_of_several_projects_of_a_capture_the_user_chooses(open_session, make_se
     folders = [Path(choice.project) for choice in session.question.choices]
     assert len(folders) == 2
     assert tmp_path / "own" in folders
-    session.dispatch(c.OpenCapture(capture_folder, is_new_project=True))
+    session.dispatch(OpenCapture(capture_folder, is_new_project=True))
     assert session.question is None
     poll_until(session, lambda: session.capture is not None, what="the new project")
     assert session.project.folder not in folders
@@ -221,16 +233,16 @@ def test_what_is_gone_is_known_and_can_be_removed(open_session, make_session, tm
     (tmp_path / "own" / "project.json").unlink()
     session = open_session(None)
     poll_until(session, lambda: session.recent.missing == {tmp_path / "own"}, what="a look at the disk")
-    session.dispatch(c.ForgetRecent(tmp_path / "own"))
+    session.dispatch(ForgetRecent(tmp_path / "own"))
     assert Settings(tmp_path / "settings.json").recent == []
 
 
 def test_training_a_finished_clip_again_is_asked_first(make_session):
     session = make_session()
-    session.dispatch(c.SetClipLength(2))
+    session.dispatch(SetClipLength(2))
     for _ in range(3):
         train_next(session)
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(TrainClip(0))
     question = session.question
     assert isinstance(question, RetrainQuestion)
     assert session.training.state == "idle"
@@ -238,15 +250,15 @@ def test_training_a_finished_clip_again_is_asked_first(make_session):
     assert question.held_out_psnr == session.clip_states[0].held_out_psnr
     assert question.seconds is not None
     assert question.outdated_seconds is not None
-    session.dispatch(c.CloseQuestion())
+    session.dispatch(CloseQuestion())
     assert session.question is None
-    session.dispatch(c.TrainClip(0, is_confirmed=True))
+    session.dispatch(TrainClip(0, is_confirmed=True))
     assert session.training.state != "idle"
 
 
 def test_a_damaged_clip_is_shown_as_such_and_only_trained_again_when_confirmed(make_session):
     session = make_session(name="own")
-    session.dispatch(c.SetClipLength(2))
+    session.dispatch(SetClipLength(2))
     for _ in range(2):
         train_next(session)
     path = session.project.clip_path(1)
@@ -262,15 +274,15 @@ def test_a_damaged_clip_is_shown_as_such_and_only_trained_again_when_confirmed(m
     train_next(session)
     assert session.notices[-1].title == "No clip can be trained next"
     assert path.read_bytes() == damaged
-    session.dispatch(c.TrainClip(1))
+    session.dispatch(TrainClip(1))
     assert session.question.is_damaged
-    session.dispatch(c.TrainClip(1, is_confirmed=True))
+    session.dispatch(TrainClip(1, is_confirmed=True))
     poll_until(session, lambda: session.clip_states[1].state == "trained", what="the clip")
 
 
 def test_a_clip_whose_arrays_turn_out_to_be_damaged_is_shown_as_such(make_session):
     session = make_session(name="own")
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     for _ in range(2):
         train_next(session)
     path = session.project.clip_path(1)
@@ -280,7 +292,7 @@ def test_a_clip_whose_arrays_turn_out_to_be_damaged_is_shown_as_such(make_sessio
     path.write_bytes(bytes(data))
     session = make_session(name="own")
     assert [state.state for state in session.clip_states] == ["trained", "trained"]
-    session.dispatch(c.SetFrame(4))
+    session.dispatch(SetFrame(4))
 
     def is_found() -> bool:
         session.shown_gaussians()

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from app.session import commands as c
+from app.session.showing.look_commands import SetFrame
+from app.session.training.train_commands import PauseTraining, TrainNextClip
 from app.training.process import ProcessWorker
 from app.training.service import TrainingService
 from app.training.worker.worker import n_training_threads
@@ -30,7 +31,7 @@ def launch(make_training):
 
 def test_a_process_trains_a_clip(make_session):
     session = make_session(launch=launch(make_fake))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     assert session.training.state == "starting"
     poll_until(session, lambda: session.training.state in ("idle", "failed"))
     assert session.clip_states[0].state == "trained", list(session.notices)
@@ -44,7 +45,7 @@ def test_a_log_that_is_a_pipe_or_a_link_holds_up_no_worker(make_session, tmp_pat
     log.parent.mkdir()
     for make in (os.mkfifo, lambda path: path.symlink_to(tmp_path / "profile")):
         make(log)
-        session.dispatch(c.TrainNextClip())
+        session.dispatch(TrainNextClip())
         poll_until(session, lambda: session.training.state in ("idle", "failed"))
         assert session.training.state == "idle", list(session.notices)
         assert "The log of the training could not be written" in [notice.title for notice in session.notices]
@@ -57,7 +58,7 @@ def test_a_worker_chooses_the_folder_of_kernels_and_how_long_threads_spin(make_s
     for name in ("NUMBA_CACHE_DIR", "GOMP_SPINCOUNT"):
         monkeypatch.delenv(name, raising=False)
     session = make_session(launch=launch(make_telling))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.state in ("idle", "failed"))
     found = json.loads((session.project.folder / "environment.json").read_text())
     assert found["NUMBA_CACHE_DIR"] == str(kernel_folder())
@@ -66,9 +67,9 @@ def test_a_worker_chooses_the_folder_of_kernels_and_how_long_threads_spin(make_s
 
 def test_a_killed_worker_is_told_and_training_goes_on_from_what_was_kept(make_session):
     session = make_session(launch=launch(make_slow))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.step >= 1)
-    session.dispatch(c.PauseTraining())  # writes a checkpoint
+    session.dispatch(PauseTraining())  # writes a checkpoint
     kept = session.project.checkpoint_path(0)
     poll_until(session, kept.is_file, what="the checkpoint")
     step = read_clip_state(kept).header.step
@@ -77,17 +78,17 @@ def test_a_killed_worker_is_told_and_training_goes_on_from_what_was_kept(make_se
     assert "signal 9" in session.notices[-1].detail
     assert session.clip_states[0].state == "failed"
     assert session.training.can_train_next
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.state == "running")
     assert session.training.step >= step
 
 
 def test_a_worker_that_dies_while_starting_is_told(make_session):
     session = make_session(launch=launch(make_crashing))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.state == "failed")
     assert session.notices[-1].title == "The training process ended unexpectedly"
-    session.dispatch(c.SetFrame(2))  # the session goes on
+    session.dispatch(SetFrame(2))  # the session goes on
     assert session.timeline.frame_index == 2
 
 
@@ -95,7 +96,7 @@ def test_closing_ends_the_process_and_keeps_what_it_learned(make_session, monkey
     # on a busy machine, keeping takes longer than the window waits
     monkeypatch.setitem(TrainingService.close.__kwdefaults__, "timeout_s", DEADLINE_S)
     session = make_session(launch=launch(make_slow))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.step >= 1)
     child = session.live_training.service.leading.worker.child
     project = session.project

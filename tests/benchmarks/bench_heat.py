@@ -16,9 +16,10 @@ import time
 from pathlib import Path
 
 from app.residuals.heat_map import HEAT_KINDS
-from app.session.commands import LookThrough, OpenProject, SetFrame
+from app.session.projects.project_commands import OpenProject
 from app.session.projects.settings import Settings
 from app.session.session import Session
+from app.session.showing.look_commands import LookThrough, SetFrame
 from engine.kernels.cache import use_kernel_cache
 
 POLL_S = 0.001

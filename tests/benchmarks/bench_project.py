@@ -74,9 +74,12 @@ class Calls:
 
 def measure(folder: Path, n_clips: int) -> tuple[float, Calls]:
     """Open the project and use it. Returns seconds until all states are there, and the calls."""
-    from app.session import commands
+    from app.session.commands import CloseQuestion
+    from app.session.projects.project_commands import OpenProject
     from app.session.projects.settings import Settings
     from app.session.session import Session
+    from app.session.showing.look_commands import SetFrame
+    from app.session.training.train_commands import TrainClip
     from ui.main import SWITCH_INTERVAL_S
     from ui.shell.window import StudioWindow
 
@@ -91,7 +94,7 @@ def measure(folder: Path, n_clips: int) -> tuple[float, Calls]:
             calls.time(f"{what}: frame", studio.draw)
 
     started_s = time.perf_counter()
-    session.dispatch(commands.OpenProject(folder))
+    session.dispatch(OpenProject(folder))
     while not session.clip_states:
         turn("opening")
         time.sleep(0.002)
@@ -101,15 +104,15 @@ def measure(folder: Path, n_clips: int) -> tuple[float, Calls]:
         studio.frame.request_redraw()
         turn("standing")
     for clip_index in range(0, n_clips, max(n_clips // 40, 1)):
-        calls.time("scrubbing: command", partial(session.dispatch, commands.SetFrame(clip_index)))
+        calls.time("scrubbing: command", partial(session.dispatch, SetFrame(clip_index)))
         studio.frame.request_redraw()
         turn("scrubbing")
-    calls.time("asking before training again", lambda: session.dispatch(commands.TrainClip(0)))
-    session.dispatch(commands.CloseQuestion())
+    calls.time("asking before training again", lambda: session.dispatch(TrainClip(0)))
+    session.dispatch(CloseQuestion())
     service = session.live_training.service
     assert service is not None
     calls.time("the end of a training: states", lambda: service.catalog.update(n_clips // 2))
-    calls.time("the end of a training: refresh", lambda: session.dispatch(commands.SetFrame(0)))
+    calls.time("the end of a training: refresh", lambda: session.dispatch(SetFrame(0)))
     studio.close()
     return open_s, calls
 

@@ -24,7 +24,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 pyglet.options.headless = True
 pyglet.options.shadow_window = False
 
-from app.session.commands import OpenProject  # noqa: E402
 from app.session.editing.finding import Ground, found_by  # noqa: E402
 from app.session.editing.selection_commands import (  # noqa: E402
     Brush,
@@ -38,6 +37,7 @@ from app.session.editing.selection_commands import (  # noqa: E402
     SelectionCommand,
     SelectVolume,
 )
+from app.session.projects.project_commands import OpenProject  # noqa: E402# noqa: E402
 from app.session.session import Session  # noqa: E402
 from engine.editing.edit import Sphere  # noqa: E402
 from engine.editing.selection.seen_from import SeenFrom  # noqa: E402

@@ -67,7 +67,7 @@ def edit(folder: Path, seed: int) -> None:
     rng = random.Random(seed)
     project = open_project(folder)
     kept = KeptDocument(guard=lambda before, after: None, on_change=lambda before, after: None)
-    kept.open(project)
+    kept.hold(project)
     for number, (event, history) in enumerate(random_events(random.Random(seed), N_STEPS, project.history), start=1):
         print(f"step {number}", flush=True)
         kept._happen(event)

@@ -26,8 +26,17 @@ from typing import Any
 
 from app.document.changes.edit_changes import MAX_EDITS
 from app.project.project import Project
-from app.session import commands
-from app.session.editing.edit_commands import AddEdit, MoveEdit, PutMarker, RemoveEdit, RemoveMarker, ToggleEdit
+from app.session.commands import DismissNotice
+from app.session.editing.edit_commands import (
+    AddEdit,
+    MoveEdit,
+    PutMarker,
+    Redo,
+    RemoveEdit,
+    RemoveMarker,
+    ToggleEdit,
+    Undo,
+)
 from app.session.editing.selection_commands import (
     ClearSelection,
     InvertSelection,
@@ -35,8 +44,12 @@ from app.session.editing.selection_commands import (
     SelectByAttribute,
     SelectVolume,
 )
+from app.session.export_commands import AskExport, ClearExports, StartExport
+from app.session.projects.project_commands import OpenProject
 from app.session.projects.settings import Settings
 from app.session.session import Session
+from app.session.showing.look_commands import LookThrough, SetFrame, SetMode, ShowHeat, TogglePlay
+from app.session.training.train_commands import TrainClip
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
 from app.training.service import Launch
@@ -147,7 +160,7 @@ class Soak:
         if n % ROUNDS_OF_AN_EXPORT == ROUNDS_OF_AN_EXPORT - 1:
             self._export(n)
         self._open(self._projects[0])
-        self._do(commands.SetFrame(0))
+        self._do(SetFrame(0))
         self._draw(10)
         self._wait("rest", lambda session: not session.jobs and session.training.state in ("idle", "failed"))
         held = held_now()
@@ -157,7 +170,7 @@ class Soak:
     # ---- pieces of a round
 
     def _open(self, project: Path) -> None:
-        self._do(commands.OpenProject(project))
+        self._do(OpenProject(project))
         self._wait(
             f"the project {project.name}",
             lambda session: session.project is not None and session.project.folder.resolve() == project.resolve(),
@@ -165,27 +178,27 @@ class Soak:
 
     def _train(self) -> None:
         clip_index = self._random.randrange(1, len(self._session.clips))
-        self._do(commands.TrainClip(clip_index, is_confirmed=True))
+        self._do(TrainClip(clip_index, is_confirmed=True))
         self._wait("the training", lambda session: session.training.state in ("idle", "failed"))
         assert self._session.clip_states[clip_index].state == "trained", self._session.clip_states
 
     def _scrub(self) -> None:
         session = self._session
         for _ in range(self._n_seeks):
-            self._do(commands.SetFrame(self._random.randrange(session.timeline.n_frames)))
+            self._do(SetFrame(self._random.randrange(session.timeline.n_frames)))
             self._draw(1)
             session.request_render(320, 240)
         for mode in ("anchors", "depth", "color"):
-            self._do(commands.SetMode(mode))
+            self._do(SetMode(mode))
             self._draw(3)
-        self._do(commands.LookThrough(0))
+        self._do(LookThrough(0))
         for heat in ("error", ""):
-            self._do(commands.ShowHeat(heat))
+            self._do(ShowHeat(heat))
             self._draw(5)
-        self._do(commands.LookThrough(None))
-        self._do(commands.TogglePlay())
+        self._do(LookThrough(None))
+        self._do(TogglePlay())
         self._draw(20)
-        self._do(commands.TogglePlay())
+        self._do(TogglePlay())
         self._wait("the picture", lambda session: session.request_render(320, 240) is not None)
 
     def _edit(self) -> None:
@@ -211,10 +224,10 @@ class Soak:
             self._draw(2)
         kept = document.content
         for _ in range(6):
-            self._do(commands.Undo())
+            self._do(Undo())
             self._draw(1)
         for _ in range(6):
-            self._do(commands.Redo())
+            self._do(Redo())
         assert document.content == kept
         for edit_id in added:
             self._do(RemoveEdit(edit_id))
@@ -228,13 +241,13 @@ class Soak:
 
     def _export(self, number: int) -> None:
         session, out = self._session, self._work / f"export-{number}"
-        self._do(commands.AskExport())
+        self._do(AskExport())
         page = session.exporting.page
         assert page is not None, list(session.notices)
-        self._do(commands.StartExport(page.choices.changed(kind="gaussians", frames="frame", out=str(out))))
+        self._do(StartExport(page.choices.changed(kind="gaussians", frames="frame", out=str(out))))
         self._wait("the export", lambda session: not session.exporting.is_busy)
         assert out.is_dir(), session.exporting.statuses
-        self._do(commands.ClearExports())
+        self._do(ClearExports())
         shutil.rmtree(out)
 
     # ---- driving
@@ -244,7 +257,7 @@ class Soak:
         errors = [notice for notice in self._session.notices if notice.kind == "error"]
         assert not errors, errors
         while len(list(self._session.notices)):
-            self._session.dispatch(commands.DismissNotice(0))
+            self._session.dispatch(DismissNotice(0))
 
     def _draw(self, n_frames: int) -> None:
         for _ in range(n_frames):

@@ -33,14 +33,16 @@ from app.project.opening.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
-from app.session import commands
 from app.session.captures.calibration_page import CalibrationPage
+from app.session.captures.capture_commands import LookAtVideos
 from app.session.captures.doctor_status import DoctorStatus
 from app.session.captures.synchronisation_page import SynchronisationPage
+from app.session.commands import CloseQuestion, Command, DismissNotice
 from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import changed, edits_status
+from app.session.editing.mark_commands import MarkRegion, RemoveRegion
 from app.session.editing.selection_status import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
@@ -48,7 +50,24 @@ from app.session.mending.mend_page import MendPage
 from app.session.notices import Notices
 from app.session.paths import path_commands
 from app.session.paths.path_edits import edited
+from app.session.projects.project_commands import OpenCapture, OpenProject
 from app.session.questions import OpeningPage, Question, RetrainQuestion
+from app.session.showing.look_commands import (
+    ActivateView,
+    FollowTraining,
+    HomeView,
+    LookThrough,
+    SetCompare,
+    SetCompareWith,
+    SetContent,
+    SetFrame,
+    SetMode,
+    ShowHeat,
+    ShowViews,
+    ToggleOverlay,
+    TogglePlay,
+)
+from app.session.training.train_commands import TrainClip
 from app.status import (
     CELL_RANGES,
     ClipStatus,
@@ -201,7 +220,7 @@ class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
     def __init__(self, *, has_capture: bool = True, seed: int = 0) -> None:
-        self.commands: list[commands.Command] = []
+        self.commands: list[Command] = []
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
         self.recent = FakeRecent(
@@ -361,44 +380,44 @@ class FakeSession:
         self.edits = EditsStatus(can_edit=True)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips trained from now on.")
 
-    def dispatch(self, command: commands.Command) -> None:
+    def dispatch(self, command: Command) -> None:
         """Record the command; carry out what needs no worker."""
         self.commands.append(command)
         match command:
-            case commands.OpenCapture(path=path):
+            case OpenCapture(path=path):
                 self.question = self.opening.page = self.opening.refused = None
                 self.calibrating.page = self.synchronising.page = None
                 self._open(replace(FakeCapture(make_rig()), path=Path(path)))
-            case commands.SetFrame():
+            case SetFrame():
                 self.timeline.seek(command.frame_index)
-            case commands.TogglePlay():
+            case TogglePlay():
                 self.timeline.toggle_play()
-            case commands.FollowTraining(is_on=is_on):
+            case FollowTraining(is_on=is_on):
                 self.timeline.is_following = is_on
-            case commands.LookThrough():
+            case LookThrough():
                 self.view.look(command.camera_index)
-            case commands.SetCompare(mode=mode):
+            case SetCompare(mode=mode):
                 self.overlays.compare = mode
-            case commands.ToggleOverlay(name=name):
+            case ToggleOverlay(name=name):
                 setattr(self.overlays, name, not getattr(self.overlays, name))
-            case commands.SetCompareWith(other=other):
+            case SetCompareWith(other=other):
                 self.overlays.compare_with = other
-            case commands.SetMode(mode=mode):
+            case SetMode(mode=mode):
                 self.overlays.mode = mode
-            case commands.SetContent(content=content):
+            case SetContent(content=content):
                 self.overlays.content = content
-            case commands.ShowHeat(kind=kind):
+            case ShowHeat(kind=kind):
                 self.overlays.heat = kind
-            case commands.HomeView():
+            case HomeView():
                 self.view.home()
-            case commands.ShowViews(n=n):
+            case ShowViews(n=n):
                 self.views.show(n)
-            case commands.ActivateView(index=index):
+            case ActivateView(index=index):
                 self.views.activate(index)
-            case commands.MarkRegion():
+            case MarkRegion():
                 sphere = sphere_region(command.treat, command.center, command.radius)
                 self._set_regions(after_marking(self.regions.regions, [sphere]))
-            case commands.RemoveRegion(index=index):
+            case RemoveRegion(index=index):
                 self._set_regions((*self.regions.regions[:index], *self.regions.regions[index + 1 :]))
             case path_commands.ChooseCameraKey(index=index):
                 self.paths = replace(self.paths, chosen_key=index)
@@ -415,15 +434,15 @@ class FakeSession:
                 self.content, self.edits = change.document, edits_status(change.document)
                 self.history = HistoryStatus(undo=change.name, past=(*self.history.past, change.name))
                 self.timeline.markers = Markers(change.document.markers)
-            case commands.TrainClip(clip_index=clip_index, is_confirmed=False):
+            case TrainClip(clip_index=clip_index, is_confirmed=False):
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
-            case commands.CloseQuestion() | commands.OpenProject() | commands.TrainClip(is_confirmed=True):
+            case CloseQuestion() | OpenProject() | TrainClip(is_confirmed=True):
                 self.question = self.opening.page = self.opening.refused = None
                 self.calibrating.page = self.synchronising.page = None
-            case commands.LookAtVideos():
+            case LookAtVideos():
                 self.opening.page = self.opening.refused = None
-            case commands.DismissNotice():
+            case DismissNotice():
                 self.notices.dismiss(command.index)
 
     def _set_regions(self, regions: tuple[GateRegion, ...]) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.session.commands import SetFrame, Undo
+from app.session.editing.edit_commands import Undo
 from app.session.paths import path_commands as p
+from app.session.showing.look_commands import SetFrame
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.projection import to_camera, to_pixels
 from tests.ui.fake_session import FakeSession

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
-from app.session.commands import SetFrame, TogglePlay
+from app.session.showing.look_commands import SetFrame, TogglePlay
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot

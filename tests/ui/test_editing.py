@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
-from app.session import commands as c
 from app.session.editing.edit_commands import AddEdit
+from app.session.projects.project_commands import OpenCapture
 from app.session.session import Session
+from app.session.showing.look_commands import SetFrame
+from app.session.training.train_commands import TrainNextClip
 from engine.editing.actions import Delete, Hide, Transform
 from engine.editing.edit import Box, Edit, Scope, Sphere
 from engine.editing.selection.volumes import in_volume
@@ -31,10 +33,10 @@ def open_window(folder: Path, open_pilot: Callable[..., Pilot]) -> Pilot:
     """The project of a folder, trained if it is not, in a window with the panel Edits in front."""
     session = make_session(folder)
     capture = folder / "ring"
-    session.dispatch(c.OpenCapture(capture if capture.exists() else write_capture(capture)))
+    session.dispatch(OpenCapture(capture if capture.exists() else write_capture(capture)))
     poll(session, lambda: session.capture is not None)
     if session.clip_states[0].state != "trained":
-        session.dispatch(c.TrainNextClip())
+        session.dispatch(TrainNextClip())
         poll(session, lambda: session.clip_states[0].state == "trained")
     session.overlays.show_frusta = session.overlays.show_residual = False
     session.overlays.show_inherited = True
@@ -55,7 +57,7 @@ def window(tmp_path: Path, open_pilot: Callable[..., Pilot]) -> Iterator[Pilot]:
 def shown(pilot: Pilot, frame_index: int) -> np.ndarray:
     """Centres of the Gaussians that are shown at a frame, once they are. [N, 3]"""
     session: Session = pilot.session
-    session.dispatch(c.SetFrame(frame_index))
+    session.dispatch(SetFrame(frame_index))
     pilot.draw()
     viewport = pilot.studio.frame.viewport
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pyglet.window import key
 
-from app.session.commands import OpenProject
+from app.session.projects.project_commands import OpenProject
 from tests.app.residuals.conftest import make_project
 from tests.ui.pilot import CTRL, Pilot
 from tests.ui.real_session import draw_until, make_session, poll

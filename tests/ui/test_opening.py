@@ -15,16 +15,16 @@ from app.playback.modes.arrays import Picture
 from app.project.opening.capture_report import CaptureReport, RefusedFolder, ReportedCamera
 from app.project.opening.opening_answers import OpeningAnswers
 from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
-from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
-from app.session.commands import (
+from app.session.captures.capture_commands import (
     ApplyOffsets,
     CalibrateVideos,
-    CloseQuestion,
     KeepCalibration,
     LookAtVideos,
-    OpenCapture,
     StopCalibration,
 )
+from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
+from app.session.commands import CloseQuestion
+from app.session.projects.project_commands import OpenCapture
 from app.session.questions import OpeningPage
 from app.status import JobStatus, OpeningForecast
 from engine.calibration.options import CalibrationOptions, KnownDistance

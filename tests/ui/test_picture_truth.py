@@ -15,7 +15,10 @@ from pyglet.window import key
 import app.playback.ahead
 import app.playback.frame_decoder
 from app.playback.render import Picture, RenderRequest
-from app.session import commands as c
+from app.session.projects.project_commands import OpenCapture
+from app.session.projects.setting_commands import SetClipLength
+from app.session.showing.look_commands import LookThrough, SetCompare, SetFrame
+from app.session.training.train_commands import TrainClip
 from engine.clip_files.clip_state import ClipState
 from tests.app.fakes import N_ANCHORS, write_capture
 from tests.ui.pilot import Pilot
@@ -32,11 +35,11 @@ def trained(tmp_path: Path) -> tuple[Path, Path]:
     """A capture of two clips of three frames and its project, both clips trained."""
     capture, project = write_capture(tmp_path / "ring"), tmp_path / "project"
     session = make_session(tmp_path)
-    session.dispatch(c.OpenCapture(capture))
+    session.dispatch(OpenCapture(capture))
     poll(session, lambda: session.capture is not None)
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     for index in (0, 1):
-        session.dispatch(c.TrainClip(index))
+        session.dispatch(TrainClip(index))
     poll(session, lambda: [state.state for state in session.clip_states] == ["trained", "trained"])
     session.close()
     return capture, project
@@ -73,7 +76,7 @@ def window(
     """The trained project open in a window that shows frame 0 from the side."""
     session = make_session(tmp_path)
     pilot = open_pilot(session)
-    session.dispatch(c.OpenCapture(trained[0]))
+    session.dispatch(OpenCapture(trained[0]))
     draw_until(pilot, lambda: session.capture is not None, "the capture")
     yield pilot
     reader.may_go_on.set()
@@ -88,7 +91,7 @@ def picture(pilot: Pilot) -> np.ndarray:
 
 def show_frame(pilot: Pilot, frame_index: int) -> None:
     """Go there and wait until nothing is on its way."""
-    pilot.session.dispatch(c.SetFrame(frame_index))
+    pilot.session.dispatch(SetFrame(frame_index))
 
     def is_there() -> bool:
         return f"frame {frame_index}   " in hud(pilot).label and "viewport.busy" not in pilot.rects
@@ -146,12 +149,12 @@ def test_compared_pictures_of_different_frames_say_so(
 
     monkeypatch.setattr("ui.panels.picture.picture_pane.chip", note)
     show_frame(window, 0)
-    window.session.dispatch(c.LookThrough(1))
-    window.session.dispatch(c.SetCompare(mode))
+    window.session.dispatch(LookThrough(1))
+    window.session.dispatch(SetCompare(mode))
     show_frame(window, 0)
     draw_until(window, lambda: labels[-2:] == ["Captured, frame 0", "Rendered, frame 0"], "both of one frame")
     reader.may_go_on.clear()
-    window.session.dispatch(c.SetFrame(3))
+    window.session.dispatch(SetFrame(3))
     warned = ["Captured, frame 3 (not the same frame)", "Rendered, frame 0 (not the same frame)"]
     draw_until(window, lambda: labels[-2:] == warned, "the warning")
     reader.may_go_on.set()
@@ -210,7 +213,7 @@ def test_the_cloud_key_does_something_on_a_trained_clip_and_says_what(window: Pi
     window.draw(40)
     assert hud(window).rate == "", "a cloud does not change, so no rate of pictures is shown"
     window.key(key.SPACE)
-    window.session.dispatch(c.SetFrame(0))
+    window.session.dispatch(SetFrame(0))
     window.key(key._4)
     draw_until(window, lambda: window.studio.frame.viewport.scene.shows == RENDERED, "the picture again")
     assert hud(window).note == ""

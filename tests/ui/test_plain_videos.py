@@ -17,8 +17,8 @@ import pytest
 from pyglet.window import key
 
 from app.calibration.job import CalibrationRequest
-from app.session.commands import TrainNextClip
 from app.session.session import Session
+from app.session.training.train_commands import TrainNextClip
 from engine.assets import asset_path
 from engine.capture.capture import open_capture
 from engine.capture.frames import VideoFrames

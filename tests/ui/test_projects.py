@@ -12,19 +12,18 @@ from pyglet.window import key, mouse
 
 from app.playback.timeline import Timeline
 from app.project.recents import RecentProject
-from app.session.commands import (
-    CancelJob,
-    CloseQuestion,
+from app.session.commands import CancelJob, CloseQuestion
+from app.session.projects.project_commands import (
     ForgetRecent,
     LeaveTraining,
     NewProject,
     OpenCapture,
     OpenProject,
     StartOver,
-    TogglePlay,
-    TrainClip,
 )
 from app.session.questions import LeaveQuestion, ProjectQuestion, RetrainQuestion, StartOverQuestion
+from app.session.showing.look_commands import TogglePlay
+from app.session.training.train_commands import TrainClip
 from app.status import ClipStatus, JobStatus
 from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession

@@ -10,8 +10,10 @@ import pytest
 from pyglet.window import key
 
 from app.playback.views.scene_axes import rig_radius
-from app.session.commands import LookThrough, MarkRegion, Redo, RemoveRegion, Undo
 from app.session.edit_status import HistoryStatus
+from app.session.editing.edit_commands import Redo, Undo
+from app.session.editing.mark_commands import MarkRegion, RemoveRegion
+from app.session.showing.look_commands import LookThrough
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, SHIFT, Pilot

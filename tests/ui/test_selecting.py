@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
-from app.session import commands as c
+from app.session.projects.project_commands import OpenCapture
 from app.session.session import Session
+from app.session.showing.look_commands import ShowViews, ToggleOverlay
+from app.session.training.train_commands import TrainNextClip
 from engine.camera.rotations import matrices_of
 from engine.editing.edit import Box, Sphere
 from engine.editing.selection.volumes import in_volume
@@ -31,13 +33,13 @@ ALT = key.LALT
 def window(tmp_path: Path, open_pilot: Callable[..., Pilot]) -> Iterator[Pilot]:
     """A trained project in a window that shows frame 0, with the panel Selection in front and no marks."""
     session = make_session(tmp_path)
-    session.dispatch(c.OpenCapture(write_capture(tmp_path / "ring")))
+    session.dispatch(OpenCapture(write_capture(tmp_path / "ring")))
     poll(session, lambda: session.capture is not None)
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll(session, lambda: session.clip_states[0].state == "trained")
     for name in ("show_frusta", "show_inherited", "show_residual"):
         if getattr(session.overlays, name):
-            session.dispatch(c.ToggleOverlay(name))
+            session.dispatch(ToggleOverlay(name))
     pilot = open_pilot(session)
     pilot.studio.frame.ui.wanted_panel = SELECTION
 
@@ -193,7 +195,7 @@ def test_a_brush_selects_what_it_paints_over_and_brackets_change_its_size(window
 
 def place_of_an_anchor(pilot: Pilot) -> tuple[float, float]:
     """Where the mark of an anchor is seen; marks are shown from now on."""
-    pilot.session.dispatch(c.ToggleOverlay("show_inherited"))
+    pilot.session.dispatch(ToggleOverlay("show_inherited"))
     pilot.draw(3)
     x, y = pixels(pilot)[4]
     return float(x), float(y)
@@ -279,7 +281,7 @@ def test_all_none_invert_and_the_one_before_by_keyboard(window: Pilot) -> None:
 
 
 def test_of_two_views_each_selects_in_its_own_picture(window: Pilot) -> None:
-    window.session.dispatch(c.ShowViews(2))
+    window.session.dispatch(ShowViews(2))
     window.draw(6)
     views = window.session.views
     views.activate(1)

@@ -15,7 +15,7 @@ from pyglet.window import key
 
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
-from app.session.commands import SetClipLength
+from app.session.projects.setting_commands import SetClipLength
 from tests.app.fakes import write_capture
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from tests.ui.real_session import draw_until, make_session

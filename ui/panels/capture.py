@@ -7,8 +7,8 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import LookThrough
 from app.session.session_view import CaptureFacts, SessionView
+from app.session.showing.look_commands import LookThrough
 from engine.camera.rig import CameraRig
 from engine.text import one_line
 from ui.gl.image import ImageTexture

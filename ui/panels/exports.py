@@ -5,11 +5,11 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.export.queue.export_status import ExportStatus
-from app.session.commands import (
+from app.session.commands import Command
+from app.session.export_commands import (
     AskExport,
     CancelExport,
     ClearExports,
-    Command,
     MoveExport,
     RemoveExport,
     RetryExport,

@@ -6,7 +6,7 @@ import math
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import RemoveRegion
+from app.session.editing.mark_commands import RemoveRegion
 from app.session.session_view import SessionView
 from app.status import RegionsStatus
 from engine.gate.regions import GateRegion

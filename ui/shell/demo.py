@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 from app.cli.arguments import EXIT_BAD_INPUT
 from app.cli.terminal.progress import ProgressLine
 from app.document.storing.document_file import PROJECT_FILE
-from app.session.commands import OpenCapture, SetFrame, ToggleOverlay
+from app.session.projects.project_commands import OpenCapture
 from app.session.session import Session
+from app.session.showing.look_commands import SetFrame, ToggleOverlay
 
 if TYPE_CHECKING:
     from ui.shell.window import StudioWindow

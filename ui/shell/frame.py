@@ -13,10 +13,12 @@ import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
 from pyglet.window import BaseWindow
 
-from app.session.commands import Command, SetFrameMemory, SetProjectsFolder
+from app.session.commands import Command
 from app.session.projects.preferences import Preferences, PreferencesFile
+from app.session.projects.project_commands import OpenCapture, SetProjectsFolder
 from app.session.projects.window_memory import WindowMemory
 from app.session.session_view import WindowSession
+from app.session.showing.look_commands import SetFrameMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
@@ -343,7 +345,6 @@ class Frame:
 
     def open_path(self, path: Path) -> None:
         """Open a capture or project folder, or the folder of a file that was dropped."""
-        from app.session.commands import OpenCapture  # here to keep the module's imports about drawing
 
         folder = path if path.is_dir() or not path.exists() else path.parent
         self.dispatch(OpenCapture(folder, is_asking=True))

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import ForgetRecent, OpenCapture
+from app.session.projects.project_commands import ForgetRecent, OpenCapture
 from app.session.session_view import SessionView
 from engine.text import one_line
 from ui.panels.actions.action import Action

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.playback.views.scene_axes import rig_radius
-from app.session.commands import MarkRegion
+from app.session.editing.mark_commands import MarkRegion
 from engine.camera.rig import CameraRig
 from engine.gate.regions import GateRegion, sphere_region
 

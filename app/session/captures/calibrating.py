@@ -11,6 +11,14 @@ from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.calibration.job import CalibrationOutcome, CalibrationRequest, calibration_work, written
 from app.project.opening.capture_report import refusal_of
 from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
+from app.session.captures.capture_commands import (
+    CalibrateVideos,
+    CalibrationCommand,
+    KeepCalibration,
+    LookAtVideos,
+    StopCalibration,
+)
+from app.session.part import Part
 from app.status import JobStatus
 from engine.calibration.calibrated import Calibration
 from engine.calibration.videos import find_videos
@@ -18,7 +26,7 @@ from engine.capture.formats.capture_json import FILE
 from engine.errors import EngineError, PreparationError
 
 
-class Calibrating:
+class Calibrating(Part):
     """For one thread, which does not wait. Only the newest page is worked on.
 
     Attributes:
@@ -40,6 +48,18 @@ class Calibrating:
         """How far the calibration is; None while none runs."""
         is_running = self.page is not None and self.page.state == "running"
         return self._job.context.status if self._job is not None and is_running else None
+
+    def obey(self, command: CalibrationCommand) -> None:
+        """Carry out a command."""
+        match command:
+            case LookAtVideos(folder=folder):
+                self.look(folder)
+            case CalibrateVideos(request=request):
+                self.start(request)
+            case KeepCalibration():
+                self.keep()
+            case StopCalibration():
+                self.stop()
 
     def look(self, folder: Path) -> None:
         """Show a folder, and find out which cameras are in it."""

@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING
 from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.background.latest import LatestWorker
 from app.project.opening.opened_project import OpenedProject
+from app.session.captures.capture_commands import CorrectCapture, DoctorCommand, ExamineCapture, StopExamining
 from app.session.captures.doctor_status import DoctorStatus
-from app.session.commands import OpenCapture
 from app.session.examining_process import examine_apart
 from app.session.notices import Notices
+from app.session.part import Part
+from app.session.projects.project_commands import OpenCapture
 from app.session.questions import CorrectionQuestion
 from engine.capture.capture import Capture
 from engine.capture.writers.capture_json import Corrections, write_corrections
@@ -29,7 +31,7 @@ if TYPE_CHECKING:  # loading what examines takes a second: that is left to the t
 NAME = "Capture doctor"
 
 
-class CaptureDoctor:
+class CaptureDoctor(Part):
     """For one thread, which does not wait.
 
     Args:
@@ -91,6 +93,19 @@ class CaptureDoctor:
         """The program ends."""
         self.stop()
         self._quick.close()
+
+    def obey(self, command: DoctorCommand) -> CorrectionQuestion | None:
+        """Carry out a command. Returns what has to be answered first, if anything."""
+        match command:
+            case ExamineCapture():
+                self.examine()
+            case StopExamining():
+                self.stop()
+            case CorrectCapture(corrections=corrections, words=words, is_confirmed=False):
+                return self.question(corrections, words)
+            case CorrectCapture(corrections=corrections):
+                self.correct(corrections)
+        return None
 
     def examine(self) -> None:
         """Begin, unless it is at it already."""

@@ -9,7 +9,9 @@ from typing import Any
 
 from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.project.opening.opened_project import OpenedProject
+from app.session.captures.capture_commands import ApplyOffsets, SynchronisationCommand, SynchroniseCameras
 from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
+from app.session.part import Part
 from app.status import JobStatus
 from engine.capture.capture import Capture
 from engine.capture.writers.capture_json import write_corrections
@@ -21,7 +23,7 @@ from engine.synchronisation.estimating import synchronise
 from engine.synchronisation.synchronisation import Synchronisation
 
 
-class Synchronising:
+class Synchronising(Part):
     """For one thread, which does not wait.
 
     Attributes:
@@ -35,6 +37,7 @@ class Synchronising:
         self._jobs = Jobs()
         self._job: BackgroundJob | None = None
         self._capture: Capture | None = None
+        self._opened: OpenedProject | None = None
         self._found: Synchronisation | None = None
 
     @property
@@ -43,12 +46,33 @@ class Synchronising:
         is_running = self.page is not None and self.page.state == "running"
         return self._job.context.status if self._job is not None and is_running else None
 
-    def measure(self, opened: OpenedProject | None) -> None:
+    def obey(self, command: SynchronisationCommand) -> None:
+        """Carry out a command.
+
+        Raises:
+            ProjectError: No capture is open.
+        """
+        match command:
+            case SynchroniseCameras():
+                self.measure()
+            case ApplyOffsets(target=target):
+                self.apply(target)
+
+    def open(self, opened: OpenedProject) -> None:
+        """Another project is open."""
+        self._opened = opened
+
+    def reopen(self, opened: OpenedProject) -> None:
+        """The same project is open, with other settings."""
+        self.open(opened)
+
+    def measure(self) -> None:
         """Measure the whole capture that is open, whichever of its frames are worked on.
 
         Raises:
             ProjectError: None is open.
         """
+        opened = self._opened
         if opened is None:
             raise ProjectError("No capture is open.", hint="Open one first.")
         self.close_page()

@@ -6,11 +6,6 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class TrainStale:
-    """Train every clip again that is out of date, one after the other."""
-
-
-@dataclass(frozen=True, slots=True)
 class CompareVersion:
     """Put an earlier version of a clip beside what it is now, at the same frame and from the same view. The playhead
     goes into the clip where it is not in it. version: None ends that."""
@@ -75,5 +70,5 @@ class ApplyDeletions:
 
 CutCommand = SplitClip | MergeClips | SetReferenceClip
 """Commands that change the document and can be undone."""
-ClipCommand = TrainStale | CompareVersion | CutCommand | AskFreeSpace | FreeSpace | AskAboutDamage | ApplyDeletions
+ClipCommand = CutCommand | AskFreeSpace | FreeSpace | AskAboutDamage | ApplyDeletions
 """Commands on clips other than training them."""

@@ -8,6 +8,7 @@ from datetime import datetime
 from app.background.jobs import JobContext, Jobs
 from app.document.changes.clip_changes import with_merge, with_reference, with_split
 from app.document.project_document import ProjectDocument
+from app.project.allowed_changes import is_other_cut
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.clips.clip_versions import best_version, list_versions, why_not
 from app.project.disk.room import WHAT, make_room, room_of
@@ -25,7 +26,6 @@ from app.session.clips.clip_commands import (
     MergeClips,
     SetReferenceClip,
     SplitClip,
-    TrainStale,
 )
 from app.session.clips.clip_questions import ClipQuestion, CutQuestion, DamagedQuestion, RoomQuestion
 from app.session.clips.costs import expected_seconds
@@ -33,9 +33,9 @@ from app.session.clips.disk_reader import DiskReader
 from app.session.clips.permanence import Permanence
 from app.session.editing.kept_document import KeptDocument
 from app.session.notices import Notices
+from app.session.part import Part
 from app.session.training.live_training import LiveTraining
 from app.status import DependencyStatus
-from app.training.due import stale_clips
 from app.training.train_queue import needed_clips
 from engine.capture.clip import Clip
 from engine.errors import EngineError, ProjectError
@@ -45,7 +45,7 @@ MAX_KEPT = 64
 """Clips whose dependencies stay in memory."""
 
 
-class ClipWork:
+class ClipWork(Part):
     """For one thread, and nothing here waits.
 
     Args:
@@ -78,9 +78,18 @@ class ClipWork:
         self._dependencies_of = self._looked_for_damage = (0, 0)
         self._disk.note_change()
 
+    def reopen(self, opened: OpenedProject) -> None:
+        """The same project is open, with other settings."""
+        self.open(opened)
+
     def check_idle(self) -> None:
         """See that no clip is written again, so that clips may be cut otherwise. Raises ProjectError."""
         self._permanence.check_idle()
+
+    def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
+        """See that no clip is written again where clips are cut otherwise. Raises ProjectError."""
+        if is_other_cut(before.settings, after.settings):
+            self.check_idle()
 
     # ---------------------------------------------------------------- commands
 
@@ -95,8 +104,6 @@ class ClipWork:
             self._live.tell_nothing_open()
             return None
         match command:
-            case TrainStale():
-                service.enqueue_all(stale_clips(service.catalog))
             case SplitClip() | MergeClips() | SetReferenceClip():
                 return self._cut(command, opened, service.catalog)
             case AskFreeSpace(what=what, clip_index=clip_index):
@@ -176,6 +183,11 @@ class ClipWork:
         self._jobs.start("Freeing disk space", work, done, self._failed("The files could not be removed"))
 
     # ---------------------------------------------------------------- damage
+
+    def poll(self) -> bool:
+        """Ask about damage that was found."""
+        self.look_for_damage()
+        return False
 
     def look_for_damage(self) -> None:
         """Ask about a clip that was found to be damaged, once each."""

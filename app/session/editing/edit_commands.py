@@ -141,6 +141,26 @@ class SetScale:
 
 
 @dataclass(frozen=True, slots=True)
+class Undo:
+    """Take back the last change of the project's content since it was opened: of regions or of camera paths."""
+
+    @property
+    def n_steps(self) -> int:
+        """As of GoToStep."""
+        return -1
+
+
+@dataclass(frozen=True, slots=True)
+class Redo:
+    """Do again what Undo took back last; another change ends that."""
+
+    @property
+    def n_steps(self) -> int:
+        """As of GoToStep."""
+        return 1
+
+
+@dataclass(frozen=True, slots=True)
 class GoToStep:
     """Take back so many steps of the history, or do so many again where the number is positive."""
 
@@ -165,3 +185,6 @@ EditCommand = (
     | SetScaleByLength
 )
 """What changes edits, markers, labels and the world, and can be taken back."""
+
+HistoryCommand = Undo | Redo | GoToStep
+"""Commands that go along the history."""

@@ -7,14 +7,16 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 
 from app.background.latest import LatestWorker
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone, coalesced
 from app.document.project_document import ProjectDocument
+from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.edit_status import HistoryStatus
+from app.session.part import Part
 from engine.errors import DiskError, EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
@@ -43,7 +45,7 @@ class DocumentRequest:
     history: DocumentHistory = field(compare=False)
 
 
-class KeptDocument:
+class KeptDocument(Part):
     """For one thread, which waits for the disk a moment at most: a kill costs the step that is being made, and none
     before it.
 
@@ -86,7 +88,11 @@ class KeptDocument:
             self._told = history, HistoryStatus(history.undo_name, history.redo_name, past, future)
         return self._told[1]
 
-    def open(self, project: Project) -> None:
+    def open(self, opened: OpenedProject) -> None:
+        """Another project is open."""
+        self.hold(opened.project)
+
+    def hold(self, project: Project) -> None:
         """Take another project, with what it holds."""
         self.leave()
         self._project = project
@@ -220,6 +226,11 @@ class KeptDocument:
         self._project.history, self._awaited = newest[1], None
         self._on_change(before, self._project.document)
         return True
+
+    def take_failures(self) -> Iterable[tuple[str, Exception]]:
+        """See `take_error`."""
+        error = self.take_error()
+        return () if error is None else (("Edits could not be read or saved", error),)
 
     def settle(self) -> bool:
         """Wait until what was changed is on disk; longer than a moment only where the disk is at fault. Whether it is

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from app.background.latest import LatestWorker, nothing
 from app.playback.modes.arrays import GaussianArrays
+from app.project.opening.opened_project import OpenedProject
 from app.session.editing.attributes import ATTRIBUTES, AnchorValues, values_of
 from app.session.editing.finding import Ground, found_by, selection_after
 from app.session.editing.selection import NOTHING_SELECTED, Selection, selection_words
@@ -28,6 +29,7 @@ from app.session.editing.selection_commands import (
     SelectionCommand,
 )
 from app.session.editing.selection_status import SelectionStatus
+from app.session.part import Part
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import ValueSpread, spread_of
@@ -97,7 +99,7 @@ class _ShareWork:
         return selected_share(projected, gaussians.opacities, self.selected)
 
 
-class ProjectSelecting:
+class ProjectSelecting(Part):
     """The selection of the open project.
 
     Args:
@@ -125,8 +127,12 @@ class ProjectSelecting:
         )
         self._worker.active_lane = FIND
 
-    def open(self) -> None:
+    def open(self, opened: OpenedProject) -> None:
         """Another project is open: what was selected belongs to the one before."""
+        self.forget()
+
+    def forget(self) -> None:
+        """Nothing is selected, and nothing was."""
         self._worker.forget()
         self._waiting.clear()
         self._running, self._mask, self._before = None, None, None
@@ -217,6 +223,11 @@ class ProjectSelecting:
         """Why something could not be looked for, once."""
         failure = self._worker.take_error()
         return None if failure is None else failure[1]
+
+    def take_failures(self) -> Iterable[tuple[str, Exception]]:
+        """See `take_error`."""
+        error = self.take_error()
+        return () if error is None else (("The selection cannot be made", error),)
 
     @property
     def finished(self) -> object:

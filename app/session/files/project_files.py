@@ -12,7 +12,6 @@ from app.export.show_in_folder import show_in_folder
 from app.project.opening.opening import LostCapture, OtherCapture
 from app.project.project import Project
 from app.project.project_copy import copy_bytes, copy_project
-from app.session.commands import OpenCapture, OpenProject
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, FileCommand, SaveProjectAs, ShowProjectFolder
 from app.session.files.file_questions import (
     SAVING,
@@ -23,6 +22,7 @@ from app.session.files.file_questions import (
     SavingQuestion,
 )
 from app.session.notices import Notices
+from app.session.projects.project_commands import OpenCapture, OpenProject
 from engine.errors import ProjectError
 
 T = TypeVar("T")

@@ -7,9 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from app.background.jobs import BackgroundJob, JobContext, Jobs
+from app.document.project_document import ProjectDocument
 from app.mending.mend_project import MendOutcome, mend_work
 from app.mending.request import MendRequest
 from app.playback.timeline import Timeline
+from app.project.allowed_changes import is_other_cut
 from app.project.mends.in_place import as_cut_now, take_back, version_before
 from app.project.opening.opened_project import OpenedProject
 from app.session.clips.clip_commands import CompareVersion
@@ -24,12 +26,13 @@ from app.session.mending.mend_commands import (
     StopMend,
 )
 from app.session.mending.mend_page import MendPage
+from app.session.part import Part
 from app.session.training.live_training import LiveTraining
 from app.status import CAPTURED, JobStatus, Overlays
 from engine.errors import EngineError, ProjectError
 
 
-class ProjectMending:
+class ProjectMending(Part):
     """For one thread, which does not wait.
 
     Args:
@@ -58,6 +61,10 @@ class ProjectMending:
             self._close_page()  # what it asks about is numbered otherwise now
         self._opened = opened
 
+    def reopen(self, opened: OpenedProject) -> None:
+        """The same project is open, with other settings."""
+        self.open(opened)
+
     @property
     def progress(self) -> JobStatus | None:
         """How far the mending is; None while none runs."""
@@ -77,6 +84,11 @@ class ProjectMending:
         """
         if self.is_busy:
             raise ProjectError("Clips are being mended.", hint="Wait for it, or stop it first.")
+
+    def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
+        """See that nothing is mended where clips are cut otherwise. Raises ProjectError."""
+        if is_other_cut(before.settings, after.settings):
+            self.check_idle()
 
     def apply(self, command: MendCommand, timeline: Timeline) -> None:
         """Carry out a command.

@@ -12,15 +12,17 @@ from app.playback.timeline import Timeline
 from app.playback.views.orbit_view import OrbitView
 from app.playback.views.view_place import ViewPlace
 from app.playback.views.views import Views
+from app.project.opening.opened_project import OpenedProject
 from app.session.edit_status import PathsStatus
 from app.session.editing.kept_document import KeptDocument
+from app.session.part import Part
 from app.session.paths.path_commands import ChooseCameraKey, ChooseCameraPath, LookAlongPath, PathCommand
 from app.session.paths.path_edits import edited
 from engine.camera.camera_path import CameraPath
 from engine.errors import ProjectError
 
 
-class CameraPaths:
+class CameraPaths(Part):
     """For one thread. document: Holds and keeps the paths."""
 
     def __init__(self, document: KeptDocument) -> None:
@@ -116,6 +118,6 @@ class CameraPaths:
         self._led = (ViewPlace.of(view), due)
         return True
 
-    def leave(self) -> None:
+    def open(self, opened: OpenedProject) -> None:
         """Another project is opened: nothing is chosen in it yet."""
         self._chosen = self._key = self._along = self._led = None

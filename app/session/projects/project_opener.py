@@ -9,8 +9,8 @@ from app.background.jobs import JobContext, Jobs
 from app.project.opening.opening import Opened, open_for_window
 from app.project.projects_folder import projects_dir
 from app.project.recents import RecentProject
-from app.session.commands import OpenCapture, OpenProject
 from app.session.notices import Notice, Notices
+from app.session.projects.project_commands import OpenCapture, OpenProject
 from engine.capture.capture import Capture
 from engine.errors import CaptureError, EngineError
 from engine.text import printable

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from app.document.project_settings import ProjectSettings
-from app.session.commands import SetClipLength, SetHoldout, SetPreset, SettingCommand, SetTrainSetting
+from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SettingCommand, SetTrainSetting
 from engine.camera.rig import CameraRig
 from engine.training.presets import preset
 

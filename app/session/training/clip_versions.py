@@ -18,6 +18,7 @@ from app.project.clips.clip_versions import ClipVersion
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.notices import Notices
+from app.session.part import Part
 from app.status import VersionStatus
 from app.training.clip_run import ShownState
 from app.training.service import TrainingService
@@ -50,7 +51,7 @@ class FoundVersions:
     statuses: tuple[VersionStatus, ...] = ()
 
 
-class Versions:
+class Versions(Part):
     """For one thread, and nothing here waits.
 
     Args:
@@ -68,6 +69,10 @@ class Versions:
     def open(self, opened: OpenedProject) -> None:
         """Take up a project."""
         self._opened = opened
+
+    def reopen(self, opened: OpenedProject) -> None:
+        """The same project is open, with other settings."""
+        self.open(opened)
 
     def statuses(self, clip_index: int) -> tuple[VersionStatus, ...]:
         """Versions of a clip, the one set aside last first; none until they were read."""
@@ -170,6 +175,11 @@ class Versions:
                 self._notices.add_failure(title, error)
 
         self._jobs.start(name, work, done, failed)
+
+    @property
+    def finished(self) -> object:
+        """Differs when versions were read."""
+        return None if self.worker.newest is None else self.worker.newest[0]
 
     def close(self) -> None:
         """End the thread."""

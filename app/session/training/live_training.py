@@ -5,20 +5,26 @@ its curves, and the plan of the next clip.
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable
 
 from app.background.jobs import JobContext, Jobs
+from app.background.latest import nothing
+from app.document.project_document import ProjectDocument
 from app.plan.forecasts import Forecasts
 from app.playback.modes.arrays import AnchorArrays
+from app.project.allowed_changes import check_change, is_other_cut
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
+from app.project.project import Project
 from app.session.notices import Notices
+from app.session.part import Part
 from app.session.questions import RetrainQuestion, retrain_question
-from app.session.training.training_notices import tell
+from app.session.training.training_notices import tell, tell_dropped
 from app.status import ClipStatus, PlanStatus, QueueStatus, TrainingStatus
 from app.training.clip_run import ShownState
 from app.training.curves import CurveReader, Curves
-from app.training.messages import ENDINGS, Event, SnapshotWritten
+from app.training.messages import ENDINGS, SnapshotWritten, TrainJob
+from app.training.process import Worker
 from app.training.service import Launch, TrainingService
 from app.training.train_queue import OwnSettings
 from app.training.training_status import ClipStatuses, curves_of, training_status
@@ -26,11 +32,8 @@ from engine.errors import EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
 
-MAX_LISTED = 12
-"""Clips named in a notice."""
 
-
-class LiveTraining:
+class LiveTraining(Part):
     """The running training, its queue and what comes of it. For one thread, and nothing here waits.
 
     At most one snapshot of each running training is unread: its worker writes no other before that was given back.
@@ -38,21 +41,31 @@ class LiveTraining:
     Args:
         jobs, notices: Of the session.
         launch: Starts a worker.
+        settle: Waits a moment until what was edited is on disk, where workers read it.
         can_measure: Whether plans may time the machine.
         live_view: How often running clips are shown anew, one of app.training.messages.LIVE_VIEWS.
     """
 
     def __init__(
-        self, jobs: Jobs, notices: Notices, *, launch: Launch, can_measure: bool = True, live_view: str = "live"
+        self,
+        jobs: Jobs,
+        notices: Notices,
+        *,
+        launch: Launch,
+        settle: Callable[[], object] = nothing,
+        can_measure: bool = True,
+        live_view: str = "live",
     ) -> None:
         self.service: TrainingService | None = None
         self._opened: OpenedProject | None = None
         self._jobs, self._notices, self._launch, self._can_measure = jobs, notices, launch, can_measure
         self._forecasts, self._curves = Forecasts(), CurveReader()
-        self._live_view = live_view
+        self._live_view, self._settle = live_view, settle
         self._statuses: ClipStatuses | None = None
         self._unread: dict[int, SnapshotWritten] = {}
         self._live_counts: tuple[int, int, int] | None = None
+        self._catalog: ClipCatalog | None = None
+        self.n_ended = 0
         self._n_ending = 0
         self._ended_clip: int | None = None
 
@@ -60,13 +73,9 @@ class LiveTraining:
         """Start the thread of the curves now rather than with the first request."""
         self._curves.worker.start()
 
-    def open(self, opened: OpenedProject, catalog: ClipCatalog | None = None) -> None:
+    def open(self, opened: OpenedProject) -> None:
         """Take up a project, or the same one with other settings. What trains in another one is ended on a thread,
-        keeping progress.
-
-        Args:
-            catalog: What lies on disk of its clips; read here when None.
-        """
+        keeping progress."""
         service, before = self.service, self._opened
         if service is not None and before is not None:
             if before.generation == opened.generation:
@@ -80,12 +89,25 @@ class LiveTraining:
             opened.project,
             opened.clips,
             holdout=opened.holdout,
-            launch=self._launch,
-            catalog=catalog,
+            launch=self._launch_settled,
+            catalog=self._catalog,
             curves=self._curves,
         )
         self.service.live_view = self._live_view
         self._statuses = ClipStatuses(self.service)
+        self._catalog = None
+
+    def _launch_settled(self, job: TrainJob, project: Project) -> Worker:
+        self._settle()  # a region marked a moment ago is meant to count
+        return self._launch(job, project)
+
+    def take_catalog(self, catalog: ClipCatalog | None) -> None:
+        """The clips on disk of the project that is opened next; read then when None."""
+        self._catalog = catalog
+
+    def reopen(self, opened: OpenedProject) -> None:
+        """The same project is open, with other settings."""
+        self.open(opened)
 
     def _retire(self, service: TrainingService, opened: OpenedProject) -> None:
         self._forecasts.forget()
@@ -119,7 +141,7 @@ class LiveTraining:
         """Whether a clip of the open project trains."""
         return self.service is not None and self.service.is_busy
 
-    def check_idle(self) -> None:
+    def check_not_training(self) -> None:
         """See that nothing trains or waits to be trained, so that clips may be cut otherwise.
 
         Raises:
@@ -130,6 +152,13 @@ class LiveTraining:
                 "Clips are training or queued.",
                 hint="Stop training first; progress is kept.",
             )
+
+    def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
+        """See that no clip is finished with settings that change. Raises ProjectError."""
+        if is_other_cut(before.settings, after.settings):
+            self.check_not_training()
+        if self._opened is not None:
+            check_change(self._opened.project, self._opened.capture, before, after, is_training=self.is_busy)
 
     def is_finished(self, clip_index: int) -> bool:
         """Whether a finished clip, or a damaged one, would be replaced by training this one."""
@@ -192,15 +221,6 @@ class LiveTraining:
         if self.service is not None:
             self.service.set_live_view(mode)
 
-    def tell_dropped(self, dropped: Sequence[int]) -> None:
-        """Tell the user that clips left the queue, because what they need cannot come."""
-        if dropped:
-            listed = ", ".join(str(index) for index in dropped[:MAX_LISTED])
-            more = f" and {len(dropped) - MAX_LISTED} more" if len(dropped) > MAX_LISTED else ""
-            them = "Clip" if len(dropped) == 1 else "Clips"
-            verb = "left the queue: it needs" if len(dropped) == 1 else "left the queue: they need"
-            self._notices.add("warn", f"{them} {listed}{more} {verb} a clip that is not trained")
-
     def tell_nothing_open(self) -> None:
         """Tell the user that no capture is open."""
         self._notices.add("warn", "Nothing to train yet", "No capture is open.", "Open a capture folder.")
@@ -223,22 +243,23 @@ class LiveTraining:
 
     # ---------------------------------------------------------------- what the worker said
 
-    def poll(self) -> Sequence[Event]:
-        """Take in what the workers said, and tell the user what is news. Returns all of it, oldest first."""
+    def poll(self) -> bool:
+        """Take in what the workers said, and tell the user what is news. Whether there was anything."""
         events = [] if self.service is None else self.service.poll()
         for clip_index, event in events:
             tell(event, self._notices, clip_index)
             if isinstance(event, SnapshotWritten):
                 self._unread[clip_index] = event
             elif isinstance(event, ENDINGS):
+                self.n_ended += 1
                 self._unread.pop(clip_index, None)
                 if self._live_counts is not None and self._live_counts[0] == clip_index:
                     self._live_counts = None
                 if self.state_of(clip_index) is not None:
                     self._ended_clip = clip_index
         if events and self.service is not None:
-            self.tell_dropped(self.service.take_dropped())
-        return [event for _, event in events]
+            tell_dropped(self.service.take_dropped(), self._notices)
+        return bool(events)
 
     @property
     def newest_clip(self) -> int | None:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from app.psnr_words import psnr_words
 from app.session.notices import Notices
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WarningRaised, WorkerDied
+
+MAX_LISTED = 12
+"""Clips named in a notice."""
 
 
 def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
@@ -30,3 +35,16 @@ def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
             )
         case _:
             pass
+
+
+def tell_dropped(dropped: Sequence[int], notices: Notices) -> None:
+    """Tell the user that clips left the queue, because what they need cannot come."""
+    if dropped:
+        them, needs = ("Clip", "it needs") if len(dropped) == 1 else ("Clips", "they need")
+        notices.add("warn", f"{them} {listed(dropped)} left the queue: {needs} a clip that is not trained")
+
+
+def listed(clip_indices: Sequence[int]) -> str:
+    """Clips as a notice names them: the first of many, and how many more."""
+    more = f" and {len(clip_indices) - MAX_LISTED} more" if len(clip_indices) > MAX_LISTED else ""
+    return ", ".join(str(index) for index in clip_indices[:MAX_LISTED]) + more

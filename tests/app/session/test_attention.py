@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import pytest
 
-import app.session.recent_input
-from app.session.recent_input import LASTS_S, Attention
+import app.session.showing.recent_input
+from app.session.showing.recent_input import LASTS_S, Attention
 
 
 def test_attention_ends_a_while_after_the_last_change(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = [100.0]
-    monkeypatch.setattr(app.session.recent_input.time, "monotonic", lambda: now_s[0])
+    monkeypatch.setattr(app.session.showing.recent_input.time, "monotonic", lambda: now_s[0])
     attention = Attention()
     assert attention.follow("here")
     now_s[0] += 0.9 * LASTS_S

@@ -11,7 +11,8 @@ from PIL import Image
 
 from app.background.jobs import JobCancelled
 from app.calibration.job import CalibrationRequest
-from app.session import commands as c
+from app.session.captures.capture_commands import CalibrateVideos, KeepCalibration, LookAtVideos, StopCalibration
+from app.session.commands import CloseQuestion
 from engine.errors import PreparationError
 from tests.app.conftest import poll_until
 
@@ -45,7 +46,7 @@ def outcome(request, missing=()):
 
 
 def look(session, folder):
-    session.dispatch(c.LookAtVideos(folder))
+    session.dispatch(LookAtVideos(folder))
     assert session.calibrating.page.state == "looking"
     poll_until(session, lambda: session.calibrating.page.state == "asking")
     return session.calibrating.page
@@ -77,11 +78,11 @@ def test_a_calibration_ends_with_a_capture_to_open(make_session, videos, tmp_pat
     )
     session = make_session(is_open=False)
     look(session, videos)
-    session.dispatch(c.CalibrateVideos(CalibrationRequest(videos, tmp_path / "elsewhere")))
+    session.dispatch(CalibrateVideos(CalibrationRequest(videos, tmp_path / "elsewhere")))
     poll_until(session, lambda: session.calibrating.page.state == "done")
     result = session.calibrating.page.result
     assert (result.capture, result.needs_links, result.missing) == (tmp_path / "elsewhere", True, ("a 2",))
-    session.dispatch(c.CloseQuestion())
+    session.dispatch(CloseQuestion())
     assert session.calibrating.page is None
 
 
@@ -101,11 +102,11 @@ def test_one_that_has_failed_can_be_kept(make_session, videos, monkeypatch):
     monkeypatch.setattr("app.session.captures.calibrating.written", write)
     session = make_session(is_open=False)
     look(session, videos)
-    session.dispatch(c.CalibrateVideos(CalibrationRequest(videos)))
+    session.dispatch(CalibrateVideos(CalibrationRequest(videos)))
     poll_until(session, lambda: session.calibrating.page.state == "done")
     assert session.calibrating.page.result.failure == "Matches contradict 3 of 3 cameras."
-    session.dispatch(c.KeepCalibration())
-    session.dispatch(c.KeepCalibration())
+    session.dispatch(KeepCalibration())
+    session.dispatch(KeepCalibration())
     poll_until(session, lambda: not session.calibrating.page.result.failure)
     assert kept == [CalibrationRequest(videos, keeps_doubtful=True)]
 
@@ -124,10 +125,10 @@ def test_what_it_says_is_shown_and_stopping_leads_back_to_the_options(make_sessi
     monkeypatch.setattr("app.session.captures.calibrating.calibration_work", made_up(work))
     session = make_session(is_open=False)
     look(session, videos)
-    session.dispatch(c.CalibrateVideos(CalibrationRequest(videos)))
+    session.dispatch(CalibrateVideos(CalibrationRequest(videos)))
     poll_until(session, lambda: session.calibrating.progress.done == 0.25)
     assert session.calibrating.progress.message == "Matching"
-    session.dispatch(c.StopCalibration())
+    session.dispatch(StopCalibration())
     assert session.calibrating.page.state == "asking"
     assert session.calibrating.progress is None
     assert ended.wait(10)
@@ -145,7 +146,7 @@ def test_why_it_failed_is_shown_beside_the_options(make_session, videos, monkeyp
     session = make_session(is_open=False)
     look(session, videos)
     for expected in ("Too little in common.", "RuntimeError: broken"):
-        session.dispatch(c.CalibrateVideos(CalibrationRequest(videos)))
+        session.dispatch(CalibrateVideos(CalibrationRequest(videos)))
         assert session.calibrating.page.failure is None
         poll_until(session, lambda: session.calibrating.page.failure is not None)
         failure = session.calibrating.page.failure

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from app.document.storing.document_store import DocumentStore
-from app.session import commands as c
+from app.session.editing.edit_commands import Redo, Undo
+from app.session.editing.mark_commands import MarkRegion
 from app.session.paths import path_commands as p
+from app.session.showing.look_commands import ActivateView, LookThrough, SetFrame, ShowViews, TogglePlay
 from engine.camera.projection import camera_center
 from engine.errors import ProjectError
 from tests.app.conftest import poll_until
 
-BALL = c.MarkRegion("dynamic", (0.25, -0.5, 1.0), 0.125)
+BALL = MarkRegion("dynamic", (0.25, -0.5, 1.0), 0.125)
 
 
 def ready(session):
@@ -42,7 +44,7 @@ def frames(session) -> list[float]:
 def add_keys(session, *frame_indices: int) -> None:
     """A key at each frame, each from another side."""
     for frame_index in frame_indices:
-        session.dispatch(c.SetFrame(frame_index))
+        session.dispatch(SetFrame(frame_index))
         session.view.orbit(40.0, 5.0)
         session.dispatch(p.SetCameraKey())
 
@@ -63,7 +65,7 @@ def test_keys_go_where_the_playhead_and_the_view_are(session):
 
 
 def test_a_key_from_a_capture_camera_is_that_camera(session):
-    session.dispatch(c.LookThrough(2))
+    session.dispatch(LookThrough(2))
     session.dispatch(p.SetCameraKey())
     assert np.allclose(session.paths.path.keys[0].world_to_camera, session.rig.world_to_camera[2])
 
@@ -109,19 +111,19 @@ def test_a_drag_is_taken_back_at_once_and_steps_of_regions_and_paths_in_turn(ses
     for x in (0.4, 0.5):
         session.dispatch(p.PlaceCameraKey(0, (x, 0.0, 0.0), gesture=2))
     assert session.history.undo == "move camera key"
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert np.allclose(session.paths.path.keys[0].center, (0.3, 0, 0))
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.history.undo == "mark a region"
     assert session.history.redo == "move camera key"
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.regions.regions == ()
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.paths.paths == ()
     assert on_disk(session) == ()
-    session.dispatch(c.Undo())  # nothing to take back
+    session.dispatch(Undo())  # nothing to take back
     for _ in range(4):
-        session.dispatch(c.Redo())
+        session.dispatch(Redo())
     assert np.allclose(session.paths.path.keys[0].center, (0.5, 0, 0))
     assert len(session.regions.regions) == 1
     assert session.history.redo == ""
@@ -133,10 +135,10 @@ def test_what_is_done_after_undo_is_a_step_of_its_own(session):
     add_keys(session, 0)
     session.dispatch(p.PlaceCameraKey(0, (0.1, 0.0, 0.0), gesture=1))
     session.dispatch(p.PlaceCameraKey(0, (0.2, 0.0, 0.0), gesture=2))
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     session.dispatch(p.PlaceCameraKey(0, (0.3, 0.0, 0.0), gesture=1))
     assert session.history.redo == ""
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert np.allclose(session.paths.path.keys[0].center, (0.1, 0, 0))
 
 
@@ -155,7 +157,7 @@ def test_paths_are_named_chosen_and_deleted(session):
     session.dispatch(p.DeleteCameraPath())
     assert session.paths.path.name == "a <b> %s ##"
     session.dispatch(p.ChooseCameraPath(1))
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.paths.path.name == "x", "what came back is chosen"
     for _ in range(3):
         session.dispatch(p.DeleteCameraPath())
@@ -187,10 +189,10 @@ def test_the_view_goes_along_until_it_is_moved(session):
     add_keys(session, 0, 5)
     session.dispatch(p.LookAlongPath())
     for frame_index in (5, 3, 0):
-        session.dispatch(c.SetFrame(frame_index))
+        session.dispatch(SetFrame(frame_index))
         assert np.allclose(session.view.world_to_camera(), session.paths.path.at(frame_index)[0], atol=1e-9)
         assert session.view.fov_y == pytest.approx(session.paths.path.at(frame_index)[1])
-    session.dispatch(c.TogglePlay())
+    session.dispatch(TogglePlay())
     session.timeline.tick(2.5 / session.timeline.fps)
     assert session.lead_view()
     assert not session.lead_view(), "it is there already"
@@ -201,23 +203,23 @@ def test_the_view_goes_along_until_it_is_moved(session):
     moved = session.view.world_to_camera()
     session.poll()
     assert not session.paths.is_along
-    session.dispatch(c.SetFrame(5))
+    session.dispatch(SetFrame(5))
     assert np.allclose(session.view.world_to_camera(), moved)
 
 
 def test_one_of_several_views_goes_along_while_the_others_look_on(session):
     add_keys(session, 0, 5)
-    session.dispatch(c.ShowViews(2))
+    session.dispatch(ShowViews(2))
     session.dispatch(p.LookAlongPath())
     assert session.paths.along == 0
-    session.dispatch(c.ActivateView(1))
+    session.dispatch(ActivateView(1))
     session.view.orbit(50.0, 0.0)
     onlooker = session.view.world_to_camera()
-    session.dispatch(c.SetFrame(2))
+    session.dispatch(SetFrame(2))
     assert np.allclose(session.views.shown[0].view.world_to_camera(), session.paths.path.at(2)[0], atol=1e-9)
     assert np.allclose(session.view.world_to_camera(), onlooker)
     assert session.paths.along == 0
-    session.dispatch(c.ShowViews(1))  # the active one stays, the one that goes along is gone
+    session.dispatch(ShowViews(1))  # the active one stays, the one that goes along is gone
     assert not session.paths.is_along
     assert np.allclose(session.view.world_to_camera(), onlooker)
 
@@ -283,7 +285,7 @@ def test_paths_come_back_when_the_project_is_opened_again(make_session):
         np.array_equal(a.world_to_camera, b.world_to_camera) for a, b in zip(again.paths.path.keys, keys, strict=True)
     )
     assert again.history.undo == "close camera path"
-    again.dispatch(c.Undo())
+    again.dispatch(Undo())
     assert not again.paths.path.is_closed
 
 

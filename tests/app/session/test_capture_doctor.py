@@ -9,7 +9,9 @@ import time
 import numpy as np
 import pytest
 
-from app.session import commands
+from app.session.captures.capture_commands import CorrectCapture, ExamineCapture, StopExamining
+from app.session.commands import CloseQuestion
+from app.session.projects.project_commands import OpenCapture
 from app.session.projects.settings import Settings
 from app.session.questions import CorrectionQuestion
 from app.session.session import Session
@@ -36,7 +38,7 @@ def session(capture_folder, tmp_path):
     capture = tmp_path / "capture"
     shutil.copytree(capture_folder, capture)
     found = Session(settings=Settings(tmp_path / "settings.json"), project_dir=tmp_path / "p", is_preloading=False)
-    found.dispatch(commands.OpenCapture(capture))
+    found.dispatch(OpenCapture(capture))
     poll(found, lambda: found.capture is not None)
     yield found
     found.close()
@@ -51,8 +53,8 @@ def made_up(capture, report) -> Diagnosis:
 def test_a_capture_is_examined_in_the_background(session) -> None:
     session.doctor.run = made_up
     assert session.doctor_status.state == "idle"
-    session.dispatch(commands.ExamineCapture())
-    session.dispatch(commands.ExamineCapture())  # at it already
+    session.dispatch(ExamineCapture())
+    session.dispatch(ExamineCapture())  # at it already
     poll(session, lambda: session.doctor_status.state == "done")
     assert session.doctor_status.findings == (FOUND,)
     assert session.doctor_status.diagnosis.n_pictures == 7
@@ -71,11 +73,11 @@ def test_examining_can_be_stopped_and_a_failure_is_told(session) -> None:
             has_ended.append(True)
 
     session.doctor.run = endless
-    session.dispatch(commands.ExamineCapture())
+    session.dispatch(ExamineCapture())
     poll(session, lambda: session.doctor_status.progress is not None and session.doctor_status.progress.done > 0.2)
     assert session.doctor_status.state == "running"
     assert session.doctor_status.progress.eta_s(time.monotonic()) is not None
-    session.dispatch(commands.StopExamining())
+    session.dispatch(StopExamining())
     assert session.doctor_status.state == "idle"
     poll(session, lambda: bool(has_ended))
 
@@ -83,22 +85,22 @@ def test_examining_can_be_stopped_and_a_failure_is_told(session) -> None:
         raise CaptureError("The disk went away.")
 
     session.doctor.run = failing
-    session.dispatch(commands.ExamineCapture())
+    session.dispatch(ExamineCapture())
     poll(session, lambda: any("cannot be examined" in notice.title for notice in session.notices))
     assert session.doctor_status.state == "idle"
 
 
 def test_a_correction_is_asked_about_then_written_and_opened_as_a_new_project(session) -> None:
     name, capture, project = session.rig.names[1], session.capture.path, session.project.folder
-    session.dispatch(commands.CorrectCapture(Corrections(is_excluded={name: True}), f"Exclude {name}"))
+    session.dispatch(CorrectCapture(Corrections(is_excluded={name: True}), f"Exclude {name}"))
     question = session.question
     assert isinstance(question, CorrectionQuestion)
     assert (question.words, question.project) == (f"Exclude {name}", str(project))
     assert not (capture / "capture.json").exists()
-    session.dispatch(commands.CloseQuestion())
+    session.dispatch(CloseQuestion())
     assert session.question is None
-    session.opener.project_dir = project.parent / "p2"
-    session.dispatch(commands.CorrectCapture(question.corrections, question.words, is_confirmed=True))
+    session.projects.opener.project_dir = project.parent / "p2"
+    session.dispatch(CorrectCapture(question.corrections, question.words, is_confirmed=True))
     poll(session, lambda: session.project is not None and session.project.folder != project)
     assert name not in session.rig.names
     written = json.loads((capture / "capture.json").read_text())
@@ -108,7 +110,7 @@ def test_a_correction_is_asked_about_then_written_and_opened_as_a_new_project(se
 @pytest.mark.slow
 def test_a_process_of_its_own_examines_and_says_what_is_wrong(session) -> None:
     seen = []
-    session.dispatch(commands.ExamineCapture())
+    session.dispatch(ExamineCapture())
     poll(session, lambda: seen.append(session.doctor_status.progress) or session.doctor_status.state == "done")
     shares = [progress.done for progress in seen if progress is not None]
     assert shares == sorted(shares)
@@ -117,6 +119,6 @@ def test_a_process_of_its_own_examines_and_says_what_is_wrong(session) -> None:
 
 def test_a_process_that_cannot_read_the_capture_says_why(session, tmp_path) -> None:
     shutil.rmtree(session.capture.path)
-    session.dispatch(commands.ExamineCapture())
+    session.dispatch(ExamineCapture())
     poll(session, lambda: any("cannot be examined" in notice.title for notice in session.notices))
     assert session.doctor_status.state == "idle"

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import commands as c
 from app.session.editing.edit_commands import AddEdit
 from app.session.editing.selection import Selection
+from app.session.projects.project_commands import OpenProject
 from app.session.session import Session
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import look_at_clip
@@ -24,7 +24,7 @@ from tests.app.residuals.conftest import make_project
 def session(make_session, tmp_path: Path) -> Session:
     """Two clips of three frames, both trained."""
     made = make_session(is_open=False)
-    made.dispatch(c.OpenProject(make_project(tmp_path / "made")))
+    made.dispatch(OpenProject(make_project(tmp_path / "made")))
     poll_until(made, lambda: made.opened is not None, what="the project")
     return made
 

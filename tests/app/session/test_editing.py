@@ -7,7 +7,6 @@ import pytest
 from msgspec import structs
 
 from app.document.storing.stored_document import plain_document
-from app.session import commands as c
 from app.session.editing.edit_commands import (
     AddEdit,
     ChangeEdit,
@@ -16,6 +15,7 @@ from app.session.editing.edit_commands import (
     MoveEdit,
     MoveMarker,
     PutMarker,
+    Redo,
     RemoveEdit,
     RemoveMarker,
     RenameEdit,
@@ -23,6 +23,7 @@ from app.session.editing.edit_commands import (
     SetScale,
     SetUp,
     ToggleEdit,
+    Undo,
 )
 from app.session.editing.selection import Selection
 from engine.editing.actions import Delete, Expose, Hide, Recolor
@@ -45,10 +46,10 @@ def test_a_box_crop_is_a_named_step_that_goes_and_comes(session):
     session.dispatch(ToggleEdit(1))
     assert session.history.undo == "switch off: crop to box 1 × 1 × 1"
     assert not session.edits.edits[0].is_on
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.edits.edits[0].is_on
     assert session.history.redo == "switch off: crop to box 1 × 1 × 1"
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.edits.edits == ()
     assert len(session.notices) == 0
 
@@ -60,9 +61,9 @@ def test_a_drag_is_one_step_and_another_drag_is_another(session):
             edit = structs.replace(session.edits.edits[0], target=Box(BOX.center, (size, 0.5, 0.5)))
             session.dispatch(ChangeEdit(edit, gesture, "resize"))
     assert session.history.past == ("hide box 1 × 1 × 1", "resize: hide box 1 × 1 × 1", "resize: hide box 1.6 × 1 × 1")
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.edits.edits[0].target.half_sizes[0] == 0.8
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.edits.edits[0].target == BOX
 
 
@@ -127,10 +128,10 @@ def test_five_hundred_steps_back_and_forth_are_the_same_documents(session):
         if text != texts[-1]:
             texts.append(text)
     for text in reversed(texts[:-1]):
-        session.dispatch(c.Undo())
+        session.dispatch(Undo())
         assert json_text(plain_document(session.document.content)) == text
     for text in texts[1:]:
-        session.dispatch(c.Redo())
+        session.dispatch(Redo())
         assert json_text(plain_document(session.document.content)) == text
     assert len(session.notices) == 0
 
@@ -140,14 +141,14 @@ def test_markers_and_up_are_shown_at_once_and_come_back_with_undo(session):
     session.dispatch(PutMarker(3, "foul!", 1))
     session.dispatch(MoveMarker(3, 5, 2))
     assert [(marker.frame_index, marker.text) for marker in session.timeline.markers] == [(5, "foul!")]
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.timeline.markers.frames == [3]
     session.dispatch(RemoveMarker(3))
     assert not session.timeline.markers
     suggested = session.view.up.copy()
     session.dispatch(SetUp((0.0, 0.0, 3.0)))
     np.testing.assert_allclose(session.view.up, [0.0, 0.0, 1.0])
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     np.testing.assert_allclose(session.view.up, suggested)
 
 

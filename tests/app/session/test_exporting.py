@@ -22,7 +22,8 @@ from app.project.opening.opened_project import OpenedProject, opened_project
 from app.project.opening.project_access import open_project
 from app.project.project import Project
 from app.scripting.scripted_project import open_scripted
-from app.session import commands
+from app.session.commands import CloseQuestion
+from app.session.export_commands import AskExport, CancelExport, ShowExport
 from app.session.exporting import Exporting, ExportPage
 from app.session.notices import Notices
 from app.session.projects.settings import Settings
@@ -51,7 +52,10 @@ class Bench:
         self.timeline = Timeline(self.opened.clips)
         self.started: list[FakeExporter] = []
         self.shown: list[Path] = []
-        self.exporting = Exporting(self.notices, self.settings, launch=self._launch, show=self._show)
+        self.is_training = False
+        self.exporting = Exporting(
+            self.notices, self.settings, launch=self._launch, show=self._show, is_training=lambda: self.is_training
+        )
         self.exporting.open(self.opened)
 
     def _launch(self, task: object) -> FakeExporter:
@@ -93,7 +97,7 @@ class Bench:
         until_s = time.monotonic() + DEADLINE_S
         while not is_so():
             assert time.monotonic() < until_s
-            self.exporting.poll(is_training=False)
+            self.exporting.poll()
             time.sleep(0.005)
 
     def start(self, out: str = "m.csv") -> None:
@@ -283,7 +287,7 @@ def test_a_name_that_says_something_else_is_told_before(bench: Bench, kind: str,
 
 def test_what_another_export_will_write_is_taken(bench: Bench):
     bench.start("p-metrics.csv")
-    bench.exporting.poll(is_training=False)
+    bench.exporting.poll()
     bench.ask()
     out = bench.folder / "out"
     assert bench.suggest(METRICS) == str(out / "p-metrics-2.csv")
@@ -294,7 +298,7 @@ def test_what_another_export_will_write_is_taken(bench: Bench):
         bench.exporting.start(METRICS.changed(out=str(out / "p-metrics.csv")))
     assert len(bench.exporting.statuses) == 1
     bench.started[0].events.append(ExportFailed("The disk is full.", ""))
-    bench.exporting.poll(is_training=False)
+    bench.exporting.poll()
     assert bench.suggest(METRICS) == str(out / "p-metrics.csv")
     assert bench.plan(METRICS.changed(out=str(out / "p-metrics.csv"))).problems == ()
     bench.exporting.start(METRICS.changed(out=str(out / "p-metrics.csv")))
@@ -343,17 +347,19 @@ def test_every_answer_of_every_form_makes_a_job_or_says_why_not(bench: Bench):
 def test_exports_run_one_after_another_and_failures_are_told(bench: Bench):
     bench.start("a.csv")
     bench.start("b.csv")
-    bench.exporting.poll(is_training=True)
+    bench.is_training = True
+    bench.exporting.poll()
+    bench.is_training = False
     assert len(bench.started) == 1
     task = bench.started[0].task
     assert (task.job.kind, task.n_threads) == ("metrics", 1)
     assert Path(task.project) == bench.opened.project.folder
     bench.started[0].events.append(ExportFailed("The disk is full.", "Free some space."))
-    bench.exporting.poll(is_training=False)
+    bench.exporting.poll()
     assert [(notice.title, notice.detail) for notice in bench.notices] == [
         ("Metrics, CSV was not exported", "The disk is full.")
     ]
-    bench.exporting.poll(is_training=False)
+    bench.exporting.poll()
     assert bench.started[1].task.n_threads is None
     bench.exporting.cancel(2)
     assert bench.started[1].is_cancelled
@@ -361,11 +367,11 @@ def test_exports_run_one_after_another_and_failures_are_told(bench: Bench):
 
 def test_a_file_manager_that_is_missing_is_told(bench: Bench):
     bench.start()
-    bench.exporting.poll(is_training=False)
+    bench.exporting.poll()
     bench.exporting.show(1)  # nothing there yet
     result = ExportResult(bench.folder / "out" / "m.csv", 1, 5)
     bench.started[0].events.append(ExportDone(result))
-    bench.exporting.poll(is_training=False)
+    bench.exporting.poll()
     bench.exporting.show(1)
     bench.until(lambda: len(bench.notices) > 0)
     assert bench.shown == [result.path]
@@ -377,11 +383,11 @@ def test_a_session_asks_and_closes(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     waits: list[str] = []
     try:
         monkeypatch.setattr(session.document, "settle", lambda: waits.append("settle"))
-        session.dispatch(commands.AskExport())  # nothing is open
+        session.dispatch(AskExport())  # nothing is open
         assert session.exporting.page is None
-        session.dispatch(commands.CancelExport(5))
-        session.dispatch(commands.ShowExport(5))
-        session.dispatch(commands.CloseQuestion())
+        session.dispatch(CancelExport(5))
+        session.dispatch(ShowExport(5))
+        session.dispatch(CloseQuestion())
         assert not list(session.notices)
         assert waits == []  # the window's thread waits for no disk
         monkeypatch.undo()

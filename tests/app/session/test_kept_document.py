@@ -29,7 +29,7 @@ def test_a_step_is_on_disk_before_the_next_one_is_accepted(tmp_path: Path, monke
 
     monkeypatch.setattr(project.store, "write", slowly)
     document = KeptDocument(guard=lambda before, after: None, on_change=lambda before, after: None)
-    document.open(project)
+    document.hold(project)
     for frame in range(4):
         document.change(replace(project.document, markers=(Marker(frame, "x"),)), "mark")
         kept = open_project(tmp_path / "p", is_writable=False).document.markers

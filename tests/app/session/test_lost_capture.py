@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from app.session.commands import OpenCapture
+from app.session.projects.project_commands import OpenCapture
 from app.session.projects.settings import Settings
 from app.session.session import Session
 from tests.app.conftest import poll_until

@@ -9,8 +9,12 @@ from app.cli.cli import main
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.stored_document import plain_document
 from app.project.opening.project_access import open_project
-from app.session import commands as c
+from app.session.editing.edit_commands import Redo, Undo
+from app.session.editing.mark_commands import MarkRegion, RemoveRegion
 from app.session.marking import effect_text, region_text
+from app.session.projects.project_commands import OpenProject
+from app.session.projects.setting_commands import SetClipLength, SetTrainSetting
+from app.session.training.train_commands import TrainNextClip
 from app.training.worker.build import build_training
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion, sphere_region
@@ -20,8 +24,8 @@ from tests.app.session.test_session import train_next
 
 BALL = sphere_region("dynamic", (0.25, -0.5, 1.0), 0.125)
 OTHER = sphere_region("static", (0.0, 0.0, 0.0), 2.0)
-MARK_BALL = c.MarkRegion("dynamic", (0.25, -0.5, 1.0), 0.125)
-MARK_OTHER = c.MarkRegion("static", (0.0, 0.0, 0.0), 2.0)
+MARK_BALL = MarkRegion("dynamic", (0.25, -0.5, 1.0), 0.125)
+MARK_OTHER = MarkRegion("static", (0.0, 0.0, 0.0), 2.0)
 
 
 def ready(session):
@@ -49,7 +53,7 @@ def building(job, store, report, *, monkeypatch, seen):
 def test_a_mark_reaches_the_file_and_the_next_training(make_session, monkeypatch):
     seen = []
     session = ready(make_session(make_training=partial(building, monkeypatch=monkeypatch, seen=seen)))
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     train_next(session)
     session.dispatch(MARK_BALL)
     assert session.regions.regions == (BALL,)  # at once, not when the disk is done
@@ -73,7 +77,7 @@ def test_a_training_starts_when_what_was_marked_just_before_is_on_disk(make_sess
     session = ready(make_session(launch=launch))
     monkeypatch.setattr(DocumentStore, "write", slowly)
     session.dispatch(MARK_BALL)
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     assert seen == [(BALL,)]
 
 
@@ -100,45 +104,45 @@ def test_regions_come_back_when_the_project_is_opened_again(make_session):
     again = ready(make_session())
     assert again.regions.regions == (BALL,)
     assert again.history.undo == "mark a region"
-    again.dispatch(c.Undo())
+    again.dispatch(Undo())
     assert again.regions.regions == ()
 
 
 def test_removing_and_taking_back(make_session):
     session = ready(make_session())
-    session.dispatch(c.Undo())  # nothing to take back
+    session.dispatch(Undo())  # nothing to take back
     for command, expected in (
         (MARK_BALL, (BALL,)),
         (MARK_OTHER, (BALL, OTHER)),
-        (c.RemoveRegion(0), (OTHER,)),
-        (c.Undo(), (BALL, OTHER)),
-        (c.Undo(), (BALL,)),
+        (RemoveRegion(0), (OTHER,)),
+        (Undo(), (BALL, OTHER)),
+        (Undo(), (BALL,)),
         (MARK_OTHER, (BALL, OTHER)),
-        (c.Undo(), (BALL,)),
-        (c.Undo(), ()),
+        (Undo(), (BALL,)),
+        (Undo(), ()),
     ):
         assert bool(session.history.undo) == (command != MARK_BALL)
         session.dispatch(command)
         assert session.regions.regions == expected
         assert on_disk(session) == expected
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.regions.regions == ()
     assert len(session.notices) == 0
 
 
 def test_what_was_taken_back_is_done_again_until_something_else_is(make_session):
     session = ready(make_session())
-    session.dispatch(c.Redo())  # nothing was taken back
+    session.dispatch(Redo())  # nothing was taken back
     for command, expected, can_redo in (
         (MARK_BALL, (BALL,), False),
         (MARK_OTHER, (BALL, OTHER), False),
-        (c.Undo(), (BALL,), True),
-        (c.Undo(), (), True),
-        (c.Redo(), (BALL,), True),
-        (c.Redo(), (BALL, OTHER), False),
-        (c.Undo(), (BALL,), True),
-        (c.RemoveRegion(0), (), False),
-        (c.Undo(), (BALL,), True),
+        (Undo(), (BALL,), True),
+        (Undo(), (), True),
+        (Redo(), (BALL,), True),
+        (Redo(), (BALL, OTHER), False),
+        (Undo(), (BALL,), True),
+        (RemoveRegion(0), (), False),
+        (Undo(), (BALL,), True),
     ):
         session.dispatch(command)
         assert session.regions.regions == expected
@@ -150,11 +154,11 @@ def test_what_was_taken_back_is_done_again_until_something_else_is(make_session)
 @pytest.mark.parametrize(
     ("command", "expected"),
     [
-        (c.MarkRegion("static", (0.0, 0.0, 0.0), -1.0), "radius"),
-        (c.MarkRegion("static", (0.0, float("nan"), 0.0), 1.0), "not finite"),
-        (c.MarkRegion("wobbly", (0.0, 0.0, 0.0), 1.0), "wobbly"),
-        (c.RemoveRegion(1), "There is no region 2; 1 are marked"),
-        (c.RemoveRegion(-1), "There is no region 0"),
+        (MarkRegion("static", (0.0, 0.0, 0.0), -1.0), "radius"),
+        (MarkRegion("static", (0.0, float("nan"), 0.0), 1.0), "not finite"),
+        (MarkRegion("wobbly", (0.0, 0.0, 0.0), 1.0), "wobbly"),
+        (RemoveRegion(1), "There is no region 2; 1 are marked"),
+        (RemoveRegion(-1), "There is no region 0"),
     ],
 )
 def test_what_cannot_be_is_told_and_changes_nothing(make_session, command, expected):
@@ -183,7 +187,7 @@ def test_a_project_that_another_program_writes_to_is_left_alone(make_session, ca
     assert not second.regions.can_mark
     assert "read-only" in second.regions.why_not
     n_notices = len(second.notices)
-    for command in (MARK_OTHER, c.RemoveRegion(0)):
+    for command in (MARK_OTHER, RemoveRegion(0)):
         second.dispatch(command)
     assert [notice.kind for notice in second.notices][n_notices:] == ["error", "error"]
     assert second.regions.regions == on_disk(second) == (BALL,)
@@ -208,7 +212,7 @@ def test_what_could_not_be_kept_is_not_shown_as_if_it_were(make_session, monkeyp
 
 def test_it_is_said_which_clips_a_mark_reaches(make_session):
     session = ready(make_session())
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     assert session.regions.effect == "Marks apply to clips trained from now on."
     train_next(session)
     assert "Clip 0 has already started and does not change until retrained." in session.regions.effect
@@ -218,7 +222,7 @@ def test_it_is_said_which_clips_a_mark_reaches(make_session):
 
 def test_without_a_gate_it_is_said_that_marks_do_nothing(make_session):
     session = ready(make_session())
-    session.dispatch(c.SetTrainSetting("gate", "off"))
+    session.dispatch(SetTrainSetting("gate", "off"))
     assert session.regions.effect.startswith("No effect here")
 
 
@@ -229,10 +233,10 @@ def test_another_capture_brings_its_own_regions(make_session, tmp_path, capture_
     other.dispatch(MARK_OTHER)
     folder = other.project.folder
     other.close()
-    session.dispatch(c.OpenProject(folder))
+    session.dispatch(OpenProject(folder))
     poll_until(session, lambda: session.project.folder == folder and session.regions.can_mark, what="the other one")
     assert session.regions.regions == (OTHER,)
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.regions.regions == ()
     assert open_project(tmp_path / "p", is_writable=False).document.regions == (BALL,)
 

@@ -16,14 +16,15 @@ from app.mending.request import MendRequest
 from app.project.mends.in_place import put_in_place
 from app.project.mends.record import MendedClip, MendRecord
 from app.project.project import Project
-from app.session import commands as c
 from app.session.clips.clip_commands import SplitClip
 from app.session.editing.edit_commands import AddEdit
 from app.session.files.file_commands import SaveProjectAs
 from app.session.mending import mending
 from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
+from app.session.projects.setting_commands import SetClipLength
 from app.session.session import Session
+from app.session.training.train_commands import TrainAll
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.editing.actions import Hide
 from engine.editing.edit import Picked, PickedRows
@@ -59,8 +60,8 @@ def session(make_session: Make, monkeypatch: pytest.MonkeyPatch) -> Session:
     """Two clips of three frames, both trained."""
     monkeypatch.setattr(mending, "mend_work", made_up)
     made = make_session()
-    made.dispatch(c.SetClipLength(3))
-    made.dispatch(c.TrainAll())
+    made.dispatch(SetClipLength(3))
+    made.dispatch(TrainAll())
     poll_until(made, lambda: [clip.state for clip in made.clip_states] == ["trained", "trained"], what="the training")
     return made
 
@@ -138,7 +139,7 @@ def test_what_cannot_be_mended_says_why(session: Session, make_session: Make) ->
     session.dispatch(StartMend())
     assert page_of(session).state == "asking"
     other = make_session(name="untrained")
-    other.dispatch(c.SetClipLength(3))
+    other.dispatch(SetClipLength(3))
     other.dispatch(AskMend(after=1))
     assert page_of(other).why_not == "Clip 0 is not trained, or out of date. Train it first."
 

@@ -9,10 +9,10 @@ import pytest
 
 from app.project.clips.clip_versions import list_versions
 from app.project.project import Project
-from app.session import commands as c
 from app.session.clips.clip_commands import ApplyDeletions
 from app.session.clips.clip_questions import DeletionsQuestion
-from app.session.editing.edit_commands import AddEdit
+from app.session.editing.edit_commands import AddEdit, Undo
+from app.session.projects.project_commands import OpenProject
 from app.session.session import Session
 from engine.clip_files.clip_state import read_clip_state
 from engine.editing.actions import Delete, Expose
@@ -27,7 +27,7 @@ from tests.app.residuals.conftest import make_project
 @pytest.fixture
 def session(make_session, tmp_path: Path) -> Session:
     made = make_session(is_open=False)
-    made.dispatch(c.OpenProject(make_project(tmp_path / "made")))
+    made.dispatch(OpenProject(make_project(tmp_path / "made")))
     poll_until(made, lambda: made.opened is not None, what="the project")
     return made
 
@@ -62,7 +62,7 @@ def test_it_is_asked_first_and_then_done(session: Session):
     project = project_of(session)
     assert [len(list_versions(project, index)) for index in (0, 1)] == [1, 1]
     assert [session.clip_states[index].state for index in (0, 1)] == ["trained", "trained"]
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert [type(edit.action) for edit in session.edits.edits] == [Delete, Expose], "in one step"
 
 

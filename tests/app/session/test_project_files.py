@@ -11,12 +11,14 @@ import pytest
 from app.document.storing.replay import journal_path
 from app.project.opening.project_access import open_project
 from app.project.opening.project_choices import ProjectChoices
-from app.session import commands as c
+from app.session.editing.edit_commands import Redo, Undo
+from app.session.editing.mark_commands import MarkRegion
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, SaveProjectAs
 from app.session.files.file_questions import RecoveryQuestion, RelocationQuestion, SaveAsQuestion, SavingQuestion
+from app.session.projects.project_commands import OpenCapture, OpenProject
 from tests.app.conftest import poll_until, write_capture
 
-MARKS = [c.MarkRegion("dynamic", (float(i), 0.0, 0.0), 0.5) for i in range(4)]
+MARKS = [MarkRegion("dynamic", (float(i), 0.0, 0.0), 0.5) for i in range(4)]
 
 
 @pytest.fixture
@@ -25,7 +27,7 @@ def together(tmp_path: Path, make_session) -> Path:
     folder = tmp_path / "together"
     write_capture(folder / "capture")
     session = make_session(is_open=False, name="together/project")
-    session.dispatch(c.OpenCapture(folder / "capture"))
+    session.dispatch(OpenCapture(folder / "capture"))
     poll_until(session, lambda: session.regions.can_mark)
     for mark in MARKS:
         session.dispatch(mark)
@@ -42,23 +44,23 @@ def opened(make_session, command):
 
 
 def test_what_was_edited_before_a_kill_is_there_and_said(make_session, together):
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     assert len(session.regions.regions) == 4
     (notice,) = [notice for notice in session.notices if "recovered" in notice.title]
     assert "4 steps were recovered from the journal, up to: mark a region." in notice.detail
     for _ in range(4):
-        session.dispatch(c.Undo())
+        session.dispatch(Undo())
     assert session.regions.regions == ()
     session.close()
-    again = opened(make_session, c.OpenProject(together / "project"))
+    again = opened(make_session, OpenProject(together / "project"))
     assert not [notice for notice in again.notices if "recovered" in notice.title]
-    again.dispatch(c.Redo())
+    again.dispatch(Redo())
     assert len(again.regions.regions) == 1
 
 
 def test_a_folder_with_capture_and_project_can_be_moved(make_session, together, tmp_path):
     together.rename(tmp_path / "elsewhere")
-    session = opened(make_session, c.OpenProject(tmp_path / "elsewhere" / "project"))
+    session = opened(make_session, OpenProject(tmp_path / "elsewhere" / "project"))
     assert session.question is None
     assert session.project.settings.capture == str(tmp_path / "elsewhere" / "capture")
 
@@ -71,12 +73,12 @@ def damage_journal(project: Path) -> None:
 
 def test_a_damaged_journal_is_asked_about_and_the_good_steps_are_kept(make_session, together):
     damage_journal(together / "project")
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     question = session.question
     assert isinstance(question, RecoveryQuestion)
     assert (question.recovery.step, question.recovery.n_replayed) == (2, 2)
     assert "Line 5 is damaged" in question.recovery.problem
-    session.dispatch(c.OpenProject(together / "project", ProjectChoices(is_repaired=True)))
+    session.dispatch(OpenProject(together / "project", ProjectChoices(is_repaired=True)))
     poll_until(session, lambda: session.project is not None)
     assert len(session.regions.regions) == 2
     assert session.regions.can_mark
@@ -87,7 +89,7 @@ def test_a_damaged_project_can_be_looked_at_without_its_journal(make_session, to
     damage_journal(together / "project")
     before = {path.name: path.read_bytes() for path in (together / "project").rglob("*.json*")}
     choices = ProjectChoices(is_journal_used=False)
-    session = opened(make_session, c.OpenProject(together / "project", choices))
+    session = opened(make_session, OpenProject(together / "project", choices))
     assert session.regions.regions == ()
     assert "Repair it" in session.regions.why_not
     session.dispatch(MARKS[0])
@@ -97,17 +99,17 @@ def test_a_damaged_project_can_be_looked_at_without_its_journal(make_session, to
 
 def test_a_capture_that_was_moved_is_asked_for_and_taken(make_session, together, tmp_path):
     (together / "capture").rename(tmp_path / "moved")
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     assert session.question == RelocationQuestion(together / "project", together / "capture")
     other = write_capture(tmp_path / "other", n_frames=4)
-    session.dispatch(c.OpenProject(together / "project", ProjectChoices(capture=other)))
+    session.dispatch(OpenProject(together / "project", ProjectChoices(capture=other)))
     poll_until(session, lambda: session.question is not None)
     assert session.question == RelocationQuestion(together / "project", together / "capture", other)
-    session.dispatch(c.OpenProject(together / "project", ProjectChoices(capture=tmp_path / "moved")))
+    session.dispatch(OpenProject(together / "project", ProjectChoices(capture=tmp_path / "moved")))
     poll_until(session, lambda: session.project is not None)
     assert session.project.settings.capture == str(tmp_path / "moved")
     assert len(session.regions.regions) == 4
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert session.project.settings.capture == str(tmp_path / "moved"), "where the capture lies is not a step"
     session.close()
     assert open_project(together / "project", is_writable=False).settings.capture == str(tmp_path / "moved")
@@ -115,26 +117,26 @@ def test_a_capture_that_was_moved_is_asked_for_and_taken(make_session, together,
 
 def test_reading_only_changes_nothing_and_says_why(make_session, together):
     before = {path.name: path.read_bytes() for path in (together / "project").rglob("*") if path.is_file()}
-    session = opened(make_session, c.OpenProject(together / "project", ProjectChoices(is_read_only=True)))
+    session = opened(make_session, OpenProject(together / "project", ProjectChoices(is_read_only=True)))
     assert len(session.regions.regions) == 4
     assert "open it again" in session.regions.why_not
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert len(session.regions.regions) == 4
     assert "read-only" in session.notices[-1].detail
     assert {path.name: path.read_bytes() for path in (together / "project").rglob("*") if path.is_file()} == before
-    session.dispatch(c.OpenProject(together / "project"))
+    session.dispatch(OpenProject(together / "project"))
     poll_until(session, lambda: session.regions.can_mark, what="the project, for writing")
 
 
 def test_a_capture_without_a_project_is_not_opened_for_reading_only(make_session, capture_folder):
-    session = opened(make_session, c.OpenCapture(capture_folder, choices=ProjectChoices(is_read_only=True)))
+    session = opened(make_session, OpenCapture(capture_folder, choices=ProjectChoices(is_read_only=True)))
     assert session.project is None
     assert "has no project yet" in session.notices[0].detail
 
 
 def test_two_windows_on_one_project(make_session, together):
-    first = opened(make_session, c.OpenProject(together / "project"))
-    second = opened(make_session, c.OpenProject(together / "project"))
+    first = opened(make_session, OpenProject(together / "project"))
+    second = opened(make_session, OpenProject(together / "project"))
     assert len(second.regions.regions) == 4
     assert [notice.title for notice in second.notices] == ["The project is open read-only"]
     second.dispatch(MARKS[0])
@@ -145,7 +147,7 @@ def test_two_windows_on_one_project(make_session, together):
 
 
 def test_saving_as_goes_on_in_the_copy(make_session, together, tmp_path):
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     session.dispatch(AskSaveAs())
     poll_until(session, lambda: session.question is not None)
     question = session.question
@@ -155,13 +157,13 @@ def test_saving_as_goes_on_in_the_copy(make_session, together, tmp_path):
     assert session.question == SavingQuestion(question.suggestion)
     poll_until(session, lambda: session.project.folder == question.suggestion)
     assert session.question is None
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert len(session.regions.regions) == 3
     assert len(open_project(together / "project", is_writable=False).document.regions) == 4
 
 
 def test_saving_as_can_be_cancelled_and_refuses_what_is_taken(make_session, together, tmp_path, monkeypatch):
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     n_before = len(session.notices)
     session.dispatch(SaveProjectAs(together / "capture"))
     poll_until(session, lambda: len(session.notices) > n_before)
@@ -187,13 +189,13 @@ def test_a_disk_that_cannot_be_written_opens_for_reading_only(make_session, toge
         raise ProjectError("The project folder cannot be written (Read-only file system).")
 
     monkeypatch.setattr("app.project.project.ProcessLock.acquire", refuse)
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     assert len(session.regions.regions) == 4
     assert "Read-only file system" in session.regions.why_not
 
 
 def test_a_full_disk_is_said_and_nothing_is_lost_once_there_is_room(make_session, together, monkeypatch):
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     monkeypatch.setattr("app.session.editing.kept_document.RETRY_S", 0.01)
     write, is_full = os.write, [True]
 
@@ -218,7 +220,7 @@ def test_a_clock_that_was_set_back_changes_nothing(make_session, together, monke
     import time
 
     monkeypatch.setattr(time, "time", lambda: 1000.0)
-    session = opened(make_session, c.OpenProject(together / "project"))
+    session = opened(make_session, OpenProject(together / "project"))
     assert len(session.regions.regions) == 4
     session.dispatch(MARKS[0])
     session.close()

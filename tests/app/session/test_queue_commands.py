@@ -11,10 +11,24 @@ from app.plan.forecasts import clip_forecast, together
 from app.project.clips.clip_catalog import ClipRecord
 from app.project.clips.clip_versions import version_path
 from app.project.project import Project
-from app.session import commands as c
+from app.session.projects.setting_commands import SetClipLength
 from app.session.projects.settings import Settings
 from app.session.questions import RetrainQuestion, SettingsQuestion
 from app.session.session import Session
+from app.session.training.train_commands import (
+    AskTrainSettings,
+    MoveInQueue,
+    RemoveFromQueue,
+    RemoveVersion,
+    RestoreVersion,
+    SetLiveView,
+    StopAfterClip,
+    StopTraining,
+    TrainAll,
+    TrainClip,
+    TrainClips,
+    TrainNextClip,
+)
 from app.status import SequenceForecast
 from app.training.service import TrainingService
 from engine.clip_files.clip_state import read_clip_state
@@ -29,7 +43,7 @@ Make = Callable[..., Session]
 def session(make_session: Make) -> Session:
     """Six clips of one frame, nothing trained."""
     made = make_session()
-    made.dispatch(c.SetClipLength(1))
+    made.dispatch(SetClipLength(1))
     return made
 
 
@@ -48,7 +62,7 @@ def titles(session: Session) -> list[str]:
 
 def test_without_a_capture_every_command_is_told_that_there_is_nothing(make_session: Make) -> None:
     session = make_session(is_open=False)
-    for command in (c.TrainAll(), c.TrainClips((0,)), c.MoveInQueue(0, 1), c.RestoreVersion(0, 1)):
+    for command in (TrainAll(), TrainClips((0,)), MoveInQueue(0, 1), RestoreVersion(0, 1)):
         session.dispatch(command)
     assert set(titles(session)) == {"Nothing to train yet"}
     assert (session.queue.waiting, session.queue.everything) == ((), None)
@@ -63,7 +77,7 @@ def test_all_clips_are_trained_with_a_forecast_for_the_whole_of_it(session: Sess
     assert everything is not None
     assert everything.n_clips == 6
     assert session.queue.queued is None
-    session.dispatch(c.TrainAll())
+    session.dispatch(TrainAll())
     assert [clip.clip_index for clip in session.queue.waiting] == [1, 2, 3, 4, 5]
     assert session.queue.queued is not None
     assert session.queue.queued.n_clips == 6
@@ -78,12 +92,12 @@ def test_all_clips_are_trained_with_a_forecast_for_the_whole_of_it(session: Sess
     assert session.queue.n_done == 6
     assert (session.queue.queued, session.queue.everything) == (None, None)
     assert {state.state for state in session.clip_states} == {"trained"}
-    session.dispatch(c.TrainAll())
+    session.dispatch(TrainAll())
     assert titles(session)[-1] == "All of these clips are trained"
 
 
 def test_the_forecast_goes_by_what_trained_clips_took(session: Session) -> None:
-    session.dispatch(c.TrainClips((0, 1)))
+    session.dispatch(TrainClips((0, 1)))
     wait_idle(session)
     poll_until(session, lambda: session.queue.everything is not None and session.queue.everything.disk_mb is not None)
     everything = session.queue.everything
@@ -109,18 +123,18 @@ def test_a_stopped_clip_counts_with_what_is_left_of_it() -> None:
 
 
 def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> None:
-    session.dispatch(c.TrainAll())
-    session.dispatch(c.MoveInQueue(5, 0))
-    session.dispatch(c.RemoveFromQueue(2))
+    session.dispatch(TrainAll())
+    session.dispatch(MoveInQueue(5, 0))
+    session.dispatch(RemoveFromQueue(2))
     assert [clip.clip_index for clip in session.queue.waiting] == [5, 1, 3, 4]
-    session.dispatch(c.StopAfterClip())
+    session.dispatch(StopAfterClip())
     assert session.queue.is_ending_after
     wait_idle(session)
     assert session.queue.is_held
     assert session.training.next_clip_index == 5
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     assert session.training.clip_index == 5
-    session.dispatch(c.StopTraining())
+    session.dispatch(StopTraining())
     wait_idle(session)
     assert session.queue.waiting == ()
 
@@ -128,8 +142,8 @@ def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> Non
 def test_a_clip_moved_before_what_it_needs_waits_no_more(session: Session) -> None:
     session.document.settle()
     project_of(session).update(replace(project_of(session).settings, overrides={"field": "continue"}))
-    session.dispatch(c.TrainAll())
-    session.dispatch(c.RemoveFromQueue(2))
+    session.dispatch(TrainAll())
+    session.dispatch(RemoveFromQueue(2))
     assert [clip.clip_index for clip in session.queue.waiting] == [1]
     assert titles(session)[-1] == "Clips 3, 4, 5 left the queue: they need a clip that is not trained"
 
@@ -141,8 +155,8 @@ def test_a_failed_clip_shows_its_reason_and_the_others_go_on(make_session: Make)
         return training
 
     session = make_session(make_training=fails)
-    session.dispatch(c.SetClipLength(2))
-    session.dispatch(c.TrainAll())
+    session.dispatch(SetClipLength(2))
+    session.dispatch(TrainAll())
     wait_idle(session)
     assert [state.state for state in session.clip_states] == ["trained", "failed", "trained"]
     ((index, reason),) = session.queue.failed
@@ -152,35 +166,35 @@ def test_a_failed_clip_shows_its_reason_and_the_others_go_on(make_session: Make)
 
 
 def test_training_a_clip_with_other_settings_asks_what_has_to_be_known(session: Session) -> None:
-    session.dispatch(c.TrainAll())
+    session.dispatch(TrainAll())
     wait_idle(session)
-    session.dispatch(c.AskTrainSettings(0))
+    session.dispatch(AskTrainSettings(0))
     question = session.question
     assert isinstance(question, SettingsQuestion)
     assert question.retrain is not None
     assert question.retrain.outdated == (1, 2, 3, 4, 5)
     values = {setting.name: setting.value for setting in question.settings}
     assert values["joint_steps"] == project_of(session).settings.config().n_joint_steps(3)
-    session.dispatch(c.TrainClip(0, settings=(("joint_steps", 9),)))
+    session.dispatch(TrainClip(0, settings=(("joint_steps", 9),)))
     unconfirmed = session.question
     assert isinstance(unconfirmed, RetrainQuestion)
     assert unconfirmed.settings == (("joint_steps", 9),)
-    session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
+    session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     assert session.question is None
     wait_idle(session)
     assert read_clip_state(project_of(session).clip_path(0)).header.step == 9
     assert {state.state for state in session.clip_states[1:]} == {"stale"}
-    session.dispatch(c.TrainClip(1, settings=(("gate", "off"),)))
+    session.dispatch(TrainClip(1, settings=(("gate", "off"),)))
     assert "share gate" in session.notices[-1].detail
-    session.dispatch(c.AskTrainSettings(99))
+    session.dispatch(AskTrainSettings(99))
     assert "There is no clip 99" in session.notices[-1].detail
 
 
 def test_a_version_comes_back_and_dependants_are_out_of_date_as_after_training(session: Session) -> None:
-    session.dispatch(c.TrainClips((0, 1)))
+    session.dispatch(TrainClips((0, 1)))
     wait_idle(session)
     assert session.clip_versions(0) == ()
-    session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
+    session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     wait_idle(session)
     poll_until(session, lambda: len(session.clip_versions(0)) == 1, what="the versions")
     (version,) = session.clip_versions(0)
@@ -191,18 +205,18 @@ def test_a_version_comes_back_and_dependants_are_out_of_date_as_after_training(s
     assert shown is not None
     assert (shown.file, shown.reference_file) == (version_path(project_of(session), 0, 1), None)
     assert shown.revision.startswith("version-")
-    session.dispatch(c.RestoreVersion(0, 1))
-    session.dispatch(c.RestoreVersion(0, 1))  # a second click
+    session.dispatch(RestoreVersion(0, 1))
+    session.dispatch(RestoreVersion(0, 1))  # a second click
     poll_until(session, lambda: not session.jobs, what="the version")
     assert titles(session)[-1] == "Clip 0 is restored"
     assert [state.state for state in session.clip_states[:2]] == ["trained", "trained"]
     assert read_clip_state(project_of(session).clip_path(0)).header.step == N_STEPS
     poll_until(session, lambda: [one.step for one in session.clip_versions(0)] == [9], what="the other version")
-    session.dispatch(c.RestoreVersion(0, session.clip_versions(0)[0].number))
+    session.dispatch(RestoreVersion(0, session.clip_versions(0)[0].number))
     poll_until(session, lambda: not session.jobs)
     assert "1 clip was trained on another version of it" in session.notices[-1].detail
     poll_until(session, lambda: [one.step for one in session.clip_versions(0)] == [N_STEPS])
-    session.dispatch(c.RemoveVersion(0, session.clip_versions(0)[0].number))
+    session.dispatch(RemoveVersion(0, session.clip_versions(0)[0].number))
     poll_until(session, lambda: not session.jobs and session.clip_versions(0) == ())
 
 
@@ -211,21 +225,21 @@ def test_the_reference_does_not_change_under_a_clip_that_trains(make_session: Ma
         return make_fake(job, store, report) if job.clip_index == 0 else make_slow(job, store, report)
 
     session = make_session(make_training=slow_later)
-    session.dispatch(c.SetClipLength(3))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(SetClipLength(3))
+    session.dispatch(TrainNextClip())
     wait_idle(session)
-    session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
+    session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     wait_idle(session)
-    session.dispatch(c.TrainClip(1))
-    session.dispatch(c.RestoreVersion(0, 1))
+    session.dispatch(TrainClip(1))
+    session.dispatch(RestoreVersion(0, 1))
     assert titles(session)[-1] == "The version cannot be restored"
     assert "Clip 1 is training" in session.notices[-1].detail
 
 
 def test_a_damaged_version_is_a_notice_and_the_clip_stays(session: Session) -> None:
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(TrainClip(0))
     wait_idle(session)
-    session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
+    session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     wait_idle(session)
     path = version_path(project_of(session), 0, 1)
     path.unlink()
@@ -233,7 +247,7 @@ def test_a_damaged_version_is_a_notice_and_the_clip_stays(session: Session) -> N
     poll_until(session, lambda: len(session.clip_versions(0)) == 1)
     assert "damaged" in session.clip_versions(0)[0].why_not
     assert session.version_state(0, 1) is None
-    session.dispatch(c.RestoreVersion(0, 1))
+    session.dispatch(RestoreVersion(0, 1))
     poll_until(session, lambda: not session.jobs)
     assert "could not be restored" in titles(session)[-1]
     assert session.clip_states[0].state == "trained"
@@ -241,11 +255,11 @@ def test_a_damaged_version_is_a_notice_and_the_clip_stays(session: Session) -> N
 
 def test_the_live_view_is_kept_for_the_next_time(session: Session, tmp_path) -> None:
     assert session.queue.live_view == "live"
-    session.dispatch(c.SetLiveView("low"))
+    session.dispatch(SetLiveView("low"))
     assert session.queue.live_view == "low"
     assert Settings(tmp_path / "settings.json").live_view == "low"
     with pytest.raises(ValueError, match="off, low, live"):
-        session.dispatch(c.SetLiveView("sometimes"))
+        session.dispatch(SetLiveView("sometimes"))
     (tmp_path / "settings.json").write_text("not JSON")
     assert Settings(tmp_path / "settings.json").live_view == "live"
 
@@ -281,7 +295,7 @@ def test_a_thousand_waiting_clips_are_queued_and_reordered_at_once(tmp_path, mon
 
 
 def test_curves_of_several_clips_are_read(session: Session) -> None:
-    session.dispatch(c.TrainClips((0, 1)))
+    session.dispatch(TrainClips((0, 1)))
     wait_idle(session)
     for index in (0, 1):
         poll_until(session, lambda index=index: session.clip_curves(index) not in (None, ([], [])))
@@ -294,8 +308,8 @@ def test_curves_of_several_clips_are_read(session: Session) -> None:
 
 def test_closing_ends_the_clip_that_trains_and_starts_no_other(make_session: Make) -> None:
     session = make_session(make_training=make_slow)
-    session.dispatch(c.SetClipLength(1))
-    session.dispatch(c.TrainAll())
+    session.dispatch(SetClipLength(1))
+    session.dispatch(TrainAll())
     session.poll()
     session.close()
     assert session.live_training.service is not None

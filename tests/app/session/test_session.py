@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 from app.project.opening.project_access import open_project, read_settings
-from app.session import commands as c
+from app.session.commands import CloseQuestion, DismissNotice
+from app.session.projects.project_commands import LeaveTraining, OpenCapture, OpenProject
+from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SetTrainSetting
 from app.session.questions import LeaveQuestion
+from app.session.showing.look_commands import HomeView, LookThrough, SetCompare, SetFrame, ToggleOverlay, TogglePlay
+from app.session.training.train_commands import PauseTraining, ResumeTraining, StopTraining, TrainClip, TrainNextClip
 from app.status import PlanStatus
 from engine.clip_files.clip_state import read_clip_state
 from engine.training.presets import PRESETS
@@ -20,7 +24,7 @@ from tests.app.fakes import N_STEPS, make_fake, make_slow
 
 def train_next(session):
     index = session.training.next_clip_index
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.state in ("idle", "failed"), what="the end of the training")
     return index
 
@@ -34,12 +38,12 @@ def test_a_fresh_session_is_empty_but_answers(make_session):
     assert session.shown_points() is None
     assert session.request_render(10, 10) is None
     for command in (
-        c.TrainNextClip(),
-        c.PauseTraining(),
-        c.StopTraining(),
-        c.SetFrame(5),
-        c.TogglePlay(),
-        c.HomeView(),
+        TrainNextClip(),
+        PauseTraining(),
+        StopTraining(),
+        SetFrame(5),
+        TogglePlay(),
+        HomeView(),
     ):
         session.dispatch(command)
     assert [notice.kind for notice in session.notices] == ["warn"]
@@ -60,14 +64,14 @@ def test_opening_makes_a_project_and_frames_the_rig(make_session, tmp_path):
 def test_what_is_not_a_capture_becomes_a_notice_and_leaves_nothing(make_session, tmp_path):
     session = make_session(is_open=False)
     (tmp_path / "empty").mkdir()
-    session.dispatch(c.OpenCapture(tmp_path / "empty"))
+    session.dispatch(OpenCapture(tmp_path / "empty"))
     assert [job.name for job in session.jobs] == ["Opening"]
     poll_until(session, lambda: len(session.notices) > 0)
     assert session.notices[0].kind == "error"
     assert "not a capture" in session.notices[0].detail
     assert session.capture is None
     assert not (tmp_path / "p").exists()
-    session.dispatch(c.DismissNotice(0))
+    session.dispatch(DismissNotice(0))
     assert len(session.notices) == 0
 
 
@@ -77,11 +81,11 @@ def test_why_something_could_not_be_opened_goes_when_a_capture_opens(make_sessio
         with contextlib.suppress(OSError):
             (tmp_path / name).mkdir()
         n_before = len(session.notices)
-        session.dispatch(c.OpenCapture(tmp_path / name))
+        session.dispatch(OpenCapture(tmp_path / name))
         poll_until(session, lambda n_before=n_before: len(session.notices) > n_before)
     assert ["cannot be opened" in notice.title for notice in session.notices] == [True, True]
     assert "File name too long" in session.notices[1].detail
-    session.dispatch(c.OpenCapture(capture_folder))
+    session.dispatch(OpenCapture(capture_folder))
     poll_until(session, lambda: session.capture is not None)
     assert len(session.notices) == 0
 
@@ -94,10 +98,10 @@ def test_links_outside_are_followed_when_the_user_says_so_and_then_by_the_projec
     (capture / "ims").rename(tmp_path / "another disk")
     (capture / "ims").symlink_to(tmp_path / "another disk")
     session = make_session(is_open=False)
-    session.dispatch(c.OpenCapture(capture))
+    session.dispatch(OpenCapture(capture))
     poll_until(session, lambda: len(session.notices) > 0)
     assert "--follow-links" in session.notices[0].hint
-    session.dispatch(c.OpenCapture(capture, follow_links=True))
+    session.dispatch(OpenCapture(capture, follow_links=True))
     poll_until(session, lambda: session.capture is not None)
     assert session.capture.follow_links
     session.document.settle()
@@ -107,7 +111,7 @@ def test_links_outside_are_followed_when_the_user_says_so_and_then_by_the_projec
 
 def test_reference_then_next_clip(make_session):
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     assert [state.state for state in session.clip_states] == ["untrained", "untrained"]
     assert train_next(session) == 0
     assert session.clip_states[0].state == "trained"
@@ -124,21 +128,21 @@ def test_reference_then_next_clip(make_session):
 
 def test_a_source_clip_waits_for_its_reference(make_session):
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
-    session.dispatch(c.TrainClip(1))
+    session.dispatch(SetClipLength(3))
+    session.dispatch(TrainClip(1))
     assert "reference clip 0" in session.notices[0].detail
     assert session.training.state == "idle"
-    session.dispatch(c.TrainClip(0))
-    session.dispatch(c.TrainClip(1))  # now it is on its way
+    session.dispatch(TrainClip(0))
+    session.dispatch(TrainClip(1))  # now it is on its way
     assert session.clip_states[1].state == "queued"
     poll_until(session, lambda: all(state.state == "trained" for state in session.clip_states))
 
 
 def test_stopping_keeps_what_was_learned_and_training_goes_on_there(make_session):
     session = make_session(make_training=make_slow)
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.step >= 3)
-    session.dispatch(c.StopTraining())
+    session.dispatch(StopTraining())
     assert session.training.state == "stopping"
     poll_until(session, lambda: session.training.state == "idle")
     kept = session.project.checkpoint_path(0)
@@ -168,9 +172,9 @@ def _until(job, store, report, *, n_steps):
 
 def test_pausing_holds_the_steps_and_resuming_goes_on(make_session):
     session = make_session(make_training=make_slow)
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.state == "running")
-    session.dispatch(c.PauseTraining())
+    session.dispatch(PauseTraining())
     assert session.training.state == "paused"
     for _ in range(3):
         session.poll()
@@ -180,13 +184,13 @@ def test_pausing_holds_the_steps_and_resuming_goes_on(make_session):
         session.poll()
     assert read_clip_state(held).header.step == step
     assert session.training.state == "paused"
-    session.dispatch(c.ResumeTraining())
+    session.dispatch(ResumeTraining())
     poll_until(session, lambda: session.training.step > step, what="steps after the pause")
 
 
 def test_closing_keeps_a_running_training(make_session, tmp_path):
     session = make_session(make_training=make_slow)
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.step >= 2)
     session.close()
     project = open_project(tmp_path / "p")  # also shows that the lock was given back
@@ -211,11 +215,11 @@ def test_a_failed_training_is_told_and_can_be_tried_again(make_session):
 
 def test_training_the_reference_again_makes_source_clips_stale(make_session):
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     train_next(session)
     train_next(session)
     session.project.update(replace(session.project.settings, overrides={"joint_steps": 9}))  # another result
-    session.dispatch(c.TrainClip(0, is_confirmed=True))
+    session.dispatch(TrainClip(0, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     assert [state.state for state in session.clip_states] == ["trained", "stale"]
     assert session.training.next_clip_index == 1
@@ -224,7 +228,7 @@ def test_training_the_reference_again_makes_source_clips_stale(make_session):
 @pytest.mark.parametrize("goes_on", [True, False])
 def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_session, goes_on):
     session = make_session()
-    session.dispatch(c.SetClipLength(2))
+    session.dispatch(SetClipLength(2))
     overrides: dict[str, object] = {"field": "continue"} if goes_on else {}
     session.document.settle()
     session.project.update(replace(session.project.settings, overrides=overrides))
@@ -234,7 +238,7 @@ def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_sessi
         train_next(session)
     assert {state.state for state in session.clip_states} == {"trained"}
     session.project.update(replace(session.project.settings, overrides=overrides | {"joint_steps": 9}))
-    session.dispatch(c.TrainClip(1, is_confirmed=True))
+    session.dispatch(TrainClip(1, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     later = "stale" if goes_on else "trained"
     assert [state.state for state in session.clip_states] == ["trained", "trained"] + [later] * (n_clips - 2)
@@ -251,13 +255,13 @@ def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_fini
     slow = make_slow if ends_by == "stopping" else partial(_fails_at, step=3)
     session = make_session(make_training=slow, name=folder.name)
     poll_until(session, lambda: session.training.psnr_history == history, what="the curve on disk")
-    session.dispatch(c.TrainClip(0, is_confirmed=True))
+    session.dispatch(TrainClip(0, is_confirmed=True))
     assert session.training.psnr_history == history  # the picture is that of the finished clip as well
     assert session.clip_states[0].held_out_psnr == psnr
     if ends_by == "stopping":
         poll_until(session, lambda: session.training.step >= 3)
         assert session.training.psnr_history != history
-        session.dispatch(c.StopTraining())
+        session.dispatch(StopTraining())
     poll_until(session, lambda: session.training.state in ("idle", "failed"))
     assert {path: path.read_bytes() for path in kept} == kept
     status = session.clip_states[0]
@@ -266,7 +270,7 @@ def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_fini
     poll_until(session, lambda: session.training.psnr_history == history, what="the curve of the finished clip")
     session.close()
     session = make_session(make_training=partial(_until, n_steps=status.resume_step + 2), name=folder.name)
-    session.dispatch(c.TrainClip(0, is_confirmed=True))
+    session.dispatch(TrainClip(0, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     assert session.clip_states[0].resume_step is None
     steps = [step for step, _ in session.training.psnr_history]
@@ -283,15 +287,15 @@ def _fails_at(job, store, report, *, step):
 
 def test_what_was_learned_fixes_clip_length_and_hold_out(make_session):
     session = make_session()
-    session.dispatch(c.SetHoldout((1,)))
+    session.dispatch(SetHoldout((1,)))
     assert session.holdout == (1,)
     session.document.settle()
     assert read_settings(session.project.folder).holdout == ("1",)
-    session.dispatch(c.SetHoldout((0, 1, 2)))
+    session.dispatch(SetHoldout((0, 1, 2)))
     assert "leaves 1 for training" in session.notices[-1].detail
     assert session.holdout == (1,)
     train_next(session)
-    session.dispatch(c.SetClipLength(2))
+    session.dispatch(SetClipLength(2))
     assert "fixed once one is finished; there is 1 trained clip" in session.notices[-1].detail
     assert session.project.settings.clip_length == 6
 
@@ -304,12 +308,12 @@ def planned(session) -> PlanStatus:
 
 def test_the_next_clip_has_a_plan_that_follows_the_settings(make_session):
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     before = planned(session)
     assert (before.clip_index, before.preset, before.can_edit) == (0, "small", True)
     assert before.summary.startswith("1,500 steps, ")
     assert {setting.name: setting.value for setting in before.settings}["joint_steps"] == 1200
-    session.dispatch(c.SetTrainSetting("joint_steps", 50))
+    session.dispatch(SetTrainSetting("joint_steps", 50))
     assert session.plan.summary == ""  # the old figures would be wrong
     after = planned(session)
     assert after.summary.startswith("350 steps, ")
@@ -317,7 +321,7 @@ def test_the_next_clip_has_a_plan_that_follows_the_settings(make_session):
     assert (changed.name, changed.value) == ("joint_steps", 50)
     session.document.settle()
     assert read_settings(session.project.folder).overrides == {"joint_steps": 50}
-    session.dispatch(c.SetTrainSetting("joint_steps", 0))  # derived again
+    session.dispatch(SetTrainSetting("joint_steps", 0))  # derived again
     session.document.settle()
     assert read_settings(session.project.folder).overrides == {}
     assert planned(session) == before
@@ -326,8 +330,8 @@ def test_the_next_clip_has_a_plan_that_follows_the_settings(make_session):
 @pytest.mark.parametrize("name", list(PRESETS))
 def test_a_preset_takes_the_place_of_what_was_set(make_session, name):
     session = make_session()
-    session.dispatch(c.SetTrainSetting("joint_steps", 50))
-    session.dispatch(c.SetPreset(name))
+    session.dispatch(SetTrainSetting("joint_steps", 50))
+    session.dispatch(SetPreset(name))
     assert session.project.settings.overrides == PRESETS[name]
     assert session.plan.preset == name
 
@@ -335,9 +339,9 @@ def test_a_preset_takes_the_place_of_what_was_set(make_session, name):
 @pytest.mark.parametrize(
     ("command", "expected"),
     [
-        (c.SetTrainSetting("joint_steps", -1), "joint_steps is -1"),
-        (c.SetTrainSetting("speed", 3), "no training setting called speed"),
-        (c.SetPreset("huge"), "no preset called 'huge'"),
+        (SetTrainSetting("joint_steps", -1), "joint_steps is -1"),
+        (SetTrainSetting("speed", 3), "no training setting called speed"),
+        (SetPreset("huge"), "no preset called 'huge'"),
     ],
 )
 def test_a_setting_that_cannot_be_is_told_and_changes_nothing(make_session, command, expected):
@@ -349,14 +353,14 @@ def test_a_setting_that_cannot_be_is_told_and_changes_nothing(make_session, comm
 
 def test_what_was_learned_fixes_the_training_settings(make_session):
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(SetClipLength(3))
+    session.dispatch(TrainNextClip())
     assert session.plan is None  # something trains
     poll_until(session, lambda: session.clip_states[0].state == "trained", what="the clip")
     found = planned(session)
     assert (found.clip_index, found.can_edit) == (1, False)
     assert any(name == "source steps" for name, _ in found.lines)
-    session.dispatch(c.SetPreset("toy"))
+    session.dispatch(SetPreset("toy"))
     assert "fixed" in session.notices[-1].detail
     assert session.project.settings.overrides == {}
 
@@ -401,12 +405,12 @@ def test_there_is_something_to_see_before_and_after_training(make_session):
     points, colors, _ = session.shown_points()
     assert points.shape == colors.shape
     assert session.shown_points().is_hint
-    session.dispatch(c.LookThrough(1))
+    session.dispatch(LookThrough(1))
     assert session.shown_points() is None  # the captured picture says more
-    session.dispatch(c.LookThrough(None))
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(LookThrough(None))
+    session.dispatch(SetClipLength(3))
     train_next(session)
-    session.dispatch(c.SetFrame(5))
+    session.dispatch(SetFrame(5))
     poll_until(session, lambda: session.shown_points() is not None and not session.shown_points().is_hint)
     assert len(session.shown_points().points) == 12
 
@@ -431,7 +435,7 @@ def test_a_project_that_another_program_writes_to_opens_for_reading(make_session
     assert first.training.can_train_next
     assert not second.training.can_train_next
     assert "read-only" in second.notices[0].title
-    second.dispatch(c.TrainNextClip())
+    second.dispatch(TrainNextClip())
     assert "read-only" in second.notices[-1].detail
     assert second.training.state == "idle"
 
@@ -441,28 +445,28 @@ def test_a_project_folder_opens_by_itself(make_session, tmp_path):
     train_next(first)
     first.close()
     session = make_session(is_open=False)
-    session.dispatch(c.OpenProject(tmp_path / "p"))
+    session.dispatch(OpenProject(tmp_path / "p"))
     poll_until(session, lambda: session.capture is not None)
     assert session.clip_states[0].state == "trained"
 
 
 def test_opening_another_capture_keeps_a_running_training(make_session, tmp_path, capture_folder):
     session = make_session(make_training=make_slow)
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.step >= 2)
     first = session.project
-    session.opener.project_dir = tmp_path / "q"
-    session.dispatch(c.OpenCapture(capture_folder))
+    session.projects.opener.project_dir = tmp_path / "q"
+    session.dispatch(OpenCapture(capture_folder))
     poll_until(session, lambda: session.question is not None, what="the question")
     assert isinstance(session.question, LeaveQuestion)
     assert (session.question.name, session.question.clip_index, session.question.step >= 2) == ("q", 0, True)
-    session.dispatch(c.CloseQuestion())
+    session.dispatch(CloseQuestion())
     assert session.training.state == "running"
     assert session.project is first
     assert not (tmp_path / "q").exists()  # the project that was made for it is gone
-    session.dispatch(c.OpenCapture(capture_folder))
+    session.dispatch(OpenCapture(capture_folder))
     poll_until(session, lambda: session.question is not None, what="the question")
-    session.dispatch(c.LeaveTraining())
+    session.dispatch(LeaveTraining())
     poll_until(session, lambda: session.project.folder.name == "q" and not session.jobs)
     assert session.clip_states[0].state == "untrained"
     assert read_clip_state(first.checkpoint_path(0)).header.step >= 2
@@ -471,15 +475,15 @@ def test_opening_another_capture_keeps_a_running_training(make_session, tmp_path
 
 def test_compare_overlays_and_views_follow_commands(make_session):
     session = make_session()
-    session.dispatch(c.SetCompare("wipe"))
-    session.dispatch(c.ToggleOverlay("show_points"))
-    session.dispatch(c.LookThrough(2))
-    session.dispatch(c.SetFrame(99))
+    session.dispatch(SetCompare("wipe"))
+    session.dispatch(ToggleOverlay("show_points"))
+    session.dispatch(LookThrough(2))
+    session.dispatch(SetFrame(99))
     assert session.overlays.compare == "wipe"
     assert session.overlays.show_points is False
     assert np.array_equal(session.view.world_to_camera(), session.rig.world_to_camera[2])
     assert session.timeline.frame_index == 5
     with pytest.raises(ValueError, match="compare is one of"):
-        session.dispatch(c.SetCompare("flip"))
+        session.dispatch(SetCompare("flip"))
     with pytest.raises(TypeError, match="not a command"):
         session.dispatch("SetFrame")

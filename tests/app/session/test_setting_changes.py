@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from app.project.opening.opened_project import OpenedProject
-from app.session.commands import SetClipLength, SetHoldout, SetPreset, SettingCommand, SetTrainSetting
 from app.session.projects.setting_changes import changed_settings
+from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SettingCommand, SetTrainSetting
 from engine.errors import EngineError
 from engine.training.presets import PRESETS
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from app.playback.modes.view_modes import CONTENTS, MODES
-from app.session.commands import SetCompareWith, SetContent, SetMode, ShowViews
 from app.session.projects.settings import Settings
 from app.session.session import Session
+from app.session.showing.look_commands import SetCompareWith, SetContent, SetMode, ShowViews
 from app.status import CAPTURED, version_name, version_number
 
 

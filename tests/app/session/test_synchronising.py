@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 
 from app.background.jobs import JobCancelled
-from app.session import commands as c
+from app.session.captures.capture_commands import ApplyOffsets, SynchroniseCameras
+from app.session.commands import CloseQuestion
+from app.session.projects.project_commands import OpenCapture
+from app.session.training.train_commands import TrainNextClip
 from engine.capture.capture import open_capture
 from engine.errors import CaptureError
 from engine.progress import Progress
@@ -35,7 +38,7 @@ def found(offsets, sigma=0.1):
 def session(make_session, capture_folder, tmp_path):
     """With a copy of the tiny capture open."""
     session = make_session(is_open=False)
-    session.dispatch(c.OpenCapture(shutil.copytree(capture_folder, tmp_path / "ring")))
+    session.dispatch(OpenCapture(shutil.copytree(capture_folder, tmp_path / "ring")))
     poll_until(session, lambda: session.capture is not None)
     return session
 
@@ -48,7 +51,7 @@ def measure(session, monkeypatch, result):
         return result
 
     monkeypatch.setattr("app.session.captures.synchronising.synchronise", synchronise)
-    session.dispatch(c.SynchroniseCameras())
+    session.dispatch(SynchroniseCameras())
     poll_until(session, lambda: session.synchronising.page.state == "done")
     return session.synchronising.page
 
@@ -65,7 +68,7 @@ def test_offsets_are_shown_and_nothing_is_written_before_that_is_said(session, m
 
 def test_applying_corrects_the_capture(session, monkeypatch):
     page = measure(session, monkeypatch, found([0.0, 2.0, 0.0, -1.0]))
-    session.dispatch(c.ApplyOffsets(page.target))
+    session.dispatch(ApplyOffsets(page.target))
     poll_until(session, lambda: session.synchronising.page.state == "written")
     document = json.loads((session.capture.path / "capture.json").read_text())
     assert [row["offset_frames"] for row in document["cameras"]] == [0.0, 2.0, 0.0, -1.0]
@@ -73,11 +76,11 @@ def test_applying_corrects_the_capture(session, monkeypatch):
 
 
 def test_where_something_is_trained_the_corrected_capture_is_another_one(session, monkeypatch, tmp_path):
-    session.dispatch(c.TrainNextClip())
+    session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.clip_states[0].state == "trained")
     page = measure(session, monkeypatch, found([0.0, 2.0, 0.0, 0.0]))
     assert page.target == tmp_path / "ring-synchronised"
-    session.dispatch(c.ApplyOffsets(page.target))
+    session.dispatch(ApplyOffsets(page.target))
     poll_until(session, lambda: session.synchronising.page.state == "written")
     assert session.synchronising.page.written == tmp_path / "ring-synchronised"
     assert not (tmp_path / "ring" / "capture.json").exists()
@@ -93,7 +96,7 @@ def test_why_it_could_not_be_measured_or_written_is_told(session, monkeypatch, t
     assert "truncated" in measure(session, monkeypatch, CaptureError("It is truncated.")).failure
     page = measure(session, monkeypatch, found([0.0, 2.0, 0.0, 0.0]))
     (tmp_path / "file").write_text("")
-    session.dispatch(c.ApplyOffsets(tmp_path / "file"))
+    session.dispatch(ApplyOffsets(tmp_path / "file"))
     poll_until(session, lambda: session.synchronising.page.failure)
     assert "could not be written" in session.synchronising.page.failure
     assert session.synchronising.page.rows == page.rows
@@ -111,9 +114,9 @@ def test_closing_ends_the_measurement(session, monkeypatch):
             raise
 
     monkeypatch.setattr("app.session.captures.synchronising.synchronise", synchronise)
-    session.dispatch(c.SynchroniseCameras())
+    session.dispatch(SynchroniseCameras())
     poll_until(session, lambda: session.synchronising.progress.message == "motion - camera 3")
-    session.dispatch(c.CloseQuestion())
+    session.dispatch(CloseQuestion())
     assert session.synchronising.page is None
     assert ended.wait(10)
     poll_until(session, lambda: True)
@@ -122,5 +125,5 @@ def test_closing_ends_the_measurement(session, monkeypatch):
 
 def test_without_a_capture_there_is_a_notice(make_session):
     session = make_session(is_open=False)
-    session.dispatch(c.SynchroniseCameras())
+    session.dispatch(SynchroniseCameras())
     assert session.notices[0].title == "The cameras cannot be synchronised"

@@ -12,8 +12,10 @@ from pyglet.window import key, mouse
 
 from app.cli.cli import main
 from app.project.opening.project_access import open_project
-from app.session.commands import AskExport, CloseQuestion, OpenProject
+from app.session.commands import CloseQuestion
 from app.session.editing.edit_commands import AddEdit, PutMarker
+from app.session.export_commands import AskExport
+from app.session.projects.project_commands import OpenProject
 from engine.editing.actions import Delete
 from engine.editing.edit import Sphere
 from tests.app.residuals.conftest import make_project

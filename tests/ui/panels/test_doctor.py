@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.session import commands
+from app.session.captures.capture_commands import (
+    CorrectCapture,
+    ExamineCapture,
+    LookAtVideos,
+    StopExamining,
+    SynchroniseCameras,
+)
 from app.session.captures.doctor_status import DoctorStatus
 from app.session.questions import CorrectionQuestion
+from app.session.showing.look_commands import LookThrough, SetFrame
 from app.status import JobStatus
 from engine.capture.writers.capture_json import Corrections
 from engine.cloud.background.exposure_survey import ExposureSurvey
@@ -54,12 +61,12 @@ def diagnosis(names: tuple[str, ...]) -> Diagnosis:
 def test_a_capture_is_examined_from_the_panel_and_stopped(pilot: Pilot) -> None:
     open_panel(pilot, DoctorStatus())
     pilot.click("doctor.examine")
-    assert pilot.session.commands[-1] == commands.ExamineCapture()
+    assert pilot.session.commands[-1] == ExamineCapture()
     open_panel(
         pilot, DoctorStatus("running", (), None, JobStatus("Doctor", 0.4, "looking at pictures of 100 %s", 1.0), 2)
     )
     pilot.click("doctor.stop")
-    assert pilot.session.commands[-1] == commands.StopExamining()
+    assert pilot.session.commands[-1] == StopExamining()
     assert not [notice for notice in pilot.session.notices if notice.kind == "error"]
 
 
@@ -71,14 +78,14 @@ def test_findings_offer_what_corrects_them(pilot: Pilot) -> None:
     assert {"doctor.finding0", "doctor.picture0", "doctor.picture1", "doctor.map", "doctor.bars"} <= rects.keys()
     pilot.click("doctor.fix")
     asked = pilot.session.commands[-1]
-    assert isinstance(asked, commands.CorrectCapture)
+    assert isinstance(asked, CorrectCapture)
     assert not asked.is_confirmed
     assert asked.corrections == found.findings[0].fix
     pilot.click("doctor.calibrate")
-    assert pilot.session.commands[-1] == commands.LookAtVideos(pilot.session.capture.path)
+    assert pilot.session.commands[-1] == LookAtVideos(pilot.session.capture.path)
     assert "doctor.synchronise" not in rects
     pilot.click("doctor.picture1")
-    assert pilot.session.commands[-2:] == [commands.SetFrame(3), commands.LookThrough(2)]
+    assert pilot.session.commands[-2:] == [SetFrame(3), LookThrough(2)]
     pilot.click("doctor.finding1")
     pilot.draw(3)
     assert "doctor.fix" not in pilot.studio.frame.ui.rects
@@ -91,7 +98,7 @@ def test_cameras_out_of_step_lead_to_the_dialog_that_measures_them(pilot: Pilot)
     late = Finding("synchronisation", "warning", (name,), (), f"{name} is late.", 0.9, "Shift it.", None)
     open_panel(pilot, DoctorStatus("done", (late,), None, revision=4))
     pilot.click("doctor.synchronise")
-    assert pilot.session.commands[-1] == commands.SynchroniseCameras()
+    assert pilot.session.commands[-1] == SynchroniseCameras()
     assert "doctor.calibrate" not in pilot.studio.frame.ui.rects
 
 

@@ -8,7 +8,6 @@ import pytest
 from pyglet.window import key, mouse
 
 from app.session.clips.clip_commands import ApplyDeletions
-from app.session.commands import MarkBox, MarkRegion
 from app.session.edit_status import EditsStatus, HistoryStatus
 from app.session.editing.edit_commands import (
     AddEdit,
@@ -23,6 +22,7 @@ from app.session.editing.edit_commands import (
     SetScale,
     SetUp,
 )
+from app.session.editing.mark_commands import MarkBox, MarkRegion
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.actions import Delete, Expose, Hide, Smooth
 from engine.editing.edit import Box, Scope, Sphere

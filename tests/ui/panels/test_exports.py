@@ -15,7 +15,17 @@ from app.export.export_progress import ExportProgress, ExportResult
 from app.export.jobs.answers import Answers
 from app.export.jobs.video import Turntable
 from app.export.queue.export_status import ExportStatus
-from app.session import commands
+from app.session.commands import CloseQuestion
+from app.session.export_commands import (
+    AskExport,
+    CancelExport,
+    ClearExports,
+    MoveExport,
+    RemoveExport,
+    RetryExport,
+    ShowExport,
+    StartExport,
+)
 from app.session.exporting import ExportPage
 from tests.ui.pilot import CTRL, Pilot
 from ui.panels.exports import bytes_text, ending_text, files_text, progress_text
@@ -48,7 +58,7 @@ def test_edits_go_along_or_are_left_out(open_pilot) -> None:
         if takes_edits:
             pilot.click("export.has_edits.false")
             pilot.click("export.start")
-            [started] = pilot.sent(commands.StartExport)[-1:]
+            [started] = pilot.sent(StartExport)[-1:]
             assert Answers(CONTEXT_WITH_EDITS, started.choices)["has_edits"] == "false"
         pilot.session.exporting.page = None
         pilot.draw(4)
@@ -81,10 +91,10 @@ def asked(pilot: Pilot) -> ExportChoices:
 @pytest.mark.gl
 def test_ctrl_e_asks_and_enter_exports(pilot: Pilot) -> None:
     pilot.key(key.E, modifiers=(CTRL,))
-    assert pilot.session.commands[-1] == commands.AskExport()
+    assert pilot.session.commands[-1] == AskExport()
     ask(pilot, ExportChoices(out="/out/g"))
     pilot.key(key.ENTER)
-    assert pilot.session.commands[-1] == commands.StartExport(ExportChoices(out="/out/g"))
+    assert pilot.session.commands[-1] == StartExport(ExportChoices(out="/out/g"))
     pilot.session.exporting.page = None
     pilot.draw(4)
     assert pilot.studio.frame.ui.rects.get("exports.ask") is not None  # the panel has come to the front
@@ -97,9 +107,9 @@ def test_escape_closes_and_problems_hold_it_back(pilot: Pilot) -> None:
     assert "export.problem" in pilot.rects
     pilot.key(key.ENTER)
     pilot.click("export.start")
-    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    assert not [one for one in pilot.session.commands if isinstance(one, StartExport)]
     pilot.key(key.ESCAPE)
-    assert pilot.session.commands[-1] == commands.CloseQuestion()
+    assert pilot.session.commands[-1] == CloseQuestion()
     assert not errors(pilot)
 
 
@@ -109,7 +119,7 @@ def test_while_it_is_looked_at_nothing_can_be_exported(pilot: Pilot) -> None:
     pilot.session.exporting.found = None
     pilot.draw(2)
     pilot.key(key.ENTER)
-    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    assert not [one for one in pilot.session.commands if isinstance(one, StartExport)]
 
 
 @pytest.mark.gl
@@ -128,7 +138,7 @@ def test_every_kind_is_asked_for_and_gets_a_name_unless_one_was_typed(pilot: Pil
     pilot.click("export.frames.range")
     pilot.draw(2)
     assert asked(pilot) == ExportChoices("metrics", (("metrics.format", "json"),), "range", "/mine")
-    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    assert not [one for one in pilot.session.commands if isinstance(one, StartExport)]
     assert not errors(pilot)
 
 
@@ -178,12 +188,12 @@ def test_nothing_is_exported_before_there_is_a_name(pilot: Pilot) -> None:
     ask(pilot, ExportChoices())
     pilot.key(key.ENTER)
     assert exporting.asked == []
-    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    assert not [one for one in pilot.session.commands if isinstance(one, StartExport)]
     exporting.is_looking = False
     pilot.draw(2)
     assert asked(pilot).out == "/out/gaussians"
     pilot.key(key.ENTER)
-    assert pilot.session.commands[-1] == commands.StartExport(ExportChoices(out="/out/gaussians"))
+    assert pilot.session.commands[-1] == StartExport(ExportChoices(out="/out/gaussians"))
 
 
 @pytest.mark.gl
@@ -200,9 +210,9 @@ def test_a_box_of_answers_takes_enter_and_escape_for_itself(pilot: Pilot) -> Non
     pilot.draw(3)
     pilot.key(key.ESCAPE)
     pilot.draw(2)
-    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport | commands.CloseQuestion)]
+    assert not [one for one in pilot.session.commands if isinstance(one, StartExport | CloseQuestion)]
     pilot.key(key.ENTER)
-    assert [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    assert [one for one in pilot.session.commands if isinstance(one, StartExport)]
 
 
 @pytest.mark.gl
@@ -218,20 +228,20 @@ def test_the_panel_lists_exports_and_its_buttons_act(pilot: Pilot) -> None:
     pilot.studio.frame.ui.wanted_panel = EXPORTS
     pilot.draw(8)
     for button, command in (
-        ("cancel1", commands.CancelExport(1)),
-        ("down2", commands.MoveExport(2, 1)),
-        ("up3", commands.MoveExport(3, 0)),
+        ("cancel1", CancelExport(1)),
+        ("down2", MoveExport(2, 1)),
+        ("up3", MoveExport(3, 0)),
     ):
         pilot.click(f"exports.{button}")
         assert pilot.session.commands[-1] == command
     pilot.session.exporting.statuses = pilot.session.exporting.statuses[3:]
     pilot.draw(4)
     for button, command in (
-        ("show4", commands.ShowExport(4)),
-        ("remove4", commands.RemoveExport(4)),
-        ("retry5", commands.RetryExport(5)),
-        ("clear", commands.ClearExports()),
-        ("ask", commands.AskExport()),
+        ("show4", ShowExport(4)),
+        ("remove4", RemoveExport(4)),
+        ("retry5", RetryExport(5)),
+        ("clear", ClearExports()),
+        ("ask", AskExport()),
     ):
         pilot.click(f"exports.{button}")
         assert pilot.session.commands[-1] == command
@@ -252,9 +262,9 @@ def test_the_panel_is_reached_and_used_by_keyboard(pilot: Pilot) -> None:
     for _ in range(6):
         pilot.key(key.DOWN)
         pilot.key(key.ENTER)
-        if pilot.session.commands and pilot.session.commands[-1] == commands.RetryExport(1):
+        if pilot.session.commands and pilot.session.commands[-1] == RetryExport(1):
             break
-    assert commands.RetryExport(1) in pilot.session.commands
+    assert RetryExport(1) in pilot.session.commands
 
 
 def test_progress_in_words() -> None:

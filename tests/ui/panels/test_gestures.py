@@ -12,7 +12,7 @@ from pyglet.window import key, mouse
 
 from app.playback.views.orbit_view import OrbitView
 from app.playback.views.view_motion import EASE_S
-from app.session import commands
+from app.session.editing.mark_commands import MarkRegion
 from app.session.projects.window_memory import WindowMemory, read_window_memory
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -278,7 +278,7 @@ def test_lens_leaning_and_perspective_by_key(pilot: Pilot) -> None:
 
 def test_framing_by_key_takes_what_is_highlighted_then_the_pivot_then_all(pilot: Pilot) -> None:
     view, rotation = pilot.session.view, pilot.session.view.rotation
-    pilot.session.dispatch(commands.MarkRegion("static", (0.5, 0.2, -0.4), 0.1))
+    pilot.session.dispatch(MarkRegion("static", (0.5, 0.2, -0.4), 0.1))
     pilot.key(key.N)
     pilot.key(key.F, modifiers=(SHIFT,))
     assert np.allclose(view.pivot, [0.5, 0.2, -0.4])

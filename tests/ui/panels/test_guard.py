@@ -11,8 +11,8 @@ from imgui_bundle import imgui, implot
 from pyglet.window import key
 
 from app.playback.modes.view_modes import MODES
-from app.session import commands
 from app.session.questions import RetrainQuestion
+from app.session.showing.look_commands import ActivateView, SetCompare, SetMode, ShowViews
 from app.status import ClipStatus
 from tests.ui.pilot import CTRL, Pilot
 from ui.panels.guard import logger
@@ -179,11 +179,11 @@ def test_every_mode_is_drawn_in_every_view_however_it_is_compared(
 ) -> None:
     _look_through_a_camera_in_four_views(pilot)
     for n_views, compare, mode in itertools.product((2, 4), ("wipe", "side", "blink"), MODES):
-        pilot.session.dispatch(commands.ShowViews(n_views))
+        pilot.session.dispatch(ShowViews(n_views))
         for index in range(n_views):
-            pilot.session.dispatch(commands.ActivateView(index))
-            pilot.session.dispatch(commands.SetCompare(compare))
-            pilot.session.dispatch(commands.SetMode(mode))
+            pilot.session.dispatch(ActivateView(index))
+            pilot.session.dispatch(SetCompare(compare))
+            pilot.session.dispatch(SetMode(mode))
             pilot.draw()
             assert told(pilot) == [], (n_views, compare, mode, index)
 

@@ -12,7 +12,7 @@ from pyglet.window import key
 
 import ui.panels.picture.comparison as comparison
 from app.playback.modes.view_modes import CONTENTS, MODES
-from app.session.commands import LookThrough, SetCompare, SetCompareWith, SetContent, SetMode, ShowHeat
+from app.session.showing.look_commands import LookThrough, SetCompare, SetCompareWith, SetContent, SetMode, ShowHeat
 from app.status import BLINK_HZ, CAPTURED, ClipStatus, Overlays, VersionStatus, version_name, version_number
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import SHIFT, Pilot

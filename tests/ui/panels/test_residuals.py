@@ -12,7 +12,7 @@ from pyglet.window import key
 
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
-from app.session import commands
+from app.session.showing.look_commands import LookThrough, SetCompare, SetFrame, ShowHeat
 from app.status import CELL_RANGES, ResidualStatus, SeamStatus
 from engine.text import camera_text
 from tests.ui.pilot import Pilot
@@ -172,13 +172,13 @@ def test_a_seam_is_played_around_as_its_worst_camera_sees_it(pilot: Pilot) -> No
 
 
 def test_a_heat_map_lies_over_the_picture_with_its_bar_and_the_value_under_the_pointer(pilot: Pilot) -> None:
-    pilot.session.dispatch(commands.LookThrough(2))
+    pilot.session.dispatch(LookThrough(2))
     pilot.key(key.RIGHT)
     pilot.draw(3)
     before = pilot.picture()
     pilot.key(key._7)
     pilot.draw(3)
-    assert pilot.sent(commands.ShowHeat) == [commands.ShowHeat("E")]
+    assert pilot.sent(ShowHeat) == [ShowHeat("E")]
     pane, bar = pilot.rects["viewport.rendered"], pilot.rects["viewport.heat_bar"]
     assert pane.contains(bar.x0, bar.y0)
     assert np.abs(pilot.picture().astype(int) - before).mean() > 5.0
@@ -192,11 +192,11 @@ def test_a_heat_map_lies_over_the_picture_with_its_bar_and_the_value_under_the_p
 
 
 def test_colours_keep_their_range_from_frame_to_frame(pilot: Pilot) -> None:
-    pilot.session.dispatch(commands.LookThrough(2))
-    pilot.session.dispatch(commands.ShowHeat("error"))
+    pilot.session.dispatch(LookThrough(2))
+    pilot.session.dispatch(ShowHeat("error"))
     strips = []
     for frame_index in (3, 17):
-        pilot.session.dispatch(commands.SetFrame(frame_index))
+        pilot.session.dispatch(SetFrame(frame_index))
         pilot.draw(4)
         pane = pilot.rects["viewport.rendered"]
         y = int(pane.y0 + pane.height * 0.8)
@@ -205,8 +205,8 @@ def test_colours_keep_their_range_from_frame_to_frame(pilot: Pilot) -> None:
 
 
 def test_where_there_is_no_map_the_reason_is_said_and_nothing_breaks(pilot: Pilot) -> None:
-    pilot.session.dispatch(commands.LookThrough(2))
-    pilot.session.dispatch(commands.ShowHeat("E"))
+    pilot.session.dispatch(LookThrough(2))
+    pilot.session.dispatch(ShowHeat("E"))
     pilot.draw(4)
     assert pilot.studio.frame.viewport.active.heat.shown is None
     assert len(pilot.session.notices) == 0
@@ -214,8 +214,8 @@ def test_where_there_is_no_map_the_reason_is_said_and_nothing_breaks(pilot: Pilo
 
 
 def test_every_kind_can_be_chosen_by_key(pilot: Pilot) -> None:
-    pilot.session.dispatch(commands.LookThrough(2))
-    pilot.session.dispatch(commands.SetFrame(4))
+    pilot.session.dispatch(LookThrough(2))
+    pilot.session.dispatch(SetFrame(4))
     seen = []
     for _ in HEAT_KINDS:
         pilot.key(key._8)
@@ -228,7 +228,7 @@ def test_every_kind_can_be_chosen_by_key(pilot: Pilot) -> None:
 def test_in_a_free_view_anchors_show_their_residual(pilot: Pilot) -> None:
     pilot.draw(3)
     before = pilot.picture()
-    pilot.session.dispatch(commands.ShowHeat("error"))
+    pilot.session.dispatch(ShowHeat("error"))
     pilot.draw(4)
     pane = pilot.rects["viewport.rendered"]
     x, y = (int(v) for v in pane.center)
@@ -257,10 +257,10 @@ def test_words_of_a_heat_map_lie_over_the_wipe_and_fit_into_the_picture(
         lambda draw, x, y, text, **_: drawn.append(f"{text}|{x - imgui.calc_text_size(text).x}"),
     )
     monkeypatch.setattr("ui.panels.picture.picture_pane._draw_handle", lambda *_: drawn.append("wipe"))
-    pilot.session.dispatch(commands.LookThrough(2))
-    pilot.session.dispatch(commands.SetFrame(10))
-    pilot.session.dispatch(commands.ShowHeat("clips"))
-    pilot.session.dispatch(commands.SetCompare("wipe"))
+    pilot.session.dispatch(LookThrough(2))
+    pilot.session.dispatch(SetFrame(10))
+    pilot.session.dispatch(ShowHeat("clips"))
+    pilot.session.dispatch(SetCompare("wipe"))
     pilot.draw(3)
     drawn.clear()
     pilot.draw(1)

@@ -11,9 +11,10 @@ from imgui_bundle import imgui
 from pyglet.window import key, mouse
 
 from app.background.log_reader import LogLine
-from app.session.commands import (
+from app.session.commands import CloseQuestion
+from app.session.questions import OwnSetting, RetrainQuestion, SettingsQuestion
+from app.session.training.train_commands import (
     AskTrainSettings,
-    CloseQuestion,
     MoveInQueue,
     RemoveFromQueue,
     RemoveVersion,
@@ -24,7 +25,6 @@ from app.session.commands import (
     TrainClip,
     TrainClips,
 )
-from app.session.questions import OwnSetting, RetrainQuestion, SettingsQuestion
 from app.status import (
     ClipStatus,
     QueuedClip,

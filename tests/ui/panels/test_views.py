@@ -9,7 +9,7 @@ import pytest
 from pyglet.window import key
 
 from app.playback.views.views import Views
-from app.session import commands
+from app.session.showing.look_commands import LookThrough, SetCompare, ShowViews
 from tests.ui.fake_session import make_rig
 from tests.ui.pilot import Pilot
 from ui.panels.picture.panes import VIEW_GAP, view_areas
@@ -102,7 +102,7 @@ def test_each_view_looks_through_its_own_camera_and_they_share_time(pilot: Pilot
     assert cameras[0] != cameras[2]
     assert cameras[1] is cameras[3] is None
     assert pilot.session.timeline.frame_index == 1
-    assert pilot.sent(commands.ShowViews) == [commands.ShowViews(4)]
+    assert pilot.sent(ShowViews) == [ShowViews(4)]
     first, last = pilot.rects["viewport.view0"], pilot.rects["viewport.view3"]
     assert last.x0 > first.x1
     assert last.y0 > first.y1
@@ -119,9 +119,9 @@ def test_words_over_small_views_stay_in_their_view_and_parts_stay_whole(pilot: P
         "156 x 117",
     ]
     pilot.studio.window.set_size(900, 600)
-    pilot.session.dispatch(commands.LookThrough(2))
-    pilot.session.dispatch(commands.SetCompare("wipe"))
-    pilot.session.dispatch(commands.ShowViews(4))
+    pilot.session.dispatch(LookThrough(2))
+    pilot.session.dispatch(SetCompare("wipe"))
+    pilot.session.dispatch(ShowViews(4))
     pilot.draw(4)
     before = pilot.picture()
     view, other = pilot.rects["viewport.view3"], pilot.rects["viewport.view1"]

@@ -12,7 +12,7 @@ from pyglet.window import key
 
 from app.document.storing.recovery import Recovery
 from app.project.opening.project_choices import ProjectChoices
-from app.session.commands import CloseQuestion, OpenCapture, OpenProject
+from app.session.commands import CloseQuestion
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, SaveProjectAs, ShowProjectFolder
 from app.session.files.file_questions import (
     SAVING,
@@ -21,6 +21,7 @@ from app.session.files.file_questions import (
     SaveAsQuestion,
     SavingQuestion,
 )
+from app.session.projects.project_commands import OpenCapture, OpenProject
 from app.status import JobStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 from pyglet.window import key
 
-from app.session.commands import OpenCapture, SetMode, TrainNextClip
+from app.session.projects.project_commands import OpenCapture
+from app.session.showing.look_commands import SetMode
+from app.session.training.train_commands import TrainNextClip
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.panels.actions.table import ACTIONS

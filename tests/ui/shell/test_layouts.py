@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from pyglet.window import key
 
-from app.session.commands import SetFrame, TogglePlay
 from app.session.projects.preferences import PreferencesFile
+from app.session.projects.project_commands import OpenCapture, OpenProject
+from app.session.showing.look_commands import SetFrame, TogglePlay
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.panels.state import EDITS, PANELS, TIMELINE
@@ -137,7 +138,6 @@ def test_a_click_gives_the_keys_back(pilot: Pilot) -> None:
 
 
 def test_the_first_screen_is_driven_by_keyboard(open_pilot: Callable[..., Pilot]) -> None:
-    from app.session.commands import OpenCapture, OpenProject
 
     pilot = open_pilot(FakeSession(has_capture=False))
     for _ in range(4):

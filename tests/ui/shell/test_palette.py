@@ -13,7 +13,9 @@ from pyglet.window import key
 
 from app.playback.timeline import Timeline
 from app.project.recents import RecentProject
-from app.session.commands import LookThrough, OpenProject, SetFrame, TrainNextClip
+from app.session.projects.project_commands import OpenProject
+from app.session.showing.look_commands import LookThrough, SetFrame
+from app.session.training.train_commands import TrainNextClip
 from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot

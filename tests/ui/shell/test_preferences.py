@@ -10,9 +10,10 @@ import pytest
 from pyglet.window import key
 
 from app.project.projects_folder import VARIABLE
-from app.session.commands import SetFrameMemory, TogglePlay, TrainNextClip
 from app.session.projects.preferences import PreferencesFile
 from app.session.projects.window_memory import WindowMemory
+from app.session.showing.look_commands import SetFrameMemory, TogglePlay
+from app.session.training.train_commands import TrainNextClip
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot
 from ui.panels.actions.table import ACTIONS

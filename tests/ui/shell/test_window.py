@@ -15,22 +15,13 @@ from imgui_bundle import imgui
 from pyglet.window import key, mouse
 
 from app.playback.modes.arrays import AnchorArrays
-from app.session.commands import (
-    DismissNotice,
-    LookThrough,
-    OpenCapture,
-    PauseTraining,
-    SetCompare,
-    SetFrame,
-    SetPreset,
-    SetTrainSetting,
-    StopTraining,
-    ToggleOverlay,
-    TogglePlay,
-    TrainNextClip,
-)
+from app.session.commands import DismissNotice
+from app.session.projects.project_commands import OpenCapture
+from app.session.projects.setting_commands import SetPreset, SetTrainSetting
 from app.session.projects.settings import Settings
 from app.session.session import Session
+from app.session.showing.look_commands import LookThrough, SetCompare, SetFrame, ToggleOverlay, TogglePlay
+from app.session.training.train_commands import PauseTraining, StopTraining, TrainNextClip
 from app.status import ClipStatus
 from engine.clip_files.roles import ROLES
 from engine.gate.reasons import USER_DYNAMIC

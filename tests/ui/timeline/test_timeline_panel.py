@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
-from app.session.commands import FollowTraining, SetFrame, TrainAll, TrainClip, TrainClips
 from app.session.projects.window_memory import WindowMemory, read_window_memory
+from app.session.showing.look_commands import FollowTraining, SetFrame
+from app.session.training.train_commands import TrainAll, TrainClip, TrainClips
 from app.status import ClipStatus, ResidualStatus, SeamStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.long_capture import MARKERS, long_session

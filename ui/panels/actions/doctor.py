@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.session.commands import ExamineCapture
+from app.session.captures.capture_commands import ExamineCapture
 from app.session.session_view import SessionView
 from ui.panels.actions.action import WINDOW, Action
 from ui.panels.state import DOCTOR, Dispatch, UiState

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.session.commands import AskExport
+from app.session.export_commands import AskExport
 from app.session.session_view import SessionView
 from ui.panels.actions.action import WINDOW, Action
 from ui.panels.state import Dispatch, UiState

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from app.playback.timeline import Timeline
-from app.session.commands import FollowTraining, SetFrame, TogglePlay
 from app.session.editing.edit_commands import RemoveMarker
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import FollowTraining, SetFrame, TogglePlay
 from ui.panels.actions.action import TIME, Action, Run
 from ui.panels.state import TIMELINE, Dispatch, UiState
 from ui.panels.timeline.marker_box import mark_playhead

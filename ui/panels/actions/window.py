@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from app.session.commands import AskStartOver, NewProject, SynchroniseCameras
+from app.session.captures.capture_commands import SynchroniseCameras
 from app.session.files.file_commands import AskSaveAs, ShowProjectFolder
+from app.session.projects.project_commands import AskStartOver, NewProject
 from app.session.session_view import SessionView
 from engine.assets import asset_path
 from ui.panels.actions.action import WINDOW, Action, Run

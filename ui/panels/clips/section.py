@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.project.disk.use import DiskUse
-from app.session.clips.clip_commands import AskFreeSpace, CompareVersion, TrainStale
-from app.session.commands import RemoveVersion, RestoreVersion
+from app.session.clips.clip_commands import AskFreeSpace, CompareVersion
 from app.session.session_view import SessionView
+from app.session.training.train_commands import RemoveVersion, RestoreVersion, TrainStale
 from app.status import DependencyStatus, QueueStatus, VersionStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text, size_text

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import LookThrough, SetFrame
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough, SetFrame
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding, PairEvidence, Point
 from ui.gl import ImageTexture

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import CorrectCapture, LookAtVideos, LookThrough, SetHoldout, SynchroniseCameras
+from app.session.captures.capture_commands import CorrectCapture, LookAtVideos, SynchroniseCameras
+from app.session.projects.setting_commands import SetHoldout
+from app.session.showing.look_commands import LookThrough
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding
 from ui.panels.doctor.words import SEVERITY_ICONS, SEVERITY_WORDS, certainty_text, fix_words, severity_color

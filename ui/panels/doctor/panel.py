@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
+from app.session.captures.capture_commands import ExamineCapture, StopExamining
 from app.session.captures.doctor_status import DoctorStatus
-from app.session.commands import ExamineCapture, LookThrough, StopExamining
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding
 from ui.gl import ImageTexture

@@ -13,8 +13,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.playback.views.scene_axes import rig_radius
-from app.session.commands import Undo
-from app.session.editing.edit_commands import SetScaleByLength, SetUpByGround
+from app.session.editing.edit_commands import SetScaleByLength, SetUpByGround, Undo
 from app.session.editing.selection_commands import InvertSelection, SelectVolume
 from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector

@@ -9,8 +9,8 @@ from typing import Any
 from imgui_bundle import ImVec2, imgui
 
 from app.document.changes.reach_words import reach_note
-from app.session.commands import MarkBox, MarkRegion
 from app.session.editing.edit_commands import AddEdit
+from app.session.editing.mark_commands import MarkBox, MarkRegion
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_scope, extent_text
 from app.session.editing.selection_commands import ClearSelection
 from app.session.session_view import SessionView

@@ -12,10 +12,10 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.project.mends.record import MendRecord
 from app.psnr_words import psnr_note
-from app.session.commands import TrainClip
 from app.session.mending.mend_commands import CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
 from app.session.session_view import SessionView
+from app.session.training.train_commands import TrainClip
 from app.status import JobStatus
 from engine.mending.figures import METHODS, StretchFigures
 from engine.text import duration_text

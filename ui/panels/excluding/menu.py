@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.session.commands import LookThrough
 from app.session.exclusions.exclusion_commands import ExcludeCameras, ExcludeFrames, RemoveMasks
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.excluding.mask_tool import SCOPES
 

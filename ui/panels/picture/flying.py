@@ -7,8 +7,8 @@ import math
 import numpy as np
 from imgui_bundle import imgui
 
-from app.session.commands import LookThrough
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough
 from ui.panels.picture.gestures import FLY_KEYS
 from ui.panels.state import Dispatch, UiState
 

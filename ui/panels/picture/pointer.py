@@ -12,8 +12,8 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.views.orbit_view import OrbitView
-from app.session.commands import LookThrough
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough
 from ui.panels.picture.flying import Flying
 from ui.panels.picture.gestures import Button, Gesture, modifier_words
 from ui.panels.picture.gizmo import gizmo_rect, tip_under

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import ActivateView
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import ActivateView
 from ui.panels.guard import Guard, draw_failed
 from ui.panels.picture.hud import Hud
 from ui.panels.picture.panes import view_areas

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.session.commands import Redo, Undo
 from app.session.edit_status import HistoryStatus
+from app.session.editing.edit_commands import Redo, Undo
 from ui.panels.state import Dispatch, UiState
 from ui.style.theme import Icon
 

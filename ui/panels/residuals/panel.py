@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import LookThrough, SetFrame
 from app.session.mending.mend_commands import AskMend
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough, SetFrame
 from app.status import CELL_COLUMNS, CELL_RANGES, LOW_IS_BAD, ResidualStatus, SeamStatus
 from engine.camera.rig import CameraRig
 from engine.text import camera_text, duration_text

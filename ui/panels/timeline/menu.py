@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.session.commands import SetFrame
 from app.session.mending.mend_commands import AskMend
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import SetFrame
 from engine.capture.clip import Clip
 from ui.panels.clips.menu import draw_cutting
 from ui.panels.editing.labels import draw_label_field

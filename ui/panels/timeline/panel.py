@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import SetFrame
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import SetFrame
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.timeline.jump_text import HINT, parse_jump
 from ui.panels.timeline.marker_box import draw_marker_box

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.session.commands import SetFrame
 from app.session.editing.edit_commands import MoveMarker
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import SetFrame
 from ui.panels.state import Dispatch
 from ui.panels.timeline.marker_box import edit_marker
 from ui.panels.timeline.rows.path_lane import DRAG_FROM, handle_keys_of_path

@@ -7,8 +7,8 @@ from fractions import Fraction
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.timeline import SPEEDS, Timeline
-from app.session.commands import FollowTraining, TogglePlay
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import FollowTraining, TogglePlay
 from engine.text import rate_text
 from ui.panels.actions.time import go_to_frame
 from ui.panels.pieces.widgets import text_right

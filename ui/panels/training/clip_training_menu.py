@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.session.clips.clip_commands import TrainStale
-from app.session.commands import AskTrainSettings, RemoveFromQueue, TrainAll, TrainClip, TrainClips
 from app.session.session_view import SessionView
+from app.session.training.train_commands import (
+    AskTrainSettings,
+    RemoveFromQueue,
+    TrainAll,
+    TrainClip,
+    TrainClips,
+    TrainStale,
+)
 from app.status import ClipStatus
 from engine.text import duration_text
 from ui.panels.pieces.copying import draw_copy_menu

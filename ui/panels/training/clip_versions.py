@@ -6,8 +6,8 @@ from imgui_bundle import imgui
 
 from app.psnr_words import psnr_label
 from app.session.clips.clip_commands import CompareVersion
-from app.session.commands import RemoveVersion, RestoreVersion
 from app.session.session_view import SessionView
+from app.session.training.train_commands import RemoveVersion, RestoreVersion
 from app.status import VersionStatus
 from engine.text import size_text
 from ui.panels.pieces.copying import draw_copy_menu

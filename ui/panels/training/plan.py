@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import AskStartOver, NewProject, SetPreset, SetTrainSetting
+from app.session.projects.project_commands import AskStartOver, NewProject
+from app.session.projects.setting_commands import SetPreset, SetTrainSetting
 from app.status import PlanStatus
 from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState

@@ -7,8 +7,15 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import MoveInQueue, RemoveFromQueue, SetLiveView, StopAfterClip, TrainAll, TrainClip
 from app.session.session_view import SessionView
+from app.session.training.train_commands import (
+    MoveInQueue,
+    RemoveFromQueue,
+    SetLiveView,
+    StopAfterClip,
+    TrainAll,
+    TrainClip,
+)
 from app.status import QueueStatus, SequenceForecast, UsageStatus
 from engine.text import duration_text, size_text
 from ui.panels.pieces.widgets import elided, text_right, text_wrapped_dim

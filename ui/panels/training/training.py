@@ -5,8 +5,9 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.psnr_words import psnr_label, psnr_note
-from app.session.commands import PauseTraining, ResumeTraining, SetFrame, StopTraining, TrainNextClip
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import SetFrame
+from app.session.training.train_commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
 from app.status import ClipStatus, TrainingStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text

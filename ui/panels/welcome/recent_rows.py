@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.modes.arrays import Picture
 from app.project.recents import RecentProject
-from app.session.commands import ForgetRecent, OpenCapture, OpenProject
+from app.session.projects.project_commands import ForgetRecent, OpenCapture, OpenProject
 from app.session.session_view import RecentView
 from engine.text import one_line
 from ui.gl import ImageTexture

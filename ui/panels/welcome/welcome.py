@@ -6,7 +6,7 @@ import time
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import OpenCapture
+from app.session.projects.project_commands import OpenCapture
 from app.session.session_view import SessionView
 from engine.assets import asset_path
 from ui.panels.pieces.widgets import draw_job_bar, pop_bold, primary_button, push_bold, text_right, text_wrapped_dim

@@ -12,7 +12,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.calibration.job import CalibrationRequest
 from app.session.captures.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
-from app.session.commands import CalibrateVideos, CloseQuestion, Command, KeepCalibration, OpenCapture, StopCalibration
+from app.session.captures.capture_commands import CalibrateVideos, KeepCalibration, StopCalibration
+from app.session.commands import CloseQuestion, Command
+from app.session.projects.project_commands import OpenCapture
 from app.session.session_view import SessionView
 from app.status import JobStatus
 from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance, Lens, Up

@@ -12,7 +12,8 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.clips.clip_commands import ApplyDeletions, FreeSpace
 from app.session.clips.clip_questions import ClipQuestion, CutQuestion, DamagedQuestion, DeletionsQuestion, RoomQuestion
-from app.session.commands import CloseQuestion, Command, RestoreVersion, TrainClip
+from app.session.commands import CloseQuestion, Command
+from app.session.training.train_commands import RestoreVersion, TrainClip
 from engine.text import duration_text, size_text
 from ui.panels.pieces.widgets import primary_button, text_wrapped
 from ui.panels.state import UiState

@@ -15,7 +15,8 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
 from app.project.opening.project_choices import ProjectChoices
-from app.session.commands import LookAtVideos, OpenCapture, OpenProject
+from app.session.captures.capture_commands import LookAtVideos
+from app.session.projects.project_commands import OpenCapture, OpenProject
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 

@@ -13,7 +13,8 @@ from app.export.jobs.answers import Answers
 from app.export.jobs.question import Question
 from app.export.jobs.table import KINDS
 from app.export.picked_frames import PickedFrames
-from app.session.commands import CloseQuestion, Command, StartExport
+from app.session.commands import CloseQuestion, Command
+from app.session.export_commands import StartExport
 from app.session.exporting import ExportPage
 from app.session.session_view import SessionView
 from engine.text import one_line

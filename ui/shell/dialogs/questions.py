@@ -12,18 +12,12 @@ from imgui_bundle import ImVec2, imgui
 
 from app.project.recents import RecentProject
 from app.psnr_words import psnr_words
+from app.session.captures.capture_commands import CorrectCapture
 from app.session.clips.clip_questions import ClipQuestion
-from app.session.commands import (
-    CloseQuestion,
-    Command,
-    CorrectCapture,
-    LeaveTraining,
-    OpenCapture,
-    OpenProject,
-    TrainClip,
-)
+from app.session.commands import CloseQuestion, Command
 from app.session.files.file_commands import CancelSaveAs
 from app.session.files.file_questions import RecoveryQuestion, RelocationQuestion, SaveAsQuestion, SavingQuestion
+from app.session.projects.project_commands import LeaveTraining, OpenCapture, OpenProject
 from app.session.questions import (
     CorrectionQuestion,
     LeaveQuestion,
@@ -34,6 +28,7 @@ from app.session.questions import (
     StartOverQuestion,
 )
 from app.session.session_view import SessionView
+from app.session.training.train_commands import TrainClip
 from engine.text import duration_text
 from ui.panels.pieces.widgets import elided, primary_button, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import CloseQuestion, Command, NewProject, StartOver
+from app.session.commands import CloseQuestion, Command
+from app.session.projects.project_commands import NewProject, StartOver
 from app.session.questions import StartOverQuestion
 from ui.panels.pieces.widgets import primary_button, text_wrapped, text_wrapped_dim
 from ui.panels.state import UiState

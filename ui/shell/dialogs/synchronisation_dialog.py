@@ -9,8 +9,10 @@ from pathlib import Path
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.session.captures.capture_commands import ApplyOffsets
 from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
-from app.session.commands import ApplyOffsets, CloseQuestion, Command, OpenCapture
+from app.session.commands import CloseQuestion, Command
+from app.session.projects.project_commands import OpenCapture
 from app.session.session_view import SessionView
 from app.status import JobStatus
 from ui.panels.pieces.widgets import primary_button, text_wrapped, text_wrapped_dim

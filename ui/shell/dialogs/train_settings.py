@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.session.commands import Command, TrainClip
+from app.session.commands import Command
 from app.session.questions import OwnSetting, SettingsQuestion
+from app.session.training.train_commands import TrainClip
 from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import UiState
 

@@ -8,9 +8,10 @@ from imgui_bundle import ImVec2, imgui
 
 from app.document.storing.recovery import Recovery
 from app.project.opening.project_choices import ProjectChoices
-from app.session.commands import CloseQuestion, Command, OpenProject
+from app.session.commands import CloseQuestion, Command
 from app.session.files.file_commands import ShowProjectFolder
 from app.session.files.file_questions import RecoveryQuestion
+from app.session.projects.project_commands import OpenProject
 from ui.panels.pieces.widgets import primary_button
 from ui.panels.state import UiState
 from ui.style import theme

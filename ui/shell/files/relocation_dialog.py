@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import CloseQuestion, Command, OpenCapture
+from app.session.commands import CloseQuestion, Command
 from app.session.files.file_questions import RelocationQuestion
+from app.session.projects.project_commands import OpenCapture
 from ui.panels.pieces.widgets import primary_button
 from ui.panels.state import UiState
 from ui.style import theme

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from app.session.commands import LookThrough, SetFrame
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough, SetFrame
 from engine.text import one_line
 from ui.panels.actions.table import ACTIONS
 from ui.panels.state import Dispatch, UiState

@@ -10,11 +10,11 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from app.session.commands import ActivateView
 from app.session.editing.edit_commands import PutMarker
 from app.session.projects.preferences import PreferencesFile
 from app.session.projects.window_memory import WindowMemory, markers_of, show_again, view_of
 from app.session.session_view import WindowSession
+from app.session.showing.look_commands import ActivateView
 from ui.panels.state import UiState
 
 SAVE_AFTER_S = 5.0

@@ -8,7 +8,6 @@ import pytest
 
 from app.project.clips.clip_versions import DAMAGED, version_path
 from app.project.project import Project
-from app.session import commands as c
 from app.session.clips.clip_commands import (
     AskFreeSpace,
     CompareVersion,
@@ -16,11 +15,15 @@ from app.session.clips.clip_commands import (
     MergeClips,
     SetReferenceClip,
     SplitClip,
-    TrainStale,
 )
 from app.session.clips.clip_questions import CutQuestion, DamagedQuestion, RoomQuestion
+from app.session.commands import CloseQuestion
+from app.session.editing.edit_commands import Redo, Undo
 from app.session.exclusions.exclusion_commands import ExcludeCameras, ExcludeFrames
+from app.session.projects.setting_commands import SetClipLength
 from app.session.session import Session
+from app.session.showing.look_commands import SetCompare, SetFrame
+from app.session.training.train_commands import RestoreVersion, TrainAll, TrainClip, TrainStale
 from app.status import CAPTURED
 from tests.app.conftest import poll_until
 from tests.app.fakes import make_slow
@@ -32,13 +35,13 @@ Make = Callable[..., Session]
 def session(make_session: Make) -> Session:
     """Three clips of two frames, all trained."""
     made = make_session()
-    made.dispatch(c.SetClipLength(2))
+    made.dispatch(SetClipLength(2))
     train_all(made)
     return made
 
 
 def train_all(session: Session) -> None:
-    session.dispatch(c.TrainAll())
+    session.dispatch(TrainAll())
     poll_until(session, lambda: session.training.state in ("idle", "failed"), what="the end of the training")
 
 
@@ -57,9 +60,9 @@ def titles(session: Session) -> list[str]:
 
 def test_frames_that_were_ready_under_other_cuts_do_no_harm(session: Session) -> None:
     session.dispatch(SplitClip(3, is_confirmed=True))
-    session.dispatch(c.SetFrame(5))
+    session.dispatch(SetFrame(5))
     poll_until(session, lambda: 5 in [i for run in session.cached_frames() for i in range(*run)], what="frame 5")
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     session.poll()
     assert session.live_training.state_of(3) is None
     assert all(stop <= 6 for _, stop in session.cached_frames())
@@ -81,16 +84,16 @@ def test_a_split_asks_and_undo_brings_the_trained_clip_back(session: Session) ->
     assert session.history.undo == "split clip 1 at frame 3"
     train_all(session)
     assert states(session) == ["trained"] * 4
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert states(session) == ["trained"] * 3
     assert project_of(session).clip_path(1).read_bytes() == before
-    session.dispatch(c.Redo())
+    session.dispatch(Redo())
     assert states(session) == ["trained"] * 4, "what was trained of the halves is there again, too"
 
 
 def test_a_merge_of_clips_that_are_not_trained_asks_nothing(make_session: Make) -> None:
     session = make_session()
-    session.dispatch(c.SetClipLength(3))
+    session.dispatch(SetClipLength(3))
     session.dispatch(MergeClips(0))
     assert session.question is None
     assert [clip.n_frames for clip in session.clips] == [6]
@@ -118,8 +121,8 @@ def test_another_reference_makes_everything_stale_and_one_command_trains_it(sess
 
 def test_clips_are_not_cut_while_one_trains(make_session: Make) -> None:
     session = make_session(make_training=make_slow)
-    session.dispatch(c.SetClipLength(3))
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(SetClipLength(3))
+    session.dispatch(TrainClip(0))
     session.dispatch(SplitClip(1, is_confirmed=True))
     assert [clip.start for clip in session.clips] == [0, 3]
     assert titles(session)[-1] == "The clips cannot be changed"
@@ -127,7 +130,7 @@ def test_clips_are_not_cut_while_one_trains(make_session: Make) -> None:
 
 def test_a_damaged_clip_is_offered_with_the_version_before_it(session: Session) -> None:
     project = project_of(session)
-    session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
+    session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     poll_until(session, lambda: session.training.state in ("idle", "failed"))
     assert version_path(project, 0, 1).is_file(), titles(session)
     path = project.clip_path(0)
@@ -138,17 +141,17 @@ def test_a_damaged_clip_is_offered_with_the_version_before_it(session: Session) 
     question = session.question
     assert isinstance(question, DamagedQuestion)
     assert (question.clip_index, question.version) == (0, 1)
-    session.dispatch(c.CloseQuestion())
+    session.dispatch(CloseQuestion())
     session.poll()
     assert session.question is None, "it is asked once"
-    session.dispatch(c.RestoreVersion(0, 1))
+    session.dispatch(RestoreVersion(0, 1))
     poll_until(session, lambda: states(session)[0] == "trained")
     assert [found.read_bytes() for found in (project.folder / DAMAGED).iterdir()] == [b"damaged"]
 
 
 def test_room_is_asked_about_with_its_figure_and_then_made(session: Session) -> None:
     project = project_of(session)
-    session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
+    session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     poll_until(session, lambda: session.training.state in ("idle", "failed"))
     poll_until(session, lambda: session.disk_use() is not None and session.disk_use().n_versions == 1)  # type: ignore[union-attr]
     session.dispatch(AskFreeSpace("versions"))
@@ -156,7 +159,7 @@ def test_room_is_asked_about_with_its_figure_and_then_made(session: Session) -> 
     question = session.question
     assert isinstance(question, RoomQuestion)
     assert question.n_bytes >= version_path(project, 0, 1).stat().st_size
-    session.dispatch(c.CloseQuestion())
+    session.dispatch(CloseQuestion())
     session.dispatch(FreeSpace("versions"))
     poll_until(session, lambda: not version_path(project, 0, 1).exists())
     poll_until(session, lambda: any("free now" in title for title in titles(session)))
@@ -165,11 +168,11 @@ def test_room_is_asked_about_with_its_figure_and_then_made(session: Session) -> 
 
 
 def test_a_version_is_put_beside_the_clip_at_the_same_frame(session: Session) -> None:
-    session.dispatch(c.SetFrame(0))
+    session.dispatch(SetFrame(0))
     session.dispatch(CompareVersion(1, 7))
     overlays = session.overlays
     assert (session.timeline.frame_index, overlays.compare, overlays.compare_with) == (2, "side", "version 7")
-    session.dispatch(c.SetCompare("blink"))
+    session.dispatch(SetCompare("blink"))
     session.dispatch(CompareVersion(1, 6))
     assert (overlays.compare, overlays.compare_with) == ("blink", "version 6")
     session.dispatch(CompareVersion(1, None))
@@ -183,5 +186,5 @@ def test_exclusions_are_noted_at_trained_clips_and_taken_back(session: Session) 
     assert session.residual_status.n_all == 6 * 4 - 1
     session.dispatch(ExcludeCameras((2, 3)))
     assert titles(session)[-1] == "The exclusion cannot be changed", "too few would be left"
-    session.dispatch(c.Undo())
+    session.dispatch(Undo())
     assert [status.reason for status in session.clip_states] == [""] * 3

@@ -181,7 +181,7 @@ def test_another_project_begins_with_nothing(selecting: ProjectSelecting) -> Non
     selecting.apply(SelectAll())
     settle(selecting)
     selecting.apply(SelectVolume(BALL))
-    selecting.open()
+    selecting.forget()
     assert chosen(selecting) == []
     assert not selecting.status().has_before
     selecting.apply(Reselect())

@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from app.project.disk.use import ClipUse, DiskUse
-from app.session.clips.clip_commands import AskFreeSpace, CompareVersion, MergeClips, SplitClip, TrainStale
+from app.session.clips.clip_commands import AskFreeSpace, CompareVersion, MergeClips, SplitClip
 from app.session.clips.clip_questions import CutQuestion, DamagedQuestion, RoomQuestion
 from app.session.exclusions.exclusion_commands import ExcludeCameras, PaintMask
+from app.session.training.train_commands import TrainStale
 from app.status import ClipStatus, DependencyStatus, QueueStatus, SequenceForecast, VersionStatus
 from engine.capture.exclusions import Stroke
 from tests.ui.fake_session import FakeSession

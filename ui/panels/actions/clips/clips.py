@@ -9,9 +9,9 @@ from app.session.clips.clip_commands import (
     MergeClips,
     SetReferenceClip,
     SplitClip,
-    TrainStale,
 )
 from app.session.session_view import SessionView
+from app.session.training.train_commands import TrainStale
 from ui.panels.actions.action import TRAIN, Action
 from ui.panels.clips.comparing import compared_version, next_version
 from ui.panels.state import Dispatch, UiState

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from app.session.commands import (
+from app.session.session_view import SessionView
+from app.session.training.train_commands import (
     AskTrainSettings,
     MoveInQueue,
     PauseTraining,
@@ -18,7 +19,6 @@ from app.session.commands import (
     TrainClips,
     TrainNextClip,
 )
-from app.session.session_view import SessionView
 from ui.panels.actions.action import TRAIN, WINDOW, Action, Run
 from ui.panels.state import LOG, TRAINING, Dispatch, UiState
 

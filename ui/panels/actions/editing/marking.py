@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.session.commands import Redo, RemoveRegion, Undo
-from app.session.editing.edit_commands import RemoveEdit
+from app.session.editing.edit_commands import Redo, RemoveEdit, Undo
+from app.session.editing.mark_commands import RemoveRegion
 from app.session.mending.mend_commands import CloseMend
 from app.session.paths.path_commands import DeleteCameraKey
 from app.session.session_view import SessionView

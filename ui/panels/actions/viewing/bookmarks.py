@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from app.playback.views.bookmarks import NUMBERS, Bookmark
 from app.playback.views.view_place import ViewPlace
-from app.session.commands import SetFrame
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import SetFrame
 from ui.panels.actions.action import BOOKMARKS, Action, Run
 from ui.panels.state import Dispatch, UiState
 

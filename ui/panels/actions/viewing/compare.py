@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from app.playback.modes.view_modes import MODES
-from app.session.commands import LookThrough, SetCompare, SetCompareWith, ToggleOverlay
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough, SetCompare, SetCompareWith, ToggleOverlay
 from app.status import CAPTURED, COMPARE_MODES
 from ui.panels.actions.action import COMPARE, Action, Run
 from ui.panels.actions.viewing.view import nearest_camera

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from app.residuals.heat_map import HEAT_KINDS
-from app.session.commands import LookThrough, ShowHeat
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough, ShowHeat
 from ui.panels.actions.action import COMPARE, Action
 from ui.panels.actions.viewing.view import nearest_camera
 from ui.panels.state import Dispatch, UiState

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.playback.modes.view_modes import CONTENTS, MODES
-from app.session.commands import SetContent, SetMode
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import SetContent, SetMode
 from ui.panels.actions.action import MODE, Action, Run
 from ui.panels.state import Dispatch, UiState
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from app.playback.views.scene_axes import AXIS_VIEWS, UP_AXES
-from app.session.commands import LookThrough
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough
 from ui.panels.actions.action import NAVIGATE, Action, Run
 from ui.panels.picture.gestures import PRESETS
 from ui.panels.state import Dispatch, UiState

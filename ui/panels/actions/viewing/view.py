@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from app.playback.views.views import COUNTS
-from app.session.commands import ActivateView, HomeView, LookThrough, ShowViews
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import ActivateView, HomeView, LookThrough, ShowViews
 from ui.panels.actions.action import VIEW, Action, Run
 from ui.panels.state import Dispatch, UiState
 

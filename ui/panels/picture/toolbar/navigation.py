@@ -10,8 +10,8 @@ from app.playback.views.bookmarks import MAX_NAME_CHARACTERS
 from app.playback.views.orbit_view import MAX_FOV_Y, MIN_FOV_Y
 from app.playback.views.scene_axes import AXIS_VIEWS, UP_AXES
 from app.playback.views.view_place import ViewPlace
-from app.session.commands import LookThrough
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough
 from ui.panels.actions.viewing.bookmarks import go_to_bookmark
 from ui.panels.actions.viewing.navigation import frame_all, frame_selection, toggle_orthographic, up_words
 from ui.panels.picture.gestures import PRESETS

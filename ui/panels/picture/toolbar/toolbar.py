@@ -7,8 +7,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.playback.modes.view_modes import ALL, COLOR, CONTENTS, MODES
 from app.playback.views.views import COUNTS
 from app.residuals.heat_map import HEAT_KINDS
-from app.session.commands import LookThrough, SetContent, SetMode, ShowHeat, ShowViews, ToggleOverlay
 from app.session.session_view import SessionView
+from app.session.showing.look_commands import LookThrough, SetContent, SetMode, ShowHeat, ShowViews, ToggleOverlay
 from ui.panels.actions.viewing.compare import cloud_overlay
 from ui.panels.actions.viewing.modes import mode_key
 from ui.panels.picture.toolbar.compare_box import compare_words, draw_compare_box

@@ -12,7 +12,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.playback.modes.arrays import Picture
 from app.project.opening.capture_report import CaptureReport, RefusedFolder
-from app.session.commands import CloseQuestion, OpenCapture
+from app.session.commands import CloseQuestion
+from app.session.projects.project_commands import OpenCapture
 from app.session.questions import OpeningPage
 from app.session.session_view import OpeningView, SessionView
 from engine.doctor.finding import Finding

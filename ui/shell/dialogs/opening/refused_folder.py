@@ -5,7 +5,9 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.project.opening.capture_report import RefusedFolder
-from app.session.commands import CloseQuestion, LookAtVideos, OpenCapture
+from app.session.captures.capture_commands import LookAtVideos
+from app.session.commands import CloseQuestion
+from app.session.projects.project_commands import OpenCapture
 from ui.panels.pieces.widgets import (
     elided,
     elided_path,

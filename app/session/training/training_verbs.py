@@ -1,22 +1,40 @@
-"""Commands about what is trained when, and about versions of clips: carried out on the open project."""
+"""TrainingVerbs: carries out what is asked of the training, its queue and the versions of clips."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from app.session import commands
 from app.session.notices import Notices
 from app.session.projects.settings import Settings
 from app.session.questions import Question
 from app.session.training.clip_versions import Versions
 from app.session.training.live_training import LiveTraining
 from app.session.training.own_settings_question import settings_question
+from app.session.training.train_commands import (
+    AskTrainSettings,
+    HoldCommand,
+    MoveInQueue,
+    PauseTraining,
+    RemoveFromQueue,
+    RemoveVersion,
+    RestoreVersion,
+    ResumeTraining,
+    SetLiveView,
+    StopAfterClip,
+    StopTraining,
+    TrainAll,
+    TrainClip,
+    TrainClips,
+    TrainCommand,
+    TrainNextClip,
+    TrainStale,
+)
+from app.session.training.training_notices import listed, tell_dropped
+from app.training.due import stale_clips
 from app.training.messages import LIVE_VIEWS
 
-MAX_LISTED = 12
 
-
-class QueueCommands:
+class TrainingVerbs:
     """For one thread, and nothing here waits.
 
     Args:
@@ -26,7 +44,7 @@ class QueueCommands:
     def __init__(self, live: LiveTraining, versions: Versions, notices: Notices, settings: Settings) -> None:
         self._live, self._versions, self._notices, self._settings = live, versions, notices, settings
 
-    def obey(self, command: commands.QueueCommand) -> Question | None:
+    def obey(self, command: TrainCommand | HoldCommand) -> Question | None:
         """Carry out a command. Returns what has to be answered first, if anything.
 
         Raises:
@@ -34,33 +52,43 @@ class QueueCommands:
         """
         live, service = self._live, self._live.service
         match command:
-            case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed, settings=settings):
+            case TrainNextClip():
+                live.train_next()
+            case PauseTraining():
+                live.pause()
+            case ResumeTraining():
+                live.resume()
+            case StopTraining():
+                live.stop()
+            case TrainClip(clip_index=clip_index, is_confirmed=is_confirmed, settings=settings):
                 question = live.train(clip_index, is_confirmed=is_confirmed, own=dict(settings))
                 return None if question is None else replace(question, settings=settings)
-            case commands.SetLiveView(mode=mode):
+            case SetLiveView(mode=mode):
                 if mode not in LIVE_VIEWS:
                     raise ValueError(f"the live view is one of {', '.join(LIVE_VIEWS)}, not {mode!r}")
                 self._settings.set_live_view(mode)
                 live.set_live_view(mode)
             case _ if service is None:
                 live.tell_nothing_open()
-            case commands.TrainAll():
+            case TrainAll():
                 self._train_all(range(len(service.clips)))
-            case commands.TrainClips(clip_indices=clip_indices):
+            case TrainClips(clip_indices=clip_indices):
                 self._train_all(clip_indices)
-            case commands.AskTrainSettings(clip_index=clip_index):
+            case TrainStale():
+                service.enqueue_all(stale_clips(service.catalog))
+            case AskTrainSettings(clip_index=clip_index):
                 return settings_question(live.opened_project, service.catalog, clip_index)
-            case commands.MoveInQueue(clip_index=clip_index, position=position):
+            case MoveInQueue(clip_index=clip_index, position=position):
                 service.queue.move(clip_index, position)
-                live.tell_dropped(service.drop_hopeless())
-            case commands.RemoveFromQueue(clip_index=clip_index):
+                tell_dropped(service.drop_hopeless(), self._notices)
+            case RemoveFromQueue(clip_index=clip_index):
                 service.queue.remove(clip_index)
-                live.tell_dropped(service.drop_hopeless())
-            case commands.StopAfterClip(is_wanted=is_wanted):
+                tell_dropped(service.drop_hopeless(), self._notices)
+            case StopAfterClip(is_wanted=is_wanted):
                 service.stop_after_clip(is_wanted)
-            case commands.RestoreVersion(clip_index=clip_index, version=version):
+            case RestoreVersion(clip_index=clip_index, version=version):
                 self._versions.restore(clip_index, version)
-            case commands.RemoveVersion(clip_index=clip_index, version=version):
+            case RemoveVersion(clip_index=clip_index, version=version):
                 self._versions.remove(clip_index, version)
         return None
 
@@ -69,12 +97,10 @@ class QueueCommands:
         assert service is not None
         left_out = service.enqueue_all(clip_indices)
         if left_out:
-            listed = ", ".join(str(index) for index in left_out[:MAX_LISTED])
-            more = f" and {len(left_out) - MAX_LISTED} more" if len(left_out) > MAX_LISTED else ""
             self._notices.add(
                 "warn",
                 f"{len(left_out)} {'clip is' if len(left_out) == 1 else 'clips are'} left out of training",
-                f"Damaged, or in need of a damaged clip: {listed}{more}.",
+                f"Damaged, or in need of a damaged clip: {listed(left_out)}.",
                 "Restore the damaged file from a backup, or train that clip again: right-click it in the timeline.",
             )
         elif not service.is_busy and not service.queue:

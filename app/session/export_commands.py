@@ -1,0 +1,66 @@
+"""Commands about what leaves the project for other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.export.export_choices import ExportChoices
+
+
+@dataclass(frozen=True, slots=True)
+class AskExport:
+    """Ask what of the open project is to be exported, and where."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartExport:
+    """Put an export into the queue."""
+
+    choices: ExportChoices
+
+
+@dataclass(frozen=True, slots=True)
+class CancelExport:
+    """End an export; what it began to write disappears."""
+
+    export_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class RetryExport:
+    """Begin an export anew that failed or was cancelled."""
+
+    export_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class MoveExport:
+    """Bring an export that waits to a place among those that wait."""
+
+    export_id: int
+    place: int
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveExport:
+    """Take an export that does not run out of the list; what it has written stays."""
+
+    export_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class ClearExports:
+    """Take all exports that have ended out of the list; what they have written stays."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowExport:
+    """Show what an export has written in the system's file manager."""
+
+    export_id: int
+
+
+ExportCommand = (
+    AskExport | StartExport | CancelExport | RetryExport | MoveExport | RemoveExport | ClearExports | ShowExport
+)
+"""Commands that export from the project."""

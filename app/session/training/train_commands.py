@@ -1,0 +1,126 @@
+"""Commands about what is trained when, how it is shown meanwhile, and which version of a clip counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class TrainNextClip:
+    """Train the first clip that is not finished; the reference clip comes first."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrainClip:
+    """Train one clip. One that is finished, or damaged, is trained again only once that is confirmed."""
+
+    clip_index: int
+    is_confirmed: bool = False
+    settings: tuple[tuple[str, int | float | str | bool], ...] = ()
+    """Names and values of settings that this clip alone is to have; see app.training.own_settings."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskTrainSettings:
+    """Ask with which settings of its own a clip is to be trained."""
+
+    clip_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class TrainClips:
+    """Train those of these clips that are not finished, one after the other, and before them what they need."""
+
+    clip_indices: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrainAll:
+    """Train every clip that is not finished."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrainStale:
+    """Train every clip again that is out of date, one after the other."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveInQueue:
+    """Put a waiting clip at another position of the queue, counted from 0."""
+
+    clip_index: int
+    position: int
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveFromQueue:
+    """Do not train a waiting clip after all."""
+
+    clip_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class StopAfterClip:
+    """Let the queue wait once the clip that trains has ended, or go on after all."""
+
+    is_wanted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class PauseTraining:
+    """Hold the running training where it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeTraining:
+    """Go on after a pause, or with a queue that waits."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopTraining:
+    """End the running training, keep progress and empty the queue."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetLiveView:
+    """How often the clip that trains is shown anew: "off", "low" or "live". Trains on meanwhile."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreVersion:
+    """Bring back what a clip was before it was trained again; what it is now becomes a version."""
+
+    clip_index: int
+    version: int
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveVersion:
+    """Delete an earlier version of a clip for good."""
+
+    clip_index: int
+    version: int
+
+
+VersionCommand = RestoreVersion | RemoveVersion
+"""Commands on versions of a clip."""
+
+HoldCommand = PauseTraining | ResumeTraining | StopTraining
+"""Commands on the clip that trains."""
+
+TrainCommand = (
+    TrainNextClip
+    | TrainClip
+    | TrainClips
+    | TrainAll
+    | TrainStale
+    | AskTrainSettings
+    | MoveInQueue
+    | RemoveFromQueue
+    | StopAfterClip
+    | SetLiveView
+    | VersionCommand
+)
+"""Commands on training: order, live view and versions."""
