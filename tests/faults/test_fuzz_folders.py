@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.project.opening.opening import project_access
+from app.project.opening import project_access
 from engine.errors import ProjectError
 from tests.faults.fuzz_folders import make_foreign, put, run_case, state_of, write_everything
 from tests.faults.fuzz_project import make_project
