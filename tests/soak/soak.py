@@ -55,7 +55,7 @@ from app.training.process import ProcessWorker
 from app.training.service import Launch
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.edit import Scope, Sphere
-from tests.app.fakes import make_fake, write_capture
+from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import train
 from tests.soak.held import Growth, Held, growths, handle_names, held_now
 
@@ -77,7 +77,7 @@ COMPARED = ("memory_mb", "handles", "threads", "children")
 
 def launch(job: TrainJob, project: Project) -> ProcessWorker:
     """Trainings that are made up, in processes as real ones."""
-    return ProcessWorker(job, project, make_fake)
+    return ProcessWorker(job, project, "tests.app.fakes:make_fake")
 
 
 class Soak:
