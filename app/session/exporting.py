@@ -32,7 +32,7 @@ from app.session.export_commands import (
     StartExport,
 )
 from app.session.notices import Notices
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.projects.settings import Settings
 from engine.capture.frames import VideoFrames
 from engine.errors import EngineError, ProjectError
@@ -71,7 +71,7 @@ class _Wish(NamedTuple):
     folder: str = ""
 
 
-class Exporting(Part):
+class Exporting(SessionPart):
     """For one thread, which does not wait.
 
     Attributes:

@@ -1,5 +1,5 @@
-"""Part: one of the things that a session is composed of. Parts: all of them, told in the order in which they were
-added.
+"""SessionPart: one of the things that a session is composed of. SessionParts: all of them, in the order in which they
+were added.
 
 Whoever adds a part says so once: opening, settings, polling and closing reach it from then on.
 """
@@ -13,7 +13,7 @@ from app.document.project_document import ProjectDocument
 from app.project.opening.opened_project import OpenedProject
 
 
-class Part:
+class SessionPart:
     """Overrides what concerns it. For one thread, and nothing here waits."""
 
     def open(self, opened: OpenedProject) -> None:
@@ -51,16 +51,16 @@ class Part:
         """End threads and processes, keeping progress."""
 
 
-AnyPart = TypeVar("AnyPart", bound=Part)
+PartT = TypeVar("PartT", bound=SessionPart)
 
 
-class Parts(Part):
+class SessionParts(SessionPart):
     """All of them."""
 
     def __init__(self) -> None:
-        self._parts: list[Part] = []
+        self._parts: list[SessionPart] = []
 
-    def add(self, part: AnyPart) -> AnyPart:
+    def add(self, part: PartT) -> PartT:
         """Tell this one, too; after those that were added before."""
         self._parts.append(part)
         return part

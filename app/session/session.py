@@ -50,7 +50,7 @@ from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import ProjectMending
 from app.session.notices import Notices
-from app.session.part import Parts
+from app.session.part import SessionParts
 from app.session.paths.camera_paths import CameraPaths
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import ProjectCommand
@@ -122,7 +122,7 @@ class Session(SessionFace):
 
         # Parts are opened, polled and closed in this order: what was edited is kept first, and a part comes after those
         # that it reads.
-        self._parts = parts = Parts()
+        self._parts = parts = SessionParts()
         self.document = parts.add(KeptDocument(guard=parts.check_change, on_change=parts.follow_change))
         self.live_training = live = parts.add(
             LiveTraining(

@@ -18,7 +18,7 @@ from app.session.captures.capture_commands import (
     LookAtVideos,
     StopCalibration,
 )
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.status import JobStatus
 from engine.calibration.calibrated import Calibration
 from engine.calibration.videos import find_videos
@@ -26,7 +26,7 @@ from engine.capture.formats.capture_json import FILE
 from engine.errors import EngineError, PreparationError
 
 
-class Calibrating(Part):
+class Calibrating(SessionPart):
     """For one thread, which does not wait. Only the newest page is worked on.
 
     Attributes:

@@ -17,7 +17,7 @@ from app.session.captures.capture_commands import CorrectCapture, DoctorCommand,
 from app.session.captures.doctor_status import DoctorStatus
 from app.session.examining_process import examine_apart
 from app.session.notices import Notices
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.projects.project_commands import OpenCapture
 from app.session.questions import CorrectionQuestion
 from engine.capture.capture import Capture
@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # loading what examines takes a second: that is left to the t
 NAME = "Capture doctor"
 
 
-class CaptureDoctor(Part):
+class CaptureDoctor(SessionPart):
     """For one thread, which does not wait.
 
     Args:

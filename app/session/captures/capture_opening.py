@@ -14,7 +14,7 @@ from app.playback.capture_pictures import downsized
 from app.playback.modes.arrays import Picture
 from app.project.opening.capture_report import RefusedFolder, refusal_of, report_of
 from app.project.opening.opening_answers import LastAnswers, OpeningAnswers, default_answers
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.questions import OpeningPage
 from app.status import OpeningForecast
 from engine.capture.capture import Capture
@@ -40,7 +40,7 @@ class _Forecast:
     folder: Path = field(compare=False)
 
 
-class CaptureOpening(Part):
+class CaptureOpening(SessionPart):
     """For one thread, which does not wait.
 
     Attributes:

@@ -11,7 +11,7 @@ from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.project.opening.opened_project import OpenedProject
 from app.session.captures.capture_commands import ApplyOffsets, SynchronisationCommand, SynchroniseCameras
 from app.session.captures.synchronisation_page import OffsetRow, SynchronisationPage
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.status import JobStatus
 from engine.capture.capture import Capture
 from engine.capture.writers.capture_json import write_corrections
@@ -23,7 +23,7 @@ from engine.synchronisation.estimating import synchronise
 from engine.synchronisation.synchronisation import Synchronisation
 
 
-class Synchronising(Part):
+class Synchronising(SessionPart):
     """For one thread, which does not wait.
 
     Attributes:

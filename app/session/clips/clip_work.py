@@ -33,7 +33,7 @@ from app.session.clips.disk_reader import DiskReader
 from app.session.clips.permanence import Permanence
 from app.session.editing.kept_document import KeptDocument
 from app.session.notices import Notices
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.training.live_training import LiveTraining
 from app.status import DependencyStatus
 from app.training.train_queue import needed_clips
@@ -45,7 +45,7 @@ MAX_KEPT = 64
 """Clips whose dependencies stay in memory."""
 
 
-class ClipWork(Part):
+class ClipWork(SessionPart):
     """For one thread, and nothing here waits.
 
     Args:

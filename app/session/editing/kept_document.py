@@ -16,7 +16,7 @@ from app.document.project_document import ProjectDocument
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.edit_status import HistoryStatus
-from app.session.part import Part
+from app.session.part import SessionPart
 from engine.errors import DiskError, EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
@@ -45,7 +45,7 @@ class DocumentRequest:
     history: DocumentHistory = field(compare=False)
 
 
-class KeptDocument(Part):
+class KeptDocument(SessionPart):
     """For one thread, which waits for the disk a moment at most: a kill costs the step that is being made, and none
     before it.
 

@@ -29,7 +29,7 @@ from app.session.editing.selection_commands import (
     SelectionCommand,
 )
 from app.session.editing.selection_status import SelectionStatus
-from app.session.part import Part
+from app.session.part import SessionPart
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import ValueSpread, spread_of
@@ -99,7 +99,7 @@ class _ShareWork:
         return selected_share(projected, gaussians.opacities, self.selected)
 
 
-class ProjectSelecting(Part):
+class ProjectSelecting(SessionPart):
     """The selection of the open project.
 
     Args:

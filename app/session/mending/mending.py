@@ -26,13 +26,13 @@ from app.session.mending.mend_commands import (
     StopMend,
 )
 from app.session.mending.mend_page import MendPage
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.training.live_training import LiveTraining
 from app.status import CAPTURED, JobStatus, Overlays
 from engine.errors import EngineError, ProjectError
 
 
-class ProjectMending(Part):
+class ProjectMending(SessionPart):
     """For one thread, which does not wait.
 
     Args:

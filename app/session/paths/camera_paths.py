@@ -15,14 +15,14 @@ from app.playback.views.views import Views
 from app.project.opening.opened_project import OpenedProject
 from app.session.edit_status import PathsStatus
 from app.session.editing.kept_document import KeptDocument
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.paths.path_commands import ChooseCameraKey, ChooseCameraPath, LookAlongPath, PathCommand
 from app.session.paths.path_edits import edited
 from engine.camera.camera_path import CameraPath
 from engine.errors import ProjectError
 
 
-class CameraPaths(Part):
+class CameraPaths(SessionPart):
     """For one thread. document: Holds and keeps the paths."""
 
     def __init__(self, document: KeptDocument) -> None:

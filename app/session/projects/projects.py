@@ -22,7 +22,7 @@ from app.session.editing.kept_document import KeptDocument
 from app.session.files.file_commands import FileCommand, SaveProjectAs
 from app.session.files.project_files import ProjectFiles
 from app.session.notices import Notices
-from app.session.part import Part, Parts
+from app.session.part import SessionPart, SessionParts
 from app.session.projects.project_commands import (
     AskStartOver,
     ForgetRecent,
@@ -48,7 +48,7 @@ from app.status import ProjectStatus
 from engine.capture.capture import Capture
 
 
-class Projects(Part):
+class Projects(SessionPart):
     """For one thread, and nothing here waits.
 
     Attributes:
@@ -65,7 +65,7 @@ class Projects(Part):
 
     def __init__(
         self,
-        parts: Parts,
+        parts: SessionParts,
         jobs: Jobs,
         notices: Notices,
         asked: Asked,

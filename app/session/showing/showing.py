@@ -15,7 +15,7 @@ from app.playback.views.orbit_view import OrbitView
 from app.playback.views.views import Views
 from app.project.opening.opened_project import OpenedProject
 from app.residuals.residuals import Residuals
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.showing.follow_training import follow_training
 from app.session.showing.look_commands import LookCommand
 from app.session.showing.looking import look
@@ -24,7 +24,7 @@ from app.session.training.live_training import LiveTraining
 from app.status import Overlays
 
 
-class Showing(Part):
+class Showing(SessionPart):
     """For one thread, and nothing here waits.
 
     Attributes:

@@ -18,7 +18,7 @@ from app.project.clips.clip_versions import ClipVersion
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.notices import Notices
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.status import VersionStatus
 from app.training.clip_run import ShownState
 from app.training.service import TrainingService
@@ -51,7 +51,7 @@ class FoundVersions:
     statuses: tuple[VersionStatus, ...] = ()
 
 
-class Versions(Part):
+class Versions(SessionPart):
     """For one thread, and nothing here waits.
 
     Args:

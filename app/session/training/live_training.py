@@ -17,7 +17,7 @@ from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.notices import Notices
-from app.session.part import Part
+from app.session.part import SessionPart
 from app.session.questions import RetrainQuestion, retrain_question
 from app.session.training.training_notices import tell, tell_dropped
 from app.status import ClipStatus, PlanStatus, QueueStatus, TrainingStatus
@@ -33,7 +33,7 @@ from engine.errors import EngineError, ProjectError
 logger = logging.getLogger(__name__)
 
 
-class LiveTraining(Part):
+class LiveTraining(SessionPart):
     """The running training, its queue and what comes of it. For one thread, and nothing here waits.
 
     At most one snapshot of each running training is unread: its worker writes no other before that was given back.
