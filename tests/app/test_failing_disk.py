@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from app.training import messages as m
 from app.training.messages import Pause, SnapshotConsumed, Stop
-from app.training.worker.worker import disk_retries
+from app.training.worker import disk_retries
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import CaptureError
 from tests.app.fakes import make_fake

@@ -9,7 +9,7 @@ from msgspec import to_builtins
 from app.session.projects.setting_commands import SetClipLength
 from app.session.showing.look_commands import SetFrame
 from app.session.training.train_commands import TrainClip, TrainNextClip
-from app.training.worker.worker import keeper
+from app.training.worker import keeper
 from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
 from engine.model.reading import load_clip_model

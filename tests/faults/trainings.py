@@ -20,9 +20,9 @@ from app.project.opening.project_access import open_project
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
 from app.training.store import ClipStore
+from app.training.worker import disk_retries, keeper
 from app.training.worker.build import build_training
 from app.training.worker.interface import Training
-from app.training.worker.worker import disk_retries, keeper
 from engine.assets import asset_path
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import read_clip_state

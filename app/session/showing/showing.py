@@ -1,4 +1,4 @@
-"""Showing: the picture that the user looks at, and what prepares it: timeline, views, decoded frames, pictures and residuals."""
+"""Showing: the picture that the user looks at, and what prepares it: the timeline, views, frames and residuals."""
 
 from __future__ import annotations
 

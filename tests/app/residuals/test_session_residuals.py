@@ -10,7 +10,7 @@ from app.residuals.figures import RowFigures
 from app.residuals.measuring_messages import PictureMeasured
 from app.session.projects.setting_commands import SetClipLength
 from app.session.training.train_commands import TrainClip, TrainNextClip
-from app.training.worker.worker import run
+from app.training.worker import run
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from tests.app.conftest import DEADLINE_S, poll_until
 from tests.app.fakes import make_slow

@@ -13,7 +13,7 @@ from app.project.opening.opened_project import OpenedProject
 from app.project.opening.project_access import open_project
 from app.session.notices import Notices
 from app.session.training.live_training import LiveTraining
-from app.training.worker.worker import keeper
+from app.training.worker import keeper
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError
 from tests.app.conftest import inline

@@ -18,9 +18,9 @@ from app.training.jobs import train_job
 from app.training.messages import ClipTrained, Pause, Resume, TrainingFailed, TrainingStopped, WarningRaised
 from app.training.service import TrainingService
 from app.training.store import ClipStore
+from app.training.worker import disk_retries
 from app.training.worker.folder_store import FolderStore
 from app.training.worker.run import TrainingRun
-from app.training.worker.worker import disk_retries
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError
 from tests.app.conftest import inline

@@ -18,8 +18,8 @@ from app.training.own_settings import ALLOWED, offered, with_own
 from app.training.service import ClipEvent, TrainingService
 from app.training.train_queue import TrainQueue, needed_clips
 from app.training.training_status import ClipStatuses, training_status
+from app.training.worker import keeper
 from app.training.worker.folder_store import FolderStore
-from app.training.worker.worker import keeper
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import NonFiniteLoss, ProjectError
 from tests.app.conftest import inline

@@ -70,7 +70,7 @@ def continued(tmp_path, built_once) -> Iterator[tuple[Project, list[TrainJob]]]:
 
 @pytest.mark.slow
 def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(continued, monkeypatch):
-    from app.training.worker.worker import build
+    from app.training.worker import build
     from engine.training.clip_training import ClipTraining
 
     monkeypatch.setattr(build, "warm_up_reporting", lambda report: None)
