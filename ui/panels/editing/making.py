@@ -57,6 +57,7 @@ def _making(kind: type[Action], first: First, *, name: str = "", **said: Any) ->
 
 
 DELETE = _making(Delete, lambda *where: Delete())
+"""Its key stands in ui.panels.actions.editing.deleting, as Delete also removes regions, camera keys and edits."""
 MAKINGS = (
     _making(Hide, lambda *where: Hide(), keys=("H",)),
     Making(

@@ -1,18 +1,13 @@
-"""Actions on regions that are marked as static or as moving, and on what is chosen or was done, whatever it is."""
+"""Actions on regions that are marked as static or as moving."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from app.session.editing.edit_commands import Redo, RemoveEdit, Undo
-from app.session.editing.mark_commands import RemoveRegion
 from app.session.mending.mend_commands import CloseMend
-from app.session.paths.path_commands import DeleteCameraKey
 from app.session.session_view import SessionView
 from ui.panels.actions.action import MARK, Action, Run
 from ui.panels.actions.editing.camera_path import nudge_key
-from ui.panels.editing.edit_subject import meant
-from ui.panels.editing.making import DELETE, make_edit
 from ui.panels.editing.mend_panel import is_asking_to_mend
 from ui.panels.regions import begin_choosing
 from ui.panels.state import REGIONS, Dispatch, UiState
@@ -60,37 +55,6 @@ def _shift_by(right: float, down: float, forward: float) -> Run:
 def _next_region(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wanted_panel = REGIONS
     ui.regions.highlight_next(len(session.regions.regions))
-
-
-def _remove_chosen(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """The region that stands out; without one, what is selected or drawn; else the camera key or the edit that is
-    chosen."""
-    if ui.regions.highlighted is None and meant(session, ui)[1]:
-        if session.edits.can_edit:
-            make_edit(session, dispatch, ui, DELETE)
-    elif ui.regions.highlighted is not None:
-        if session.regions.can_mark:
-            dispatch(RemoveRegion(ui.regions.highlighted))
-    elif session.paths.chosen_key is not None and session.paths.can_edit:
-        dispatch(DeleteCameraKey(session.paths.chosen_key))
-    elif ui.editing.chosen is not None and session.edits.can_edit:
-        dispatch(RemoveEdit(ui.editing.chosen))
-
-
-def _undo(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    if session.history.undo:
-        dispatch(Undo())
-
-
-def _redo(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    if session.history.redo:
-        dispatch(Redo())
-
-
-def _cannot_remove(session: SessionView) -> str:
-    if session.regions.can_mark or session.paths.can_edit or session.edits.can_edit:
-        return ""
-    return session.regions.why_not or "Regions cannot be removed now."
 
 
 _SIZING: dict[str, Any] = {"needs_choosing": True, "repeats": True}
@@ -154,30 +118,4 @@ ACTIONS = (
         **_STEERING,
     ),
     Action("mark.highlight_next", "Highlight the next marked region", MARK, _next_region, keys=("N",)),
-    Action(
-        "mark.remove",
-        "Delete what is selected, drawn, highlighted or chosen",
-        MARK,
-        _remove_chosen,
-        keys=("Delete",),
-        lacks=_cannot_remove,
-    ),
-    Action(
-        "mark.undo",
-        "Undo the last step",
-        MARK,
-        _undo,
-        keys=("Ctrl+Z",),
-        menu="Edit",
-        lacks=lambda session: "" if session.history.undo else "Nothing to undo.",
-    ),
-    Action(
-        "mark.redo",
-        "Redo the step undone last",
-        MARK,
-        _redo,
-        keys=("Ctrl+Shift+Z", "Ctrl+Y"),
-        menu="Edit",
-        lacks=lambda session: "" if session.history.redo else "Nothing to redo.",
-    ),
 )
