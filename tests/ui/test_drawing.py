@@ -111,7 +111,7 @@ def test_menus_work_with_the_keyboard_alone(pilot: Pilot, symbol: int) -> None:
     assert "menu.Quit; training progress is kept" in pilot.rects
     pilot.key(key.RIGHT)
     pilot.rest()
-    assert "menu.Hide what is selected" in pilot.rects, "Right goes on to the next menu"
+    assert "menu.Hide the selection" in pilot.rects, "Right goes on to the next menu"
     pilot.key(key.LEFT)
     pilot.rest()
     pilot.key(key.UP)  # from the first entry round to the last

@@ -280,7 +280,7 @@ def why_not(project: Project, clip_index: int, header: ClipHeader) -> str:
     start, stop = project.frames_of(clip_index)
     if header.start != start or (stop is not None and header.start + header.n_frames > stop):
         last = header.start + header.n_frames - 1
-        return f"The version covers frames {header.start} to {last}, not of clip {clip_index}."
+        return f"The version covers frames {header.start} to {last}, not clip {clip_index}."
     base = project.inherited_index(clip_index)
     if header.role != ("reference" if base is None else "source"):
         return "The version was trained before another clip was made the reference."

@@ -78,7 +78,7 @@ def test_another_reference_makes_all_clips_stale_until_it_is_taken_back(tmp_path
     project.change(with_reference(before, 1, 3), "another reference")
     catalog = ClipCatalog(project, 3)
     assert [catalog[index].state for index in range(3)] == ["stale"] * 3
-    assert "clip 1 now" in catalog[0].reason
+    assert "now clip 1" in catalog[0].reason
     assert "now it is the reference itself" in catalog[1].reason
     assert best_version(project, 1) is None, "its versions were trained on another reference"
     project.change(before, "back")
