@@ -160,7 +160,7 @@ def test_a_kept_cloud_is_of_pictures_in_the_same_exposure(tiny, paper_prep, refe
 
 
 def test_frames_need_no_gate():
-    with pytest.raises(ProjectError, match="cannot go with gate=hull"):
+    with pytest.raises(ProjectError, match="cannot be combined with gate=hull"):
         TrainConfig(cloud="frames")
 
 
