@@ -49,7 +49,7 @@ def test_quality_over_the_clips_is_of_those_that_were_measured() -> None:
     assert "(clip 2)" in quality.exposure_text
     assert all(values.flags.c_contiguous for values in (quality.clips, quality.psnr, quality.exposure))
     assert clip_quality(states[:2]).title == ""
-    assert "no change" in clip_quality(states[:2]).exposure_text
+    assert "does not change" in clip_quality(states[:2]).exposure_text
     assert clip_quality([]).title == ""
 
 

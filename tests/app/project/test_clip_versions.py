@@ -160,7 +160,7 @@ def test_a_version_of_another_clip_or_project_is_refused(tmp_path: Path) -> None
     path = version_path(project, 0, 7)
     for header, said in (
         (clip_header(0, fingerprint="x", start=3), "covers frames 3 to .*, not clip 0"),
-        (clip_header(0, fingerprint="x", n_frames=9), "of frames 0 to 8, not of clip 0"),
+        (clip_header(0, fingerprint="x", n_frames=9), "covers frames 0 to 8, not clip 0"),
         (clip_header(0, fingerprint="x", camera_names=["elsewhere"]), "another project"),
     ):
         write_header(path, header)

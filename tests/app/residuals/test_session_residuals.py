@@ -10,7 +10,7 @@ from app.residuals.figures import RowFigures
 from app.residuals.measuring_messages import PictureMeasured
 from app.session.projects.setting_commands import SetClipLength
 from app.session.training.train_commands import TrainClip, TrainNextClip
-from app.training.worker import run
+from app.training.worker import keeper
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from tests.app.conftest import DEADLINE_S, poll_until
 from tests.app.fakes import make_slow
@@ -96,8 +96,8 @@ def test_a_clip_that_cannot_be_read_is_told_once_and_marked(open_session, launch
 
 
 def test_a_clip_has_heat_while_it_trains_and_what_is_gone_is_no_fault(make_session, monkeypatch):
-    monkeypatch.setattr(run, "SNAPSHOT_EVERY_S", 0.0)
-    monkeypatch.setattr(run, "SNAPSHOT_SHARE", 1.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_SHARE", 1.0)
     session = make_session(make_training=make_slow)
     session.dispatch(TrainNextClip())
     seen = []

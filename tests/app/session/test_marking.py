@@ -216,7 +216,7 @@ def test_it_is_said_which_clips_a_mark_reaches(make_session):
     assert session.regions.effect == "Marks apply to clips trained from now on."
     train_next(session)
     assert "Clip 0 has already started and does not change until retrained." in session.regions.effect
-    assert "Clips 0 to 2, 5 have started already" in effect_text([5, 0, 1, 2], gate="hull")
+    assert "Clips 0 to 2, 5 have already started" in effect_text([5, 0, 1, 2], gate="hull")
     assert "gate=off" in effect_text([], gate="off")
 
 

@@ -31,7 +31,7 @@ def test_pictures_without_anything_in_them_say_what_is_missing(tmp_path: Path, s
         calibrate(tmp_path / "grey", CalibrationOptions(), report=lambda _: None)
     assert "  a  b       0 matches\n" in caught.value.message
     assert "0 of 3 pairs have 30 matches or more" in caught.value.message
-    assert "patterns" in caught.value.hint
+    assert "finely patterned" in caught.value.hint
     assert "Caliscope" in caught.value.hint
     assert not list(scratch.glob("clipgstream-*"))
 

@@ -173,7 +173,7 @@ def test_constant_sets_are_decoded_once_and_equal_the_plain_decode():
 def test_a_source_clip_refuses_a_missing_or_another_reference():
     reference = state_of(make_reference(), role="reference")
     state = state_of(make_source(reference), role="source", clip_index=1, reference=reference)
-    with pytest.raises(ProjectError, match="not there"):
+    with pytest.raises(ProjectError, match="missing reference"):
         load_clip_model(state, None, backend=backend_called("cpu"))
     other = with_header(reference, fingerprint="0" * 16)
     with pytest.raises(ProjectError, match="0000"):

@@ -164,7 +164,7 @@ def test_there_has_to_be_something_to_select(selecting: ProjectSelecting, shown:
             selecting.apply(SelectAll())
         selecting.apply(ClearSelection())  # always possible
     shown.gaussians = gaussians
-    with pytest.raises(ProjectError, match="no attribute 'weight'"):
+    with pytest.raises(ProjectError, match="'weight' is not an attribute"):
         selecting.apply(SelectByAttribute("weight", 0.0, 1.0))
 
 

@@ -95,22 +95,6 @@ def test_whoever_is_interrupted_leaves_no_child_and_no_folder(monkeypatch, scrat
     assert not list(scratch.iterdir())
 
 
-@pytest.mark.skipif(os.name != "posix", reason="processes have no groups there")
-def test_ctrl_c_in_a_terminal_does_not_reach_a_child_that_starts(monkeypatch, scratch) -> None:
-    started: list[subprocess.Popen] = []
-    monkeypatch.setattr(subprocess, "Popen", _sleeping_child(started))
-    groups: list[int] = []
-
-    def stop() -> None:
-        groups.append(os.getpgid(started[-1].pid))
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        triangulate(*wall_views(), report=lambda _: None, alive=stop)
-    assert groups == [started[0].pid]
-    assert groups != [os.getpgid(0)]
-
-
 def test_folders_of_killed_processes_are_removed_and_those_of_living_ones_stay(scratch) -> None:
     done = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
     dead, living = (scratch / f"clipgstream-sparse-{pid}-x" for pid in (int(done.stdout), os.getpid()))

@@ -91,7 +91,7 @@ def test_only_held_out_cameras_of_the_others_are_measured(project, other):
         (["--crop", "8:0:0,0,4,4"], "There is no camera '8'"),
         (["--crop", "0:6:0,0,4,4"], "frame 6 is in no trained clip. Trained are frames 0 to 2, 3 to 5."),
         (["--crop", "0:0:29,0,4,4"], "reaches outside of the picture. Pictures of camera 0 are 32 x 24 pixels."),
-        (["--crop", "0:0:0,0,0,4"], "empty or out of range"),
+        (["--crop", "0:0:0,0,0,4"], "which is empty or reaches outside"),
         (["--crop", f"0:{'9' * 5000}:0,0,4,4"], "which is not a window"),
     ],
 )
