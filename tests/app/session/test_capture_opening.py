@@ -54,8 +54,8 @@ def test_answers_make_the_project_and_are_offered_the_next_time(make_session, ca
 def test_frames_that_were_chosen_are_those_that_are_trained(make_session, capture_folder, tmp_path):
     jobs = []
     session = make_session(is_open=False, launch=None)
-    launch = session._launch
-    session._launch = lambda job, project: (jobs.append(job), launch(job, project))[1]
+    launch = session.live_training._launch
+    session.live_training._launch = lambda job, project: (jobs.append(job), launch(job, project))[1]
     session.dispatch(OpenCapture(capture_folder, answers=OpeningAnswers((2, 6), 1.0, 4, ("0",))))
     poll_until(session, lambda: session.capture is not None)
     session.dispatch(TrainNextClip())
