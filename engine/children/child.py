@@ -72,6 +72,15 @@ class Parent(Generic[Event]):
         except OSError as error:
             raise Unwanted from error
 
+    def answer(self, kind: Message, value: object) -> None:
+        """Send the last message. From now on the folder is left to its owner, who reads the results in it.
+
+        Raises:
+            Unwanted: Nobody listens any more.
+        """
+        self._folder = None
+        self.write(kind, value)
+
     def job(self, kind: ChildKind[Any, Event, Any]) -> Any:
         """What this child is asked. Waits for it; ends the process where nobody asks."""
         self._kind = kind
@@ -122,9 +131,9 @@ def main(place: str, folder: str | None = None) -> None:
     with suppress(Unwanted):
         try:
             job = parent.job(kind)
-            parent.write(Message.RESULT, work(job, parent))
+            parent.answer(Message.RESULT, work(job, parent))
         except EngineError as error:
-            parent.write(Message.ERROR, Refusal.of(error))
+            parent.answer(Message.ERROR, Refusal.of(error))
         except MemoryError:
             error = EngineError("There is not enough memory.", hint="Close other programs.")
-            parent.write(Message.ERROR, Refusal.of(error))
+            parent.answer(Message.ERROR, Refusal.of(error))

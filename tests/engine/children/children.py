@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -113,6 +114,12 @@ def _tidy_up(job: Ask, parent: Parent[str]) -> str:
         raise
 
 
+def _linger(job: Ask, parent: Parent[str]) -> str:
+    """Takes its time to end after its answer, as processes with large libraries do."""
+    atexit.register(time.sleep, 60.0)
+    return job.payload
+
+
 def _lie(job: Ask, parent: Parent[str]) -> str:
     return 17  # type: ignore[return-value]
 
@@ -129,5 +136,6 @@ BEHAVIOUR = {
     "sleep": _sleep,
     "spin": _spin,
     "tidy up": _tidy_up,
+    "linger": _linger,
     "lie": _lie,
 }

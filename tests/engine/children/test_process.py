@@ -190,6 +190,18 @@ def test_in_a_terminal_ctrl_z_halts_both_and_ctrl_c_is_for_the_parent_to_underst
     assert (tmp_path / "tidy").read_text() == "tidy"
 
 
+def test_the_folder_of_a_child_that_has_answered_is_its_parents(tmp_path) -> None:
+    folder = tmp_path / "scratch"
+    folder.mkdir()
+    child = ChildProcess(AT_ONCE, Ask("linger", payload="done"), folder=folder)
+    wait_for(lambda: child.is_over, "answer")
+    assert child.pid is not None
+    child.ask_to_end()
+    wait_for(lambda: not is_alive(child.pid), "end of the child")
+    assert child.result() == "done"
+    assert folder.exists()
+
+
 PARENT = """
 import sys
 from pathlib import Path
