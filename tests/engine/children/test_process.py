@@ -195,9 +195,10 @@ def test_the_folder_of_a_child_that_has_answered_is_its_parents(tmp_path) -> Non
     folder.mkdir()
     child = ChildProcess(AT_ONCE, Ask("linger", payload="done"), folder=folder)
     wait_for(lambda: child.is_over, "answer")
-    assert child.pid is not None
+    pid = child.pid
+    assert pid is not None
     child.ask_to_end()
-    wait_for(lambda: not is_alive(child.pid), "end of the child")
+    wait_for(lambda: not is_alive(pid), "end of the child")
     assert child.result() == "done"
     assert folder.exists()
 
