@@ -45,7 +45,7 @@ class DepthOrder:
     """A finished order.
 
     Attributes:
-        key: What was asked for.
+        key: Key of the request.
         ids: Row numbers, farthest first. [M] uint32
     """
 

@@ -122,7 +122,7 @@ class SplatRenderer:
         Args:
             gaussians: Arrays, which must not change afterwards. The same key as last time uploads nothing; a key of
                 None always uploads.
-            at_once: Do not wait for the thread: what is drawn must not be seen any more.
+            at_once: Do not wait for the thread: the present picture must no longer be seen.
         Returns:
             Whether it was another one.
         Raises:

@@ -61,7 +61,7 @@ def draw_regions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _draw_choice(ui: UiState) -> None:
-    """What the sphere means, how large it is, and the two ways to be done."""
+    """Meaning and size of the sphere, and the two ways to finish."""
     tool = ui.regions
     half = (imgui.get_content_region_avail().x - 8) / 2
     for treat, words in REGION_WORDS.items():

@@ -158,11 +158,11 @@ class ImGuiBackend:
     Args:
         window: A pyglet window whose GL context is current.
         on_input: Called after each event that was forwarded, so that the owner can plan a redraw.
-        fixed_delta_s: Seconds per frame as told to ImGui; None measures real time. Tests fix it.
+        fixed_delta_s: Seconds per frame as reported to ImGui; None measures real time. Tests fix it.
         scale: How large everything is drawn.
 
     Attributes:
-        pixels_per_unit: Of the newest frame. Everything that ImGui is told and tells is in units (ui.style.ui_scale).
+        pixels_per_unit: Of the newest frame. Everything that ImGui takes and gives is in units (ui.style.ui_scale).
         is_panel_keyed: Do arrow keys, Enter and Space move inside of a panel? Set before a frame.
         is_popup_open: Was a menu or another popup open when the newest frame began, or just before?
     """
@@ -277,7 +277,7 @@ class ImGuiBackend:
 
     def _after_frame(self) -> None:
         is_closing = self._menu_frames > 0 and not self._is_menu_open()
-        is_late = len(self.context.input_events_queue) > 0  # ImGui has not taken in all that it was told
+        is_late = len(self.context.input_events_queue) > 0  # ImGui has not taken in all of its input
         # Else the next frame may give a field the keyboard, or the shortcuts their keys back.
         self._queue.after_frame(is_held=is_late or is_closing or self.context.nav_move_submitted)
         self._show_cursor()

@@ -1,4 +1,4 @@
-"""What a finding rests on, as pictures side by side: frames, or two cameras with matches and epipolar lines."""
+"""Evidence of a finding, as pictures side by side: frames, or two cameras with matches and epipolar lines."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from ui.viewport.editing.handles import Thing, axes_of, middle_of
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What has handles.
+    """A thing with handles.
 
     Attributes:
         thing: A box, a sphere or a movement.
@@ -50,7 +50,7 @@ def invert_selection(dispatch: Dispatch, ui: UiState) -> None:
 
 
 def subject_of(session: SessionView, ui: UiState) -> Subject | None:
-    """What has handles now: what was drawn, else what belongs to the chosen edit."""
+    """The thing with handles now: the drawn one, else that of the chosen edit."""
     volume = drawn_volume(ui)
     if volume is not None:
         return Subject(volume)
@@ -60,7 +60,7 @@ def subject_of(session: SessionView, ui: UiState) -> Subject | None:
 
 
 def meant(session: SessionView, ui: UiState) -> tuple[Box | Sphere | None, str]:
-    """What a new edit would act on: the box or sphere that was drawn, with its words; None stands for what is selected.
+    """Target of a new edit: the box or sphere that was drawn, with its words; None stands for the selection.
     No words where there is neither."""
     volume = drawn_volume(ui)
     if volume is not None:

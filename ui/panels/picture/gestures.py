@@ -33,7 +33,7 @@ FLY_KEYS: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """What a mouse does.
+    """Functions of a mouse.
 
     Attributes:
         name: In preferences.
@@ -56,13 +56,13 @@ class Preset:
         return self.label.partition(":")[0]
 
     def drag(self, button: Button, modifiers: str, *, is_flying: bool = False) -> Gesture:
-        """What dragging with a button does."""
+        """The gesture of dragging with a button."""
         if is_flying and button == self.look_button:
             return "look"
         return self.drags.get((button, modifiers), self.drags.get((button, ""), "none"))
 
     def turn(self, modifiers: str) -> Gesture:
-        """What turning the wheel does."""
+        """The gesture of turning the wheel."""
         return self.wheel.get(modifiers, self.wheel[""])
 
 

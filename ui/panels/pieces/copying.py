@@ -16,7 +16,7 @@ COMMAND, PYTHON = "Copy as command", "Copy as Python"
 
 
 def copy_command(make: Callable[[], CommandText]) -> None:
-    """The line for a terminal goes onto the clipboard; what cannot be said leaves it as it is."""
+    """Copy the line for a terminal; a command without such a line leaves the clipboard as it is."""
     with suppress(EngineError):
         imgui.set_clipboard_text(make().shell())
 

@@ -17,7 +17,7 @@ from ui.style.axis import ticks_that_fit, whole_ticks
 
 PLOT_HEIGHT = 76.0
 TICK_ROOM = 52.0
-"""What the numbers on the left and the margins take of a plot, units."""
+"""Room of a plot for the numbers on the left and the margins, units."""
 MIN_TICK_DISTANCE = 30.0
 LEAST_CLIPS = 2
 """With fewer there is nothing to compare."""

@@ -31,7 +31,7 @@ MAX_MARKED = 30
 TICK_DISTANCE = 52.0
 ROW_DISTANCE = 24.0
 TICK_ROOM = 52.0
-"""What the numbers on the left and the margins take of a plot, units."""
+"""Room of a plot for the numbers on the left and the margins, units."""
 CLIP_HUES = (SKY, ORANGE, GREEN, PURPLE, VERMILLION, YELLOW)
 MENU_HEIGHT = 260.0
 HELP = "Wheel: zoom. Drag: move. Double click: everything."

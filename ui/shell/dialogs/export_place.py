@@ -84,7 +84,7 @@ class ExportPlace:
 
 
 def draw_plan(plan: ExportPlan | None, ui: UiState) -> None:
-    """What will be written, or what is wrong with it; None while that is looked at."""
+    """The planned export, or its fault. plan: None while it is being made."""
     if plan is None:
         text_wrapped_dim("Estimating the size ...")
         return

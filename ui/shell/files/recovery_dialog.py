@@ -26,8 +26,8 @@ class Way:
     """One way to continue.
 
     Attributes:
-        title, detail: What it is and what it means.
-        command: What is sent for it.
+        title, detail: Its name and its consequences.
+        command: The command sent for it.
     """
 
     title: str

@@ -156,7 +156,7 @@ class ActionPalette:
         return is_clicked
 
     def _mark_letters(self, draw: imgui.ImDrawList, text: str, positions: tuple[int, ...], at: ImVec2) -> None:
-        """A line below each letter that was meant: not told by colour alone."""
+        """A line below each letter that was meant: colour alone is not enough."""
         bottom = at.y + imgui.get_text_line_height() + 1
         for position in positions:
             if position < len(text):

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 POINT_SIZE = 5.0
 """Diameter, units."""
 ANCHOR_RANGES = {"E": (0.0, 8.0), "error": (0.0, 25.5)}
-"""What colours span, 1/255, one range for all frames: a mean over many pixels is lower than the worst of them."""
+"""Ranges of the colours, 1/255, one range for all frames: a mean over many pixels is lower than the worst of them."""
 FAINT_SHARE = 0.06
-"""Least opacity, of an anchor without any residual: what is hot has to stand out."""
+"""Least opacity, of an anchor without any residual: hot ones have to stand out."""
 
 
 def anchor_column(kind: str) -> str:
@@ -32,7 +32,7 @@ def anchor_column(kind: str) -> str:
 
 
 def shown_anchor_heat(session: SessionView) -> AnchorHeat | None:
-    """What is to be shown; None where no heat map is chosen, a camera is looked through, or nothing is there yet."""
+    """The heat to show; None where no heat map is chosen, a camera is looked through, or nothing is there yet."""
     if not session.overlays.heat or session.view.look_through is not None:
         return None
     return session.anchor_heat(anchor_column(session.overlays.heat))

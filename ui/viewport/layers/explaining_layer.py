@@ -1,5 +1,5 @@
-"""What explains a clip over its picture: the spheres that inherited anchors cover, how far residual anchors lie from
-them, and the trails of what moves.
+"""Explanations of a clip over its picture: the spheres that inherited anchors cover, how far residual anchors lie from
+them, and the trails of moving Gaussians.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class ExplainingLayer:
     """Owns what is drawn. GL thread only.
 
     Attributes:
-        coverage: What is drawn of it; None where nothing is.
+        coverage: The part that is drawn; None where nothing is.
     """
 
     def __init__(self, ctx: moderngl.Context) -> None:

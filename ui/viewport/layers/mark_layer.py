@@ -152,7 +152,7 @@ class MarkLayer:
         inherited = (anchors.inherited_positions, anchors.inherited_roles, anchors.inherited_reasons)
         own = (anchors.own_positions, anchors.own_roles, anchors.own_reasons)
         is_reference = len(inherited[0]) == 0
-        if is_reference:  # what the reference clip learns is what the others inherit
+        if is_reference:  # its own anchors are those that the others inherit
             inherited, own = own, inherited
         first = anchor_marks(*inherited, most=MAX_INHERITED_MARKS, color=INHERITED_ANCHOR_COLOR)
         second = anchor_marks(*own, most=MAX_RESIDUAL_MARKS, color=RESIDUAL_ANCHOR_COLOR)

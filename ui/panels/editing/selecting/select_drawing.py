@@ -1,4 +1,4 @@
-"""What a tool that selects draws over the picture: its shape, its size under the pointer, and its hint."""
+"""Drawings of a selecting tool over the picture: its shape, its size under the pointer, and its hint."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ MARK_SLIDER = imgui.SliderFlags_.always_clamp
 STYLES = ((True, True), (False, True), (False, False))
 """Whether buttons have words, and whether boxes have arrows however short their word is; the roomiest first."""
 HIDDEN_FIRST = ("views", "heat", "compare", "mark")
-"""What goes into the menu at the end of the row where there is no room for it."""
+"""Parts that go into the menu at the end of the row where there is no room for them."""
 HIDDEN_WORDS = {"compare": "Compare", "heat": "Heat map", "views": "Views"}
 HIDDEN_X = 90.0
 BOX = 150.0
@@ -85,7 +85,7 @@ def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: V
 
 
 def _widths(words: dict[str, str], is_wordy: bool, has_arrows: bool) -> dict[str, float]:
-    """What each part of the row needs in a style, in its order."""
+    """Width of each part of the row in a style, in its order."""
     widths = {name: box_width(text, has_arrow=has_arrows) for name, text in words.items()}
     widths["show"] = _button_width(f"{Icon.EYE}  Show" if is_wordy else Icon.EYE)
     widths["look"] = _button_width(Icon.COMPASS)
@@ -226,7 +226,7 @@ _CLAMPED = imgui.SliderFlags_.always_clamp
 
 
 def heat_words(session: SessionView) -> str:
-    """What the box says."""
+    """Label of the box."""
     return HEAT_KINDS[session.overlays.heat].label if session.overlays.heat else "Heat"
 
 
@@ -254,7 +254,7 @@ def draw_heat_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: 
 
 
 def mode_words(session: SessionView) -> str:
-    """What the box says: the mode, or the part of a clip and then the mode."""
+    """Label of the box: the mode, or the part of a clip and then the mode."""
     overlays = session.overlays
     words = MODES[overlays.mode].label
     if overlays.content == ALL:
@@ -267,7 +267,7 @@ def draw_mode_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: 
     overlays = session.overlays
     imgui.set_next_item_width(width)
     is_plain = overlays.mode == COLOR and overlays.content == ALL
-    if not is_plain:  # what is seen is not the scene: that should be noticed
+    if not is_plain:  # not the plain scene: that should be noticed
         imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.YELLOW))
     is_open = imgui.begin_combo("##mode", box_words(mode_words(session), width), box_flags(width))
     if not is_plain:

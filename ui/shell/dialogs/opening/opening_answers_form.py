@@ -30,7 +30,7 @@ _FIT_CHOICES: dict[FrameFit, str] = {
     "cropped_start": "Cropped left and above",
     "cropped_middle": "Cropped on both sides",
 }
-"""What may have become of frames of another shape than their calibration."""
+"""Possible changes to frames of another shape than their calibration."""
 
 
 class AnswersForm:
@@ -188,7 +188,7 @@ class AnswersForm:
 
 
 def forecast_lines(found: OpeningForecast, *, is_final: bool) -> list[str]:
-    """What the dialog says of a forecast."""
+    """Text of the dialog about a forecast."""
     if found.total_s is None:
         time = "not known before the first clip has begun" if is_final else "measuring this machine ..."
     else:

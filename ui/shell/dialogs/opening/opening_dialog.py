@@ -71,7 +71,7 @@ class OpeningDialog:
         self._textures.clear()
 
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-        """Draw the dialog, if there is something to be asked or told."""
+        """Draw the dialog, if there is a question or a message."""
         opening = session.opening
         shown = opening.page or opening.refused
         is_new = shown is not self._shown
@@ -161,7 +161,7 @@ class OpeningDialog:
         self._draw_pictures(report, opening.pictures, ui)
 
     def _draw_pictures(self, report: CaptureReport, pictures: Mapping[int, Picture], ui: UiState) -> None:
-        """What each camera took first, side by side."""
+        """The first picture of each camera, side by side."""
         spacing = 8.0
         room = imgui.get_content_region_avail().x - 4
         n_columns = max(int((room + spacing) / (LEAST_PICTURE_WIDTH + spacing)), 1)
