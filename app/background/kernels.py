@@ -33,7 +33,7 @@ def warm_up_reporting(report: ReportProgress) -> None:
     """Compile what is not in the cache yet, saying how far that is, and load what a training step of this process's
     back end needs.
 
-    What `report` raises ends the compiling processes and passes on.
+    An exception of `report` ends the compiling processes and passes on.
     """
     said = -1
 

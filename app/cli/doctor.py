@@ -1,4 +1,4 @@
-"""What `clipgstream doctor` tells: versions, cores, memory, compiled kernels, OpenGL. Changes nothing."""
+"""The report of `clipgstream doctor`: versions, cores, memory, compiled kernels, OpenGL. Changes nothing."""
 
 from __future__ import annotations
 

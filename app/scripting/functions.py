@@ -68,7 +68,7 @@ def render(project: Source, out: Path | str, **options: Any) -> ExportResult:
 
 
 def export(project: Source, out: Path | str, **options: Any) -> ExportResult:
-    """Write what other programs read; see ScriptedProject.export."""
+    """Write files for other programs; see ScriptedProject.export."""
     with _opened(project, read_only=True) as opened:
         return opened.export(out, **options)
 

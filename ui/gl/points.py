@@ -1,6 +1,6 @@
 """Points as anti-aliased marks: disc, ring or diamond, of a size in pixels or in scene units.
 
-Shape as well as hue tells kinds of points apart, for eyes that do not tell the hues apart.
+Shape as well as hue distinguishes kinds of points, for eyes that do not distinguish the hues.
 """
 
 from __future__ import annotations

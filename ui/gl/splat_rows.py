@@ -1,4 +1,4 @@
-"""Gaussians as rows of textures: what is the same in all frames of a clip apart from what changes. Knows no GL."""
+"""Gaussians as rows of textures: the constant ones of a clip separate from those that change. Knows no GL."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ class SplatTextures:
         self._still_key = self._still_colors = None
 
     def _hold(self, n_rows: int) -> None:
-        """Make room; what was there is gone if it was too small."""
+        """Make room; earlier contents are gone if it was too small."""
         if self._geometry is not None and self._geometry.height >= n_rows:
             return
         self.release()

@@ -1,4 +1,4 @@
-"""The exports panel: what is being written, what waits and what has ended, each with what can be done about it."""
+"""The exports panel: those being written, waiting and ended, each with the commands for it."""
 
 from __future__ import annotations
 

@@ -229,7 +229,7 @@ class Frame:
         return True
 
     def _move_on(self, dt_s: float) -> bool:
-        """Follow what was chosen, move time on, and ask for pictures; a fault there is reported as well."""
+        """Follow the user's choices, move time on, and ask for pictures; a fault there is reported as well."""
         session = self.session
         with self.guard.telling("the loop", "An error occurred between two frames"):
             if self._theme.follow(self.ui.preferences.theme):

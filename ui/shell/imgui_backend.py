@@ -292,7 +292,7 @@ class ImGuiBackend:
     # ---- events ----------------------------------------------------------------------------------------------
 
     def _pass_on(self, event: Callable[[], object]) -> None:
-        """Tell ImGui about an event, after those before it. True of an event asks for a frame before the next one."""
+        """Report an event to ImGui, after those before it. True of an event asks for a frame before the next one."""
         self._newest_press = None
         self._queue.add(lambda: event() is True)
         self._on_input()
@@ -375,7 +375,7 @@ class ImGuiBackend:
             self._add_key(imgui_key, False)
 
     def _released(self, symbol: int) -> list[imgui.Key]:
-        """Keys that go up. What a key is called depends on Shift, which may have been released since it was pressed:
+        """Keys that go up. The name of a key depends on Shift, which may have been released since it was pressed:
         under a name that was not pressed, the key of the same place goes up, else all of them."""
         imgui_key = _KEY_MAP.get(symbol)
         if imgui_key is not None and int(imgui_key) in _MODIFIER_OF:

@@ -1,4 +1,4 @@
-"""The preferences: one dialog with pages. What a page changes is seen at once, and kept in the user's configuration."""
+"""The preferences: one dialog with pages. Changes on a page are seen at once, and kept in the user's configuration."""
 
 from __future__ import annotations
 

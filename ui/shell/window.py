@@ -1,6 +1,6 @@
 """The pyglet window: a GL 3.3 core context, the loop, and the events that are not ImGui's (drop, close, resize).
 
-Owns the window and its context. What is drawn is ui.shell.frame's business.
+Owns the window and its context. Drawing is ui.shell.frame's business.
 """
 
 from __future__ import annotations

@@ -200,7 +200,7 @@ class ViewportScene:
     # ---- the picture -----------------------------------------------------------------------------------------
 
     def compose(self, session: SessionView, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
-        """Draw what belongs to the session's frame from this view, unless it is drawn already."""
+        """Draw the picture of the session's frame from this view, unless it is drawn already."""
         self._target.resize(view.width, view.height)
         is_cloud_chosen = bool(session.overlays.show_cloud)
         points_key = self._take_points(session) if is_cloud_chosen else None

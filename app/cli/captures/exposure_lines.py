@@ -1,4 +1,4 @@
-"""What `clipgstream inspect` says of the cameras' exposure over a capture, as lines and as JSON."""
+"""Output of `clipgstream inspect` about the cameras' exposure over a capture, as lines and as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `clipgstream inspect` says of the findings of the capture doctor, as lines and as JSON."""
+"""Output of `clipgstream inspect` about the findings of the capture doctor, as lines and as JSON."""
 
 from __future__ import annotations
 

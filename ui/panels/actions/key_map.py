@@ -35,7 +35,7 @@ class KeyMap:
         self._parsed: dict[tuple[str, tuple[str, ...]], tuple[Key, ...]] = {}
 
     def drop_unknown(self, actions: Iterable[Keyed]) -> None:
-        """Forget what the user chose for actions that there are not, and labels that name no key; each gets a line in
+        """Forget the user's choices for actions that do not exist, and labels that name no key; each gets a line in
         the log."""
         known = {action.id for action in actions}
         for action_id, labels in list(self.chosen.items()):

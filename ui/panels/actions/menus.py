@@ -69,7 +69,7 @@ _MENU_OF_TOPIC = {
     "show": "View/Show",
     "timeline": "Time/Timeline",
 }
-"""By what an id begins with, up to the first dot."""
+"""By the beginning of an id, up to the first dot."""
 
 
 @dataclass

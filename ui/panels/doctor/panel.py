@@ -1,4 +1,4 @@
-"""The capture doctor: what is wrong with the open capture, how certain that is, what it looks like, and what helps."""
+"""The capture doctor: faults of the open capture, their certainty, their evidence, and their remedies."""
 
 from __future__ import annotations
 

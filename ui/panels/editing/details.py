@@ -1,4 +1,4 @@
-"""The details of one edit in numbers: its name, where it holds, what it acts on and what it does."""
+"""The details of one edit in numbers: its name, where it holds, its target and its action."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _draw_target(ui: UiState, target: Target) -> Target | None:
 
 
 def _draw_action(session: SessionView, ui: UiState, action: Action) -> Action | None:
-    """Fields of what an edit does; what it was changed to."""
+    """Fields of an edit's action; the changed action."""
     changed = action
     for one in settings_of(type(action)).values():
         found = _field(ui, one, getattr(action, one.name), session.timeline.last_frame)

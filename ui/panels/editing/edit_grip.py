@@ -158,7 +158,7 @@ def _vector(values: np.ndarray) -> Vector:
 
 
 def select_drawn(dispatch: Dispatch, ui: UiState) -> None:
-    """Let what was drawn be selected as it is now."""
+    """Select the contents of the drawn volume as it is now."""
     if ui.selecting.volume is not None:
         dispatch(SelectVolume(ui.selecting.volume, ui.selecting.how(), ui.selecting.is_by_extent))
         if ui.editing.is_outside:

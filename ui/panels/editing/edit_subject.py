@@ -43,7 +43,7 @@ def drawn_volume(ui: UiState) -> Box | Sphere | None:
 
 
 def invert_selection(dispatch: Dispatch, ui: UiState) -> None:
-    """Select what is not selected; of a box or sphere that was drawn, everything outside of it is meant then."""
+    """Select all that is not selected; of a box or sphere that was drawn, everything outside of it is meant then."""
     dispatch(InvertSelection())
     if drawn_volume(ui) is not None:
         ui.editing.is_outside = not ui.editing.is_outside

@@ -1,4 +1,4 @@
-"""Numeric fields of an edit: what is dragged or typed in one of them is one step of the history."""
+"""Numeric fields of an edit: a drag or an input in one of them is one step of the history."""
 
 from __future__ import annotations
 

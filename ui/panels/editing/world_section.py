@@ -1,4 +1,4 @@
-"""How the scene lies in the world: what is up, and how long a unit of the scene is."""
+"""How the scene lies in the world: its upward direction, and how long a unit of the scene is."""
 
 from __future__ import annotations
 

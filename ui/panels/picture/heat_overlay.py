@@ -87,7 +87,7 @@ class HeatOverlay:
         self._draw_bar(ui, pane, kind, kind.value_range, heat_words(kind, heat), pointed)
 
     def draw_words(self) -> None:
-        """Say what was drawn, over everything else in the pane."""
+        """Name the drawn map, over everything else in the pane."""
         if self._draw_words is not None:
             self._draw_words()
 

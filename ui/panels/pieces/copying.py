@@ -22,7 +22,7 @@ def copy_command(make: Callable[[], CommandText]) -> None:
 
 
 def copy_python(make: Callable[[], CommandText]) -> None:
-    """The lines for a script go onto the clipboard; what cannot be said leaves it as it is."""
+    """Copy the lines for a script; a command without such lines leaves the clipboard as it is."""
     with suppress(EngineError):
         imgui.set_clipboard_text(make().python)
 

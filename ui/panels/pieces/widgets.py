@@ -47,7 +47,7 @@ def draw_job_bar(job: JobStatus | None, ui: UiState, width: float, height: float
 
 
 def text_warning(text: str) -> None:
-    """What is in the way, wrapped at the panel's edge."""
+    """A warning, wrapped at the panel's edge."""
     imgui.push_text_wrap_pos(0.0)
     imgui.text_colored(ImVec4(*theme.ORANGE), f"{theme.Icon.WARNING}  {text}")
     imgui.pop_text_wrap_pos()

@@ -1,4 +1,4 @@
-"""What the pointer does over the track: scrub, zoom, pan, play around a seam, go to a marker, move or edit it, and move
+"""The pointer's use over the track: scrub, zoom, pan, play around a seam, go to a marker, move or edit it, and move
 keys of the camera path.
 """
 

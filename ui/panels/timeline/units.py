@@ -23,7 +23,7 @@ def frames_per_second_of_timecode(fps: float) -> int:
 
 
 def unit_note(unit: str, fps: float) -> str:
-    """What there is to know of a unit."""
+    """A note on a unit."""
     if unit == FRAMES:
         return "Frames, counted from 0"
     if unit == SECONDS:

@@ -1,4 +1,4 @@
-"""What of time a window shows, and in which unit. State of widgets; the playhead is in app.playback.timeline."""
+"""The part of time that a window shows, and its unit. State of widgets; the playhead is in app.playback.timeline."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ MAX_PLOT_POINTS = 600
 LOWEST, HIGHEST = 84.0, 130.0
 """Height of a plot, units: as much as a panel has to spare."""
 ROOM_BELOW = 210.0
-"""For what comes below the plots, units."""
+"""For the parts below the plots, units."""
 MAX_MARKED = 30
 """Points; more of them stand so close that marks hide the line."""
 TICK_DISTANCE = 52.0

@@ -1,4 +1,4 @@
-"""The dialog for a project whose document or journal is damaged: what is wrong, and three ways to continue."""
+"""The dialog for a project whose document or journal is damaged: the fault, and three ways to continue."""
 
 from __future__ import annotations
 

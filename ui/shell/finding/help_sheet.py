@@ -16,7 +16,7 @@ from ui.style import theme
 
 
 class HelpSheet:
-    """Owns what is searched for."""
+    """Owns the text searched for."""
 
     def __init__(self) -> None:
         self._typed = ""

@@ -27,7 +27,7 @@ _FLAGS = (
 
 
 class ActionPalette:
-    """Owns what is typed and which row is chosen, as long as it is open."""
+    """Owns the typed text and the chosen row, as long as it is open."""
 
     def __init__(self) -> None:
         self._typed = ""
@@ -75,7 +75,7 @@ class ActionPalette:
         self._chosen, self._is_scroll_wanted = 0, True
 
     def _draw_inside(self, ui: UiState) -> PaletteEntry | None:
-        """Returns what was chosen."""
+        """Returns the chosen entry."""
         if self._is_new:
             self._is_new = False
             imgui.set_keyboard_focus_here()

@@ -59,7 +59,7 @@ class EditTool:
     _pressed_s: float = -1e9
 
     def follow(self, edits: tuple[Edit, ...]) -> None:
-        """Drop what belongs to an edit that is gone."""
+        """Drop everything of an edit that is gone."""
         if self.chosen is not None and all(edit.edit_id != self.chosen for edit in edits):
             self.choose(None)
 

@@ -118,7 +118,7 @@ class SelectTool:
         self.kind = None if is_same else kind
 
     def leave(self) -> None:
-        """Drop what is being drawn; without that, put the tool away."""
+        """Drop the drawing in progress; without one, put the tool away."""
         if not self.is_dragging:
             self.kind = None
         self.points, self.surface = [], None

@@ -56,7 +56,7 @@ def heat_points(heat: AnchorHeat) -> tuple[np.ndarray, np.ndarray]:
 
 
 class AnchorHeatLayer:
-    """Owns what is drawn. GL thread only."""
+    """Owns the drawn points. GL thread only."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._points = PointRenderer(ctx)

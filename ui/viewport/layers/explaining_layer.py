@@ -33,7 +33,7 @@ TRAIL_WIDTH = 1.6
 
 
 class ExplainingLayer:
-    """Owns what is drawn. GL thread only.
+    """Owns the drawn explanations. GL thread only.
 
     Attributes:
         coverage: The part that is drawn; None where nothing is.

@@ -53,7 +53,7 @@ class AnchorCounts:
     """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited.
 
     Attributes:
-        source: What they are of.
+        source: The picture source they are of.
         inherited_roles, residual_roles: Likewise by what they are; empty where unknown.
     """
 
@@ -66,7 +66,7 @@ class AnchorCounts:
 
 
 class MarkLayer:
-    """Owns what is drawn as marks. GL thread only.
+    """Owns the drawn marks. GL thread only.
 
     Attributes:
         counts: Of the anchors that were taken last.

@@ -17,7 +17,7 @@ SAMPLES, MOST_PER_PIECE, LEAST_PER_PIECE = 256, 24, 6
 PICTURE_SIZE = (160, 90)
 """Shape of the pictures at the keys."""
 MOST_PYRAMIDS = 400
-"""Keys beyond this number have no pyramid: nobody could tell them apart."""
+"""Keys beyond this number have no pyramid: nobody could distinguish them."""
 
 
 def path_line(path: CameraPath) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Actions on how the view is turned, what it frames, and its lens."""
+"""Actions on the view's direction, framing and lens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The popup of the toolbar on how one looks: lens, axes, what is up, and the bookmarks of the project."""
+"""The popup of the toolbar on how one looks: lens, axes, the upward direction, and the bookmarks of the project."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The row over the picture: which camera, what it is compared with, what is shown over it, and marking."""
+"""The row over the picture: which camera, the comparison, the overlays, and marking."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ BOX = 150.0
 
 
 def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: ViewPopup) -> None:
-    """The row of choices over the picture; what has no room is in a menu at its end."""
+    """The row of choices over the picture; those without room are in a menu at its end."""
     imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + GAP, imgui.get_cursor_pos_y() + 6))
     room = imgui.get_content_region_avail().x - GAP
     words = {
@@ -54,7 +54,7 @@ def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: V
     boxes = [name for name in words if name in fit.widths]
 
     def box(name: str) -> float:
-        """Width of a box: what it needs, and its part of what is left; less than it needs in a very narrow row."""
+        """Width of a box: its least width, and its part of the rest; less than it needs in a very narrow row."""
         more = free / len(boxes) if has_arrows or free < 0.0 else 0.0  # a wider one would get an arrow
         return min(fit.widths[name] + more, max(fit.widths[name], BOX))
 
@@ -143,7 +143,7 @@ def _draw_camera_box(session: SessionView, dispatch: Dispatch, ui: UiState, widt
         if imgui.selectable("Free", shown is None)[0]:
             dispatch(LookThrough(None))
         for index, name in enumerate(names):
-            imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would tell apart
+            imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would distinguish
             is_chosen = imgui.selectable("##camera", shown == index)[0]
             ui.mark(f"viewport.camera{index}")
             imgui.same_line(0, 0)

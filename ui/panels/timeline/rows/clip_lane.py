@@ -87,7 +87,7 @@ def state_runs(
 
 
 def _band(stage: TimelineStage, session: SessionView, first: int, last: int) -> Rect:
-    """What is in sight of a band, so that its words are, too."""
+    """The visible part of a band, so that its words are visible, too."""
     row, scale = stage.rows[CLIPS], stage.scale
     x0 = max(scale.left_of(session.clips[first].start) + 1, scale.x0)
     x1 = min(scale.left_of(session.clips[last].stop) - 1, scale.x1)

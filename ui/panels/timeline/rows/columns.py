@@ -59,7 +59,7 @@ def shown_ratio(seam: SeamStatus) -> float | None:
 
 
 def provisional_text(seam: SeamStatus) -> str:
-    """What is known of a seam of which cameras are missing; empty of others."""
+    """Figures so far of a seam whose cameras are incomplete; empty for others."""
     if not seam.is_provisional or seam.ratio is None:
         return ""
     return f"~{seam.ratio:.1f} ({seam.n_cameras} of {seam.n_all} cameras)"

@@ -34,7 +34,7 @@ _FIT_CHOICES: dict[FrameFit, str] = {
 
 
 class AnswersForm:
-    """Owns what was answered until it is taken. `answers` is always possible; see `CaptureOpening.problem`."""
+    """Owns the answers until they are taken. `answers` is always possible; see `CaptureOpening.problem`."""
 
     def __init__(self) -> None:
         self._page: OpeningPage | None = None

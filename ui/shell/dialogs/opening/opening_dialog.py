@@ -46,12 +46,12 @@ LEAST_PICTURE_WIDTH, PICTURE_SHAPE = 120.0, 0.62
 """Of the small pictures: units, and height by width."""
 WORD_WIDTH = 92.0
 INDENT = 23.0
-"""Of what belongs to words behind a sign."""
+"""Of the parts that belong to words after a sign."""
 MORE = 'Once it is open, "Examine the capture" checks the pictures, too.'
 
 
 class OpeningDialog:
-    """Owns what was answered so far, and textures of small pictures. GL thread only.
+    """Owns the answers so far, and textures of small pictures. GL thread only.
 
     Args:
         make_texture: Makes an empty texture.

@@ -24,7 +24,7 @@ from ui.style.theme import Icon
 BUTTON = ImVec2(150, 34)
 MAX_NAMED = 4
 INDENT = 34.0
-"""Of what belongs to words behind a dot."""
+"""Of the parts that belong to words after a dot."""
 ALLOW = "Open it, the files are mine"
 
 
@@ -76,7 +76,7 @@ def draw_refused(
         return CloseQuestion() if is_closed or is_agreed else None
     is_closed = imgui.button("Close", BUTTON)
     ui.mark("refused.close")
-    if found.needs_links:  # nothing that Enter does by itself
+    if found.needs_links:  # Enter alone does not do it
         imgui.set_item_default_focus()
     imgui.same_line()
     if found.needs_links:
