@@ -86,7 +86,7 @@ class PointRenderer:
         opacity: float = 1.0,
         is_depth_tested: bool = False,
     ) -> None:
-        """Blend the points over what the target holds.
+        """Blend the points over the contents of the target.
 
         Args:
             target: Where to; may differ in size from width x height.

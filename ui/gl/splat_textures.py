@@ -80,7 +80,7 @@ class SplatTextures:
 
 
 def _write(texture: moderngl.Texture, values: np.ndarray, first_row: int) -> None:
-    """Whole rows of the texture at once, then what is left of the last one."""
+    """Whole rows of the texture at once, then the rest of the last one."""
     n_full, n_left = divmod(len(values), SPLATS_PER_ROW)
     texels = texture.width // SPLATS_PER_ROW
     if n_full:

@@ -223,7 +223,7 @@ class Frame:
         return self._redraw.is_due
 
     def _drain(self) -> bool:
-        """Let the session take in what was finished; a fault there becomes a notice and never ends the loop."""
+        """Let the session take in finished work; a fault there becomes a notice and never ends the loop."""
         with self.guard.telling("the session", "A finished result could not be used"):
             return self.session.poll()
         return True

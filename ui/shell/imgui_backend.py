@@ -266,7 +266,7 @@ class ImGuiBackend:
         return is_in_bar or len(self.context.open_popup_stack) > 0
 
     def end_frame(self) -> int:
-        """Finish the frame; returns the fingerprint of what it draws (ui.shell.redraw)."""
+        """Finish the frame; returns the fingerprint of its drawing (ui.shell.redraw)."""
         imgui.render()
         self._after_frame()
         return fingerprint(imgui.get_draw_data())

@@ -56,7 +56,7 @@ def _begin_menu(title: str, ui: UiState) -> bool:
 
 
 def _draw_items(menu: Menu, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """The actions of one menu, and what is added behind some of them."""
+    """The actions of one menu, and the entries added after some of them."""
     for item in menu.items:
         match item:
             case None:

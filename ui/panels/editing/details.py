@@ -26,7 +26,7 @@ FAR = 1e6
 """Largest coordinate that fields take, scene units."""
 LEAST_SIZE = 1e-6
 SPEED_SHARE = 2e-3
-"""Of a drag over a field, per unit: as a share of the size of what is changed."""
+"""Of a drag over a field, per unit: as a share of the size of the changed thing."""
 
 
 def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:

@@ -69,7 +69,7 @@ def meant(session: SessionView, ui: UiState) -> tuple[Box | Sphere | None, str]:
 
 
 def pivot_of(session: SessionView, volume: Box | Sphere | None) -> Vector:
-    """Where a movement turns about: the middle of what it moves, as it is shown. Scene units"""
+    """Where a movement turns about: the middle of the things it moves, as shown. Scene units"""
     if volume is not None:
         return _vector(middle_of(volume))
     means = _selected_means(session)
@@ -91,7 +91,7 @@ def bounds_of(session: SessionView, volume: Box | Sphere | None) -> tuple[Vector
 
 
 def _selected_means(session: SessionView) -> np.ndarray:
-    """Centres of what is selected, as far as it is shown. [N, 3]"""
+    """Centres of the selection, as far as it is shown. [N, 3]"""
     gaussians = session.shown_gaussians()
     if gaussians is None or gaussians.rows is None or not session.selection.n_gaussians:
         return np.zeros((0, 3))

@@ -30,7 +30,7 @@ TITLE = "Mend###mend"
 WIDTH = 372.0
 MARGIN = 12.0
 BELOW_HINT = 72.0
-"""Below two lines of what a tool in use does."""
+"""Below two lines about a tool in use."""
 HELD_OUT = "Held-out PSNR"
 METHOD_WORDS = {
     "auto": "Automatic",

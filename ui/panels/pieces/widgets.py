@@ -18,7 +18,7 @@ LEAST_WITH_ARROW = 92.0
 
 
 def text_right(text: str, color: Color | None = None) -> None:
-    """Text at the right end of the current line, pushed right rather than overlapping what is there."""
+    """Text at the right end of the current line, pushed right rather than overlapping other things."""
     imgui.same_line()
     free = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(free, 0.0))

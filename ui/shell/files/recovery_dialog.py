@@ -95,7 +95,7 @@ class RecoveryDialog:
         return answer
 
     def _draw_way(self, index: int, way: Way, ui: UiState) -> bool:
-        """A row: title and what it means. True when it is taken by a double click."""
+        """A row: title and its consequences. True when it is taken by a double click."""
         start, width = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
         flags = imgui.SelectableFlags_.allow_double_click | imgui.SelectableFlags_.no_auto_close_popups
         is_clicked = imgui.selectable(f"##way{index}", index == self._chosen, flags, ImVec2(width, ROW_HEIGHT))[0]

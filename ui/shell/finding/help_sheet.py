@@ -1,4 +1,4 @@
-"""The F1 sheet: every key and what the mouse does, with a search."""
+"""The F1 sheet: every key and the functions of the mouse, with a search."""
 
 from __future__ import annotations
 

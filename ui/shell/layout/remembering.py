@@ -1,4 +1,4 @@
-"""Brings back what the window looked like, and keeps it: layout, scale, marks, and each project's frame and view.
+"""Brings back the window's appearance, and keeps it: layout, scale, marks, and each project's frame and view.
 
 Written a while after something changed and when the window closes, so that a killed program has lost seconds of it.
 """

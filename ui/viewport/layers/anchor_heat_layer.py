@@ -39,7 +39,7 @@ def shown_anchor_heat(session: SessionView) -> AnchorHeat | None:
 
 
 def heat_points(heat: AnchorHeat) -> tuple[np.ndarray, np.ndarray]:
-    """Places and colours of the anchors that were seen, the coldest first, so that nothing hides what is hot.
+    """Places and colours of the anchors that were seen, the coldest first, so that nothing hides the hot ones.
 
     Returns:
         [A', 3] float32 and RGBA in 0..1 [A', 4] float32
@@ -74,7 +74,7 @@ class AnchorHeatLayer:
         return not self._is_shown
 
     def take(self, session: SessionView, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
-        """Take up the anchors' residuals; asks for what is missing.
+        """Take up the anchors' residuals; asks for missing ones.
 
         Args:
             gaussians: Of the picture below: what they hide is not drawn. None where it is something else.
@@ -97,6 +97,6 @@ class AnchorHeatLayer:
         return key
 
     def draw(self, target: Target, view: SceneView, opacity: float, pixels_per_unit: float) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         if self._is_shown:
             self._points.draw(target, *view.camera, shape="circle", size=POINT_SIZE * pixels_per_unit, opacity=opacity)

@@ -56,7 +56,7 @@ class ExplainingLayer:
         return self.coverage is None and self._trails is None
 
     def take(self, session: SessionView, view: SceneView) -> Hashable:
-        """Take up what belongs to the session's frame; gives a key that differs whenever what is drawn does."""
+        """Take up the explanations of the session's frame; gives a key that differs whenever the drawing does."""
         overlays = session.overlays
         self.coverage = session.shown_coverage() if overlays.show_coverage else None
         self._trails = session.shown_trails() if overlays.show_trails else None
@@ -73,7 +73,7 @@ class ExplainingLayer:
         return coverage_key, trails_key
 
     def draw(self, target: Target, view: SceneView, pixels_per_unit: float) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         if self.coverage is not None:
             self._outlines.draw(target, *view.camera, width_px=1.2 * pixels_per_unit, opacity=OUTLINE_OPACITY)
             size = DISTANCE_SIZE * pixels_per_unit

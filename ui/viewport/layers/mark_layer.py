@@ -148,7 +148,7 @@ class MarkLayer:
         return colors
 
     def _sort(self, anchors: AnchorArrays) -> None:
-        """Marks and counts of what is inherited and of what is the clip's own."""
+        """Marks and counts of inherited anchors and of the clip's own."""
         inherited = (anchors.inherited_positions, anchors.inherited_roles, anchors.inherited_reasons)
         own = (anchors.own_positions, anchors.own_roles, anchors.own_reasons)
         is_reference = len(inherited[0]) == 0
@@ -167,7 +167,7 @@ class MarkLayer:
         )
 
     def draw(self, target: Target, view: SceneView, session: SessionView) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         overlays, unit = session.overlays, self.pixels_per_unit
         size, opacity = self._look(session)
         room = np.sqrt(view.width * view.height) / (ROOMY_SIDE * unit)

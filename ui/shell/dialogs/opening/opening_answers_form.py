@@ -47,7 +47,7 @@ class AnswersForm:
         self._pointed: str | None = None
 
     def begin(self, page: OpeningPage) -> None:
-        """Begin with what is offered, once for each page."""
+        """Begin with the offered answers, once for each page."""
         if page is self._page:
             return
         self._page, answers = page, page.answers

@@ -1,4 +1,4 @@
-"""Why a folder does not open, and what helps: its videos are calibrated, or files outside of it are allowed."""
+"""Why a folder does not open, and the remedy: its videos are calibrated, or files outside of it are allowed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ALLOW = "Open it, the files are mine"
 def draw_refused(
     found: RefusedFolder, ui: UiState, *, is_agreed: bool
 ) -> CloseQuestion | LookAtVideos | OpenCapture | None:
-    """Draw all of the dialog; returns what was answered. is_agreed: Enter was pressed."""
+    """Draw all of the dialog; returns the answer. is_agreed: Enter was pressed."""
     width = imgui.get_content_region_avail().x
     if imgui.begin_child("why", ImVec2(0, -(BUTTON.y + 18)), imgui.ChildFlags_.nav_flattened):
         push_bold(ui, ui.fonts.body_size + 2)
