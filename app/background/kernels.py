@@ -22,7 +22,7 @@ COMPILING = "Compiling kernels, first start only"
 
 
 def warm_cache() -> None:
-    """Compile what is not in the cache yet. Blocks until it is done; a failure is logged and otherwise ignored."""
+    """Compile kernels missing from the cache. Blocks until it is done; a failure is logged and otherwise ignored."""
     try:
         compile_all(backend=process_backend().name)
     except OSError as error:

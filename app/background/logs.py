@@ -21,7 +21,7 @@ N_OLD = 2
 
 
 class PrintableFormatter(logging.Formatter):
-    """Writes out what a terminal would obey and what no encoding holds, as names of files and cameras may have it."""
+    """Escapes characters that a terminal would obey or that no encoding holds, as in names of files and cameras."""
 
     def format(self, record: logging.LogRecord) -> str:
         """The record as text."""

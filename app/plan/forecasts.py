@@ -1,4 +1,4 @@
-"""Forecasts: what training the next clip takes, and what all takes that waits or is left, made on a thread.
+"""Forecasts: cost of training the next clip, and of all clips that wait or are left, made on a thread.
 
 One plan per kind and length of clip stands for all of them; clips trained before say most. The next clip is planned by
 itself, while nothing trains.

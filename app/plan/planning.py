@@ -1,4 +1,4 @@
-"""Plans of a project's clips: what the settings, the capture and the clips trained before say together."""
+"""Plans of a project's clips, from the settings, the capture and the clips trained before."""
 
 from __future__ import annotations
 

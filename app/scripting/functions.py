@@ -56,7 +56,7 @@ def undo(project: Source) -> str:
 
 
 def redo(project: Source) -> str:
-    """Do again what was taken back last; see ScriptedProject.redo."""
+    """Redo the last undone step; see ScriptedProject.redo."""
     with _opened(project) as opened:
         return opened.redo()
 

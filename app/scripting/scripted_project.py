@@ -192,15 +192,14 @@ class ScriptedProject:
         self.change(document, f"change {', '.join(name.replace('_', ' ') for name in entries)}")
 
     def undo(self) -> str:
-        """Take back the last step. Returns what that was; empty where there was none. Raises what `change` raises."""
+        """Undo the last step. Returns its name; empty where there was none. Raises what `change` raises."""
         name = self.history.undo_name
         if name:
             self._happen(Undone())
         return name
 
     def redo(self) -> str:
-        """Do again what was taken back last. Returns what that was; empty where there was nothing. Raises what
-        `change` raises."""
+        """Redo the last undone step. Returns its name; empty where there was none. Raises what `change` raises."""
         name = self.history.redo_name
         if name:
             self._happen(Redone())

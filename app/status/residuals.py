@@ -51,7 +51,7 @@ class SeamStatus:
 
     @property
     def is_provisional(self) -> bool:
-        """Whether cameras are missing: with few of them a ratio is often twice what it comes to."""
+        """Whether cameras are missing: with few of them a ratio is often twice the final one."""
         return self.n_cameras < self.n_all
 
 
@@ -88,7 +88,7 @@ class ResidualStatus:
     revision: int = 0
 
     def worst(self, column: str, n_worst: int) -> list[tuple[float, int, int]]:
-        """The worst figures of a column: (value, frame_index, camera_index), worst first; only what is measured.
+        """The worst figures of a column: (value, frame_index, camera_index), worst first; only measured ones.
 
         Raises:
             ValueError: There is no such column.

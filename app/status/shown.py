@@ -18,7 +18,7 @@ OVERLAY_NAMES = (
 )
 COMPARE_MODES = ("off", "wipe", "side", "blink")
 CAPTURED = "captured"
-"""Of Overlays.compare_with: what the camera took."""
+"""Of Overlays.compare_with: the camera's picture."""
 _VERSION = "version "
 BLINK_HZ = (0.25, 3.0)
 """Slowest and fastest blinking. More than three flashes a second can cause seizures."""

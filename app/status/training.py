@@ -120,7 +120,7 @@ class QueuedClip:
 
 @dataclass(frozen=True, slots=True)
 class QueueStatus:
-    """Clips that wait, those that failed, and what all of it takes.
+    """Clips that wait, those that failed, and the cost of all.
 
     Attributes:
         waiting: In the order in which they are trained.

@@ -33,7 +33,7 @@ class ProjectStatus:
 
 @dataclass(frozen=True, slots=True)
 class RegionsStatus:
-    """Where the user says what is static and what moves.
+    """Where the user marks static and moving parts.
 
     Attributes:
         regions: As they are kept in the project; later ones overrule earlier ones.

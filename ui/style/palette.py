@@ -1,4 +1,4 @@
-"""Palette: every colour of the window, dark or light, as one value; and how far text stands out from what is behind it.
+"""Palette: every colour of the window, dark or light, as one value; and how far text stands out from its background.
 
 Plain numbers; imports no library. Pictures stay on the same dark grey in both, so what lies over a picture is written
 in the colours of `DARK`, whatever the panels are drawn in.

@@ -16,7 +16,7 @@ from engine.doctor.finding import Finding
 from engine.errors import CaptureError
 
 APPLY_CERTAINTY = 0.8
-"""--apply does what is at least so certain, and no mere note."""
+"""Least certainty of the corrections of --apply; it ignores mere notes."""
 NONE = "none"
 
 

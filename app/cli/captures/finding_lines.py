@@ -15,7 +15,7 @@ SIGNS = {"error": "!!", "warning": "! ", "note": "- "}
 
 
 def finding_lines(findings: Sequence[Finding], *, path: str) -> list[str]:
-    """Two or three lines per finding: what, how certain, what to do, and the flags that do it."""
+    """Two or three lines per finding: the fault, its certainty, the remedy, and the flags for it."""
     lines = []
     for finding in findings:
         sign = SIGNS[finding.severity]

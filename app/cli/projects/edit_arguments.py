@@ -91,12 +91,12 @@ def _add_scopes(group: argparse._ArgumentGroup) -> None:
 
 
 def has_action(options: argparse.Namespace) -> bool:
-    """Whether something was said of what an edit does."""
+    """Whether an action was given."""
     return bool(_given_actions(options))
 
 
 def has_target(options: argparse.Namespace) -> bool:
-    """Whether something was said of what an edit acts on."""
+    """Whether a target was given."""
     return any(_is_given(options, name) for name in _TARGET_OPTIONS)
 
 

@@ -1,4 +1,4 @@
-"""Gestures: what the buttons and the wheel of the mouse do over the picture, as one table per preset.
+"""Gestures: functions of the mouse's buttons and wheel over the picture, as one table per preset.
 
 A preset is chosen, never guessed: a wheel and a touchpad cannot be distinguished by what they send.
 """
@@ -52,7 +52,7 @@ class Preset:
 
     @property
     def title(self) -> str:
-        """The label without what explains it."""
+        """The label without its explanation."""
         return self.label.partition(":")[0]
 
     def drag(self, button: Button, modifiers: str, *, is_flying: bool = False) -> Gesture:
@@ -100,7 +100,7 @@ PRESETS: dict[str, Preset] = {
         ),
     )
 }
-"""By name; the first one is what a new user gets."""
+"""By name; the first one is that of a new user."""
 
 
 @dataclass

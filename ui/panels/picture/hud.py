@@ -230,7 +230,7 @@ def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: Color) -> None:
 
 
 def legend_rows(session: SessionView, scene: ViewportScene) -> list[tuple[str, Color, str]]:
-    """Shape, colour and words of what is marked."""
+    """Shape, colour and words of marks."""
     counts = scene.counts
     rows = [("disc", (*hue, 1.0), words) for hue, words in MODES[scene.shown.source.shown_as.mode].legend]
     clip_index, frame_index = counts.source.clip_index, counts.source.frame_index
@@ -252,7 +252,7 @@ def legend_rows(session: SessionView, scene: ViewportScene) -> list[tuple[str, C
 
 
 def _role_rows(shape: str, counts: dict[str, int]) -> Sequence[tuple[str, Color, str]]:
-    """Legend of anchors by what they are; nothing where they are all the same."""
+    """Legend of anchors by role; nothing where they are all the same."""
     if len(counts) < 2:
         return []
     return [(shape, ON_PICTURE.role_colors[role], f"of them {format_count(n)} {role}") for role, n in counts.items()]

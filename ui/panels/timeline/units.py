@@ -66,7 +66,7 @@ class Ticks:
 
 
 def ruler_ticks(shown: TimeRange, width: float, fps: float, unit: str, n_frames: int) -> Ticks:
-    """Ticks of what is shown: at round values, as far apart as their labels need.
+    """Ticks of the shown part: at round values, as far apart as their labels need.
 
     Args:
         width: Of the ruler, units of the screen.

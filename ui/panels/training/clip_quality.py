@@ -51,7 +51,7 @@ class ClipQuality:
 
     @property
     def exposure_text(self) -> str:
-        """How far exposure goes, and what became of that."""
+        """How far exposure goes, and its correction."""
         largest = np.nanmax(self.exposure) if np.isfinite(self.exposure).any() else 0.0
         if largest < LEAST_CHANGE_PERCENT:
             return "The cameras' exposure does not change between clips."

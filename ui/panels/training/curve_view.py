@@ -1,4 +1,4 @@
-"""CurveView: which curves are shown and which part of them: what the user chose in the plots of the training panel."""
+"""CurveView: which curves are shown and which part of them: the user's choice in the plots of the training panel."""
 
 from __future__ import annotations
 

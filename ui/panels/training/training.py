@@ -1,4 +1,4 @@
-"""The training panel: what runs, how fast, how well, what waits, and the buttons that start, pause and stop it."""
+"""The training panel: the running clip, its speed and quality, the waiting clips, and buttons for training."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small pictures of what cameras took, kept on the GPU as long as they are looked at."""
+"""Small pictures from cameras, kept on the GPU as long as they are looked at."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def _button_width(label: str) -> float:
 
 
 def _draw_more(session: SessionView, dispatch: Dispatch, ui: UiState, hidden: tuple[str, ...]) -> None:
-    """The button at the end of the row, and what it shows."""
+    """The button at the end of the row, and its menu."""
     if imgui.button(f"{Icon.MORE}##more"):
         imgui.open_popup("more")
     ui.mark("viewport.more")

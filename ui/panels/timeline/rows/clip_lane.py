@@ -38,7 +38,7 @@ def clips_in_sight(session: SessionView, scale: TimeScale) -> tuple[int, int]:
 
 
 def draw_clip_lane(stage: TimelineStage, session: SessionView) -> None:
-    """Bands or runs of what is in sight, and the note of the clip under the pointer."""
+    """Bands or runs in sight, and the note of the clip under the pointer."""
     first, stop = clips_in_sight(session, stage.scale)
     if first == stop:
         return

@@ -1,4 +1,4 @@
-"""Figures of all clips as columns, and columns thinned to what a screen can show. Arithmetic only."""
+"""Figures of all clips as columns, and columns thinned for the screen. Arithmetic only."""
 
 from __future__ import annotations
 
