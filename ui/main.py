@@ -119,7 +119,7 @@ def _choose_backend(parser: argparse.ArgumentParser, options: argparse.Namespace
 
 
 def _mistyped_command(arguments: Sequence[str]) -> str:
-    """What to say where the first argument was most likely meant as a command; a path that exists is always a path."""
+    """The message where the first argument was most likely meant as a command; a path that exists is always a path."""
     word = arguments[0] if arguments else ""
     if not word or word.startswith("-") or os.path.lexists(word):
         return ""

@@ -1,1 +1,1 @@
-"""Edits applied permanently: clips are written again without what edits have deleted."""
+"""Edits applied permanently: clips are written again without deleted anchors."""

@@ -1,8 +1,8 @@
-"""Applying deletions permanently: new versions of the clips, without the anchors that no frame shows any more.
+"""Applying deletions permanently: new versions of the clips, without the anchors that frames no longer show.
 
-First the document learns the new numbers of what was picked, beside the old ones, so that it holds for clips of before
+First the document learns the new numbers of picked anchors, next to the old ones, so that it holds for clips of before
 and after. Then all clips are exchanged at once. At last the edits go that have nothing left to delete. Whenever the
-program is killed in between, edits and clips fit together. What was deleted comes back with the versions of the clips.
+program is killed in between, edits and clips fit together. Deleted anchors come back with the versions of the clips.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class StagedClips:
         return tuple(edit for edit in self.after if edit.is_on and isinstance(edit.action, Delete))
 
     def text(self) -> str:
-        """What was done, and why something stays."""
+        """The outcome, and why something stays."""
         clips = "1 clip was" if len(self.clip_indices) == 1 else f"{len(self.clip_indices)} clips were"
         said = f"{clips} rewritten without {self.n_anchors:,} anchors."
         if self.kept:
@@ -72,7 +72,7 @@ def apply_permanently(
 
     Args:
         clips: All of the capture.
-        report: What it raises ends the work as long as nothing is exchanged.
+        report: Its exceptions end the work as long as nothing is exchanged.
     Raises:
         ProjectError: There is nothing to apply, the project is read-only, or a clip is damaged; nothing has changed.
         DiskError: The disk refused.
@@ -86,7 +86,7 @@ def apply_permanently(
 
 
 def stage(project: Project, deletions: Deletions, report: Report = lambda n_done, n_all: None) -> StagedClips:
-    """Write the new clips beside the old ones. Nothing else changes yet.
+    """Write the new clips next to the old ones. Nothing else changes yet.
 
     Raises:
         ProjectError: No anchor goes, a clip is another one than before, or damaged.

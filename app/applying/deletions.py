@@ -28,7 +28,7 @@ Report = Callable[[int, int], None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClipDeletions:
-    """What one clip can do without.
+    """The anchors that one clip can lose.
 
     Attributes:
         fingerprint: Of the clip that was looked at.
@@ -51,7 +51,7 @@ class ClipDeletions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Deletions:
-    """What the clips of a project can do without.
+    """The anchors that the clips of a project can lose.
 
     Attributes:
         edits: Of the document that was looked at.
@@ -67,7 +67,7 @@ class Deletions:
 
     @property
     def gone_from_reference(self) -> Rows:
-        """Anchors that the reference clip can lose: no clip shows them any more. None where a clip is not trained."""
+        """Anchors that the reference clip can lose: clips no longer show them. None where a clip is not trained."""
         index = self.reference_index
         if index is None or index not in self.clips or self.untrained:
             return {}
@@ -100,7 +100,7 @@ def find_deletions(
 
     Args:
         clips: All of the capture.
-        report: What it raises ends the work.
+        report: Its exceptions end the work.
         edits: The stack; None for that of the document.
     Raises:
         ProjectError: A clip is damaged, an edit is, there is nothing to delete, or the clips share one field.

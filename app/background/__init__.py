@@ -1,1 +1,1 @@
-"""Work beside the window: threads, child processes, kernels, logs."""
+"""Work next to the window: threads, child processes, kernels, logs."""

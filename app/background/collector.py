@@ -21,7 +21,7 @@ _n_modules = 0
 @contextmanager
 def uncollected() -> Iterator[None]:
     """Load modules in this block: nothing is collected until the last such block of all threads ends, and what is there
-    then is never looked at again, unless nothing was loaded. Garbage among it stays, which is little beside modules."""
+    then is never looked at again, unless nothing was loaded. Garbage among it stays, little compared with modules."""
     global _n_loading, _n_modules, _was_enabled
     with _lock:
         if _n_loading == 0:

@@ -19,17 +19,17 @@ class JobCancelled(Exception):
 
 
 class JobContext:
-    """What a job sees of the outside."""
+    """A job's access to the outside."""
 
     def __init__(self, name: str, *, can_cancel: bool = False) -> None:
         self.status = JobStatus(name, began_s=time.monotonic(), can_cancel=can_cancel)
         self._is_cancelled = threading.Event()
 
     def report(self, done: float, message: str = "") -> None:
-        """Tell progress, 0..1.
+        """Report progress, 0..1.
 
         Raises:
-            JobCancelled: The job is not wanted any more.
+            JobCancelled: The job is no longer wanted.
         """
         if self._is_cancelled.is_set():
             raise JobCancelled
@@ -128,7 +128,7 @@ class Jobs:
         return [job.context.status for job in self._jobs]
 
     def poll(self) -> bool:
-        """Deliver finished jobs on this thread. Whether there were any. What taking up a result raises ends here."""
+        """Deliver finished jobs on this thread. Whether there were any. Exceptions of taking up a result end here."""
         finished = [job for job in self._jobs if not job.is_running]
         self._jobs = [job for job in self._jobs if job not in finished]
         for job in finished:
@@ -147,7 +147,7 @@ class Jobs:
                 job.context.cancel()
 
     def cancel(self) -> None:
-        """Nothing that runs is wanted any more."""
+        """Cancel all running jobs."""
         for job in self._jobs:
             job.context.cancel()
 

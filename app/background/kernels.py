@@ -22,7 +22,7 @@ COMPILING = "Compiling kernels, first start only"
 
 
 def warm_cache() -> None:
-    """Compile what is not in the cache yet. Blocks until it is done; a failure is logged and otherwise ignored."""
+    """Compile kernels missing from the cache. Blocks until it is done; a failure is logged and otherwise ignored."""
     try:
         compile_all(backend=process_backend().name)
     except OSError as error:
@@ -33,7 +33,7 @@ def warm_up_reporting(report: ReportProgress) -> None:
     """Compile what is not in the cache yet, saying how far that is, and load what a training step of this process's
     back end needs.
 
-    What `report` raises ends the compiling processes and passes on.
+    An exception of `report` ends the compiling processes and passes on.
     """
     said = -1
 

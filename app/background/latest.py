@@ -31,7 +31,7 @@ class LatestWorker(Generic[Request, Result]):
 
     Args:
         name: Of the thread, for logs.
-        compute: Called on the thread. What it raises is kept and handed to `take_error`.
+        compute: Called on the thread. Its exceptions are kept and handed to `take_error`.
         prepare: Called once on the thread before the first request.
         on_done: Called on the thread after each result that was asked for, to wake somebody up. Must not block.
     """
@@ -82,7 +82,7 @@ class LatestWorker(Generic[Request, Result]):
             self._condition.notify_all()
 
     def plan(self, requests: Sequence[Request]) -> None:
-        """What to work on, in this order, while nothing is asked; takes the place of what was planned before.
+        """Set the requests to work on, in this order, while none is pending; they replace those planned before.
 
         Results are what `compute` keeps of them: they are not `newest`, and nobody is woken up. What fails is not tried
         again before it is asked for.
@@ -167,7 +167,7 @@ class LatestWorker(Generic[Request, Result]):
 
     @property
     def is_closed(self) -> bool:
-        """For `compute`: whether nothing that it comes to is taken up any more."""
+        """For `compute`: whether its results are no longer taken up."""
         return self._is_closed
 
     def close(self, timeout_s: float = 2.0) -> None:
@@ -190,7 +190,7 @@ class LatestWorker(Generic[Request, Result]):
             logger.warning("%s could not be prepared", self._name, exc_info=True)
 
     def _take(self) -> tuple[Hashable, Request]:
-        """What to work on now and its lane, None where it was planned. There is something."""
+        """The lane, None for a planned request, and the request to work on now. There is one."""
         if not self._pending:
             return None, self._planned.pop(0)
         lanes = [lane for lane in self._pending if lane != self.active_lane]

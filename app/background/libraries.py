@@ -32,8 +32,8 @@ _has_loaded = False
 
 
 def load_libraries() -> None:
-    """Open what torch, numba, scipy and av will need. Blocks the calling thread alone; what cannot be opened is left to
-    the import, which says why. Does nothing the second time, nor on Windows."""
+    """Open what torch, numba, scipy and av will need. Blocks the calling thread alone; a library that does not open
+    is left to the import, which says why. Does nothing the second time, nor on Windows."""
     global _has_loaded
     with _lock:
         if _has_loaded or sys.platform == "win32":

@@ -1,4 +1,4 @@
-"""What program and training have said, as lines to look at: the ends of their log files, read on a thread."""
+"""Log lines of program and training: the ends of their log files, read on a thread."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class LogLine:
 
 @dataclass(frozen=True, slots=True)
 class LogRequest:
-    """Files as they are now: size and time tell whether they were read before."""
+    """Files as they are now: size and time show whether they were read before."""
 
     files: tuple[tuple[str, Path, int, int], ...]
 

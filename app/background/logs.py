@@ -17,11 +17,11 @@ from engine.user_folders import data_dir
 FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 MAX_LOG_BYTES = 2_000_000
 N_OLD = 2
-"""Earlier files that are kept beside the log, each of about MAX_LOG_BYTES."""
+"""Earlier files that are kept next to the log, each of about MAX_LOG_BYTES."""
 
 
 class PrintableFormatter(logging.Formatter):
-    """Writes out what a terminal would obey and what no encoding holds, as names of files and cameras may have it."""
+    """Escapes characters that a terminal would obey or that no encoding holds, as in names of files and cameras."""
 
     def format(self, record: logging.LogRecord) -> str:
         """The record as text."""
@@ -83,7 +83,7 @@ def log_path() -> Path:
 def start_logging(path: Path | None = None, *, level: int = logging.INFO) -> Path | None:
     """Send this program's records to a file. Returns the file, or None when the disk refused."""
     path = log_path() if path is None else path
-    logging.raiseExceptions = False  # what a stream refuses is nobody's business either
+    logging.raiseExceptions = False  # nor does it matter that a stream refuses a record
     handler: logging.Handler = SharedLogHandler(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""What processes use of the machine: memory and processor time, read from the system at most once a second.
+"""Use of the machine by processes: memory and processor time, read from the system at most once a second.
 
-Linux says it of every process; elsewhere only the processor time of this one is known.
+Linux reports both for every process; elsewhere only the processor time of this one is known.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What subcommands share: argparse that says what is wrong in one line, ranges, cameras, codes."""
+"""Parts that subcommands share: argparse with errors in one line, ranges, cameras, codes."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 class PlainParser(argparse.ArgumentParser):
-    """Says what is wrong in one line and how to get help. Options are written in full: `--seed` is not `--seeds`."""
+    """Reports an error in one line and how to get help. Options are written in full: `--seed` is not `--seeds`."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"allow_abbrev": False, **options})
@@ -97,7 +97,7 @@ def path_argument(text: str) -> Path:
     try:
         os.lstat(os.path.join(text, "x" * _LONGEST_INSIDE))
     except (FileNotFoundError, NotADirectoryError, PermissionError):
-        pass  # told better by whoever uses it
+        pass  # reported better by whoever uses it
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise argparse.ArgumentTypeError(f"{shown(text)} cannot be used as a path ({reason})") from error

@@ -68,7 +68,7 @@ def project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
 
 
 def what_goes(project: Project, options: argparse.Namespace) -> str:
-    """What training with these arguments would discard, in words; empty for nothing."""
+    """The progress that training with these arguments would discard, in words; empty for none."""
     if options.is_starting_over:
         return training_of(project).words
     stored = read_settings(project.folder) if (project.folder / PROJECT_FILE).is_file() else project.settings

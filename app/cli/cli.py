@@ -129,7 +129,7 @@ class _Notes(logging.Handler):
 
 @contextmanager
 def notes_on_terminal() -> Iterator[None]:
-    """In this block, say on standard error what is missing in projects that are read."""
+    """In this block, report on standard error missing parts of projects that are read."""
     handler, package = _Notes(), logging.getLogger(DOCUMENTS)
     package.addHandler(handler)
     try:
@@ -139,7 +139,7 @@ def notes_on_terminal() -> Iterator[None]:
 
 
 class PrintableStream(io.TextIOBase):
-    """A text stream in front of another, for results: what goes through it is printable.
+    """A text stream in front of another, for results: all text through it is printable.
 
     Args:
         stream: As sys.stdout. Characters that its encoding lacks are written out too.

@@ -1,4 +1,4 @@
-"""The table of commands: name, what it does, and the module that is imported once the command is used.
+"""The table of commands: name, purpose, and the module that is imported once the command is used.
 
 Each module has `add_arguments(parser)` and `run(options, launch)`. Nothing here imports them, so that a command costs
 nothing until it is called, and the product does not depend on the laboratory whose commands are named here too.
@@ -17,7 +17,7 @@ _GOES_ON = "Progress is kept; the same command resumes from there."
 
 
 class CommandModule(Protocol):
-    """What a command's module provides."""
+    """The functions of a command's module."""
 
     def add_arguments(self, command: argparse.ArgumentParser) -> None:
         """Declare the command's arguments."""
@@ -32,9 +32,9 @@ class Command(NamedTuple):
     """One subcommand.
 
     Attributes:
-        summary: What it does, in one line for the list of commands and for its own help.
+        summary: Its purpose, in one line for the list of commands and for its own help.
         module: Where its arguments and its work are.
-        interrupted: What has become of the work after an interruption, beside what the interruption itself says.
+        interrupted: State of the work after an interruption, in addition to the words of the interruption itself.
         has_backend: Whether clips are trained, decoded or drawn, with the back end of `--backend`.
     """
 

@@ -1,4 +1,4 @@
-"""What `clipgstream doctor` tells: versions, cores, memory, compiled kernels, OpenGL. Changes nothing."""
+"""The report of `clipgstream doctor`: versions, cores, memory, compiled kernels, OpenGL. Changes nothing."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ print(json.dumps([ctx.info["GL_RENDERER"], ctx.info["GL_VERSION"]]))
 
 @dataclass(frozen=True, slots=True)
 class MachineFinding:
-    """One line of the report. `is_fine` is False for what the user should look at."""
+    """One line of the report. `is_fine` is False for findings that the user should look at."""
 
     subject: str
     text: str

@@ -1,4 +1,4 @@
-"""The argument of commands that measure how fast pictures are rendered unless they are told not to."""
+"""The argument of commands that measure how fast pictures are rendered unless the user forbids it."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ def add_no_fps(command: argparse.ArgumentParser) -> None:
 
 
 def wanted_rates(options: argparse.Namespace) -> RatesOf:
-    """What measures: nothing with --no-fps."""
+    """The measuring function; it measures nothing with --no-fps."""
     return (lambda opened: None) if options.no_fps else frame_rates

@@ -33,7 +33,7 @@ def add_training_settings(command: argparse.ArgumentParser) -> None:
 
 
 def overrides_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Training settings of the arguments: the preset, and what was set beside it."""
+    """Training settings of the arguments: the preset, and settings in addition to it."""
     return (preset(options.preset) if options.preset else {}) | parse_overrides(options.assignments)
 
 

@@ -1,1 +1,1 @@
-"""What training the next clips would take."""
+"""Cost of training the next clips."""

@@ -1,4 +1,4 @@
-"""Forecasts: what training the next clip takes, and what all takes that waits or is left, made on a thread.
+"""Forecasts: cost of training the next clip, and of all clips that wait or are left, made on a thread.
 
 One plan per kind and length of clip stands for all of them; clips trained before say most. The next clip is planned by
 itself, while nothing trains.
@@ -39,10 +39,10 @@ Kind = tuple[bool, int]
 
 @dataclass(frozen=True, slots=True)
 class ForecastRequest:
-    """What to plan.
+    """The clips to plan.
 
     Attributes:
-        basis: What plans depend on: settings, exclusions, and the revision of the catalog of clips.
+        basis: The inputs of plans: settings, exclusions, and the revision of the catalog of clips.
         next_clip: None while something trains or nothing is left.
         can_measure: Whether nothing else computes, so that the machine may be timed.
     """
@@ -82,7 +82,7 @@ def clip_forecast(plan: TrainingPlan | None, record: ClipRecord, *, begins_afres
 
     Args:
         plan: Of its kind; None until it was made.
-        record: What lies on disk of it.
+        record: Its record on disk.
         begins_afresh: Whether it does not resume where it was stopped.
     """
     if plan is None:
@@ -104,7 +104,7 @@ def together(parts: Sequence[SequenceForecast]) -> SequenceForecast:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """What waits and what is left, without the clip that trains."""
+    """The waiting clips and the work left, without the clip that trains."""
 
     clips: tuple[QueuedClip, ...] = ()
     queued: SequenceForecast = NOTHING
@@ -130,7 +130,7 @@ class Forecasts:
     def _ask(
         self, service: TrainingService, project: Project, capture: Capture, *, can_measure: bool
     ) -> tuple[ForecastRequest, tuple[ForecastRequest, Plans] | None]:
-        """What is to be planned now, and what was planned last of this project; asks for it where that says less."""
+        """The request for plans now, and the last plans of this project; makes the request where those cover less."""
         basis = (f"{project.settings!r} {id(project.document.exclusions)}", service.catalog.revision)
         is_idle, index = not service.is_busy, service.next_clip_index
         next_clip = service.clips[index] if is_idle and index is not None else None
@@ -185,8 +185,8 @@ class Forecasts:
         )
 
     def _waiting(self, service: TrainingService, project: Project, kinds: Mapping[Kind, TrainingPlan]) -> Waiting:
-        """What does not depend on the clip that trains; made anew only when something has changed, since clips may be
-        thousands and this is asked for at every change of the picture."""
+        """The part that does not depend on the clip that trains; made anew only when something has changed, since
+        clips may be thousands and this is asked for at every change of the picture."""
         queue, running = service.queue, tuple(service.runs)
         clips = tuple(queue)
         own = tuple(index for index in clips if queue.own_settings(index) is not None)
@@ -236,7 +236,7 @@ def _clip_parts(
 
 
 def _running_part(run: ClipRun, whole: SequenceForecast) -> SequenceForecast:
-    """What is left of the clip that trains: by its own speed once it has one, else by its plan."""
+    """The work left on the clip that trains: by its own speed once it has one, else by its plan."""
     if not run.n_steps:
         return whole
     left_s = None if whole.seconds is None else whole.seconds * (1.0 - run.step / run.n_steps)

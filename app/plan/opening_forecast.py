@@ -1,4 +1,4 @@
-"""What training a capture takes, before there is a project: from what a user is about to answer."""
+"""Cost of training a capture, before there is a project: from the answers that a user is about to give."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from engine.training.config import TrainConfig
 from engine.training.plan.plan import Footage, StepTime, TrainingPlan, expected_anchors, make_plan
 
 _ANCHOR_BYTES, _FIELD_MB = 40.0, 0.25
-"""What a stored clip comes to, measured on finished projects: for each anchor that it adds, and for the rest of it."""
+"""Size of a stored clip, measured on finished projects: for each anchor that it adds, and for the rest of it."""
 
 
 def forecast_opening(capture: Capture, answers: OpeningAnswers, *, step_time: StepTime, place: Path) -> OpeningForecast:
-    """What training takes with these answers.
+    """Cost of training with these answers.
 
     Args:
         capture: At any scale.
-        answers: What the project is going to begin with.
+        answers: Those that the project is going to begin with.
         step_time: Times steps on this machine; may take seconds.
         place: Folder on the disk that the project is going to lie on.
     Raises:

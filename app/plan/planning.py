@@ -1,4 +1,4 @@
-"""Plans of a project's clips: what the settings, the capture and the clips trained before say together."""
+"""Plans of a project's clips, from the settings, the capture and the clips trained before."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLAN_SCHEMA = 3
 
 
 def clip_history(project: Project, n_clips: int) -> list[MeasuredClip]:
-    """What the finished clips of a project say about the next one."""
+    """Measurements of a project's finished clips, for planning the next one."""
     found = (_measured(project, clip_index) for clip_index in range(n_clips))
     return [known for known in found if known is not None]
 
@@ -116,13 +116,13 @@ def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
 def plan_status(
     project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool, discards: str
 ) -> PlanStatus:
-    """What the window shows of the next clip.
+    """The next clip's plan as the window shows it.
 
     Args:
-        project, capture, clip: What would be trained.
+        project, capture, clip: Those to be trained.
         plan: Its plan; None until it is made.
         can_edit: Whether settings may still change.
-        discards: What a change would throw away, in words.
+        discards: The progress that a change would discard, in words.
     """
     settings, config = project.settings, project.settings.config()
     capture = capture.without(project.document.exclusions)
@@ -218,7 +218,7 @@ def plan_document(
     trained: Sequence[int],
     damaged: Sequence[int] = (),
 ) -> dict[str, Any]:
-    """What `train --plan --json` prints.
+    """The output of `train --plan --json`.
 
     Args:
         project, capture: As planned.

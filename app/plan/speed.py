@@ -23,7 +23,7 @@ TIMEOUT_S = 60.0
 
 
 class TimedSteps(msgspec.Struct, frozen=True):
-    """What to time."""
+    """The steps to time."""
 
     sizes: StepSizes
     phase: str
@@ -49,7 +49,7 @@ def step_time(sizes: StepSizes, phase: str, is_wanted: Callable[[], bool] = lamb
     Args:
         is_wanted: Asked several times a second; the process is ended once it is not.
     Raises:
-        Unwanted: It is not wanted any more; nothing is known.
+        Unwanted: It is no longer wanted; nothing is known.
     """
     if not is_cache_warm():
         return None
@@ -71,7 +71,7 @@ def step_time(sizes: StepSizes, phase: str, is_wanted: Callable[[], bool] = lamb
 
 
 def known_step_time(sizes: StepSizes, phase: str) -> float | None:
-    """What `step_time` found earlier, without timing anything now: for when something else computes."""
+    """The earlier result of `step_time`, without timing anything now: for when something else computes."""
     return _known.get((sizes, phase))
 
 

@@ -1,4 +1,4 @@
-"""What an edit does, by its name: for scripts that would rather write a word than import a value."""
+"""Actions of edits, by name: for scripts that would rather write a word than import a value."""
 
 from __future__ import annotations
 

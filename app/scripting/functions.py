@@ -56,7 +56,7 @@ def undo(project: Source) -> str:
 
 
 def redo(project: Source) -> str:
-    """Do again what was taken back last; see ScriptedProject.redo."""
+    """Redo the last undone step; see ScriptedProject.redo."""
     with _opened(project) as opened:
         return opened.redo()
 
@@ -68,7 +68,7 @@ def render(project: Source, out: Path | str, **options: Any) -> ExportResult:
 
 
 def export(project: Source, out: Path | str, **options: Any) -> ExportResult:
-    """Write what other programs read; see ScriptedProject.export."""
+    """Write files for other programs; see ScriptedProject.export."""
     with _opened(project, read_only=True) as opened:
         return opened.export(out, **options)
 

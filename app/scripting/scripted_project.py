@@ -169,8 +169,8 @@ class ScriptedProject:
         """Replace the document, as one step that can be taken back; on the disk when it returns.
 
         Args:
-            document: What it is to be; made of `document` with dataclasses.replace or the functions of app.document.
-            name: What is done, as a word or two that can follow "Undo".
+            document: The new one; made of `document` with dataclasses.replace or the functions of app.document.
+            name: The change, as a word or two that can follow "Undo".
         Raises:
             ProjectError: The project is read-only, or such a change is not allowed.
             DiskError: The disk refused; nothing has changed.
@@ -192,15 +192,14 @@ class ScriptedProject:
         self.change(document, f"change {', '.join(name.replace('_', ' ') for name in entries)}")
 
     def undo(self) -> str:
-        """Take back the last step. Returns what that was; empty where there was none. Raises what `change` raises."""
+        """Undo the last step. Returns its name; empty where there was none. Raises what `change` raises."""
         name = self.history.undo_name
         if name:
             self._happen(Undone())
         return name
 
     def redo(self) -> str:
-        """Do again what was taken back last. Returns what that was; empty where there was nothing. Raises what
-        `change` raises."""
+        """Redo the last undone step. Returns its name; empty where there was none. Raises what `change` raises."""
         name = self.history.redo_name
         if name:
             self._happen(Redone())
@@ -231,13 +230,13 @@ class ScriptedProject:
         """Put an edit on top of the stack.
 
         Args:
-            action: What it does: a value such as Delete() or Expose(0.5), or its name with the `values` of its entries,
+            action: The effect: a value such as Delete() or Expose(0.5), or its name with the `values` of its entries,
                 such as "expose", stops=0.5. "isolate" hides everything but the target.
-            target: What it acts on, such as a Box, a Sphere or what `select` gives; None for everything.
+            target: The part to act on, such as a Box, a Sphere or the result of `select`; None for everything.
             scope: In which frames.
             is_inverted: Whether it acts on everything but the target.
             name: For people; an empty one is put into words where the edit is shown.
-            on_note: Told, before it is made, what is unexpected about where it acts; a warning of Python by default.
+            on_note: Notified, before it is made, of surprises about where it acts; a warning of Python by default.
         Returns:
             The edit with its number.
         Raises:
@@ -297,7 +296,7 @@ class ScriptedProject:
         self._carry_out(RenameEdit(edit_id, name))
 
     def _carry_out(self, command: EditCommand) -> None:
-        """What the window does at the same command."""
+        """Carry out a command as the window does."""
         change = changed(self.document, command)
         self.change(change.document, change.name)
 
@@ -326,7 +325,7 @@ class ScriptedProject:
         return select(opened, self.edits, frame_index, volume=volume, where=where, is_inverted=is_inverted)
 
     def apply_permanently(self, on_progress: Callable[[int, int], None] | None = None) -> tuple[int, ...]:
-        """Take what is deleted out of the clips for good; what clips were becomes versions.
+        """Take deleted anchors out of the clips for good; earlier clips become versions.
 
         Args:
             on_progress: Told how many clips are done, of how many.
@@ -361,7 +360,7 @@ class ScriptedProject:
             method: "auto" or one of engine.mending.figures.METHODS.
             on_progress: Told how far it is.
         Returns:
-            What came of it, with figures before and after; `record.has_helped` says whether anything was kept.
+            The outcome, with figures before and after; `record.has_helped` says whether anything was kept.
         Raises:
             ProjectError: It cannot be mended; all clips are as they were.
         """
@@ -387,9 +386,9 @@ class ScriptedProject:
         """Train a clip in a process of its own, and wait for it. One that was stopped resumes where it was.
 
         Args:
-            on_progress: Told some twenty times a second how far it is; what it raises stops the training, and what was
+            on_progress: Notified some twenty times a second of progress; its exception stops the training, and what was
                 learned is kept.
-            is_again: Train it also when it is finished or damaged; what it was becomes a version.
+            is_again: Train it also when it is finished or damaged; its earlier result becomes a version.
             settings: Training settings that it alone is to have.
         Returns:
             How it ended: "trained", or "skipped" where it was finished already.
@@ -413,7 +412,7 @@ class ScriptedProject:
         )
 
     def restore_version(self, clip_index: int, number: int) -> None:
-        """Bring back what a clip was before it was trained again; what it is now becomes a version.
+        """Bring back a clip's result from before it was trained again; its present result becomes a version.
 
         Args:
             number: Of the version, as `clipgstream versions` lists them.
@@ -437,7 +436,7 @@ class ScriptedProject:
         Args:
             out: A file, or a new folder for pictures.
             format: "mp4", "webm", "png" or "exr"; None goes by the name.
-            on_progress: Told how far it is; what it raises ends the work, and then nothing is left.
+            on_progress: Notified of progress; its exceptions end the work, and then nothing is left.
             options: Entries of app.export.jobs.video.VideoJob, such as camera="cam00" or turntable=Turntable(2).
         Raises:
             EngineError: It cannot be rendered; nothing is left.
@@ -457,12 +456,12 @@ class ScriptedProject:
         on_progress: TellExport | None = None,
         **options: Any,
     ) -> ExportResult:
-        """Write what other programs read.
+        """Write files for other programs.
 
         Args:
             out: A new or empty folder; of a player and of figures a file.
             format: One of app.export.jobs.table.formats_of(), such as "spz", "player" or "metrics-csv".
-            on_progress: Told how far it is; what it raises ends the work, and then nothing is left.
+            on_progress: Notified of progress; its exceptions end the work, and then nothing is left.
             options: Entries of the format's job, such as frames=range(10).
         Raises:
             EngineError: It cannot be written; nothing is left.

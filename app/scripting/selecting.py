@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _CONDITION = re.compile(r"\s*([a-z]+)\s*(<=|>=|<|>|=)\s*([^\s<>=]+)\s*")
 _MEASURED = tuple(name for name, attribute in ATTRIBUTES.items() if attribute.column)
-"""What only the window knows."""
+"""Attributes that only the window knows."""
 
 
 def select(

@@ -1,4 +1,4 @@
-"""What the window shows of training, clips, jobs and overlays: plain values, remade when something changes."""
+"""State of training, clips, jobs and overlays for the window: plain values, remade when something changes."""
 
 from app.status.residuals import (
     CELL_COLUMNS,

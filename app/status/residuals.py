@@ -1,4 +1,4 @@
-"""What the window shows of measured pictures: figures and seams. Plain values."""
+"""State of measured pictures for the window: figures and seams. Plain values."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 CELL_COLUMNS = ("psnr", "flip", "E")
 """Figures of single pictures: PSNR in dB, mean FLIP, and mean excess flicker against the frame before in 1/255."""
 CELL_RANGES = {"psnr": (20.0, 40.0), "flip": (0.0, 0.3), "E": (0.0, 2.0)}
-"""What the colours of cells span, one range for all projects. PSNR: below 20 dB a picture is plainly wrong, above 40 dB
+"""Ranges of the cells' colours, the same for all projects. PSNR: below 20 dB a picture is plainly wrong, above 40 dB
 nobody sees a difference. FLIP: trained clips lie around 0.1, and 0.3 is bad everywhere. E: trained clips lie around 0.3
 levels of a display, mostly where something moves; two on average are plain flicker."""
 LOW_IS_BAD = frozenset({"psnr"})
 """Columns in which higher figures are better."""
 SEAM_RANGE = (0.0, 1.0)
-"""What the colours of seam scores span, 1/255, one range for all projects. Where everything is inherited scores are
+"""Range of the colours of seam scores, 1/255, one range for all projects. Where everything is inherited scores are
 0.01 to 0.1; with heads of their own clips are 0.4 to 0.8 apart, and independent ones 1.4 and more."""
 SEAM_FLAGGED = 0.3
 """Scores above it are pointed out."""
 SEAM_RATIO_RANGE = (1.0, 3.0)
-"""What the colours of seam ratios span: at 1 nothing shows; inheriting clips have 1.0 to 1.4, others 10 and more."""
+"""Range of the colours of seam ratios: at 1 nothing shows; inheriting clips have 1.0 to 1.4, others 10 and more."""
 SEAM_RATIO_FLAGGED = 2.0
 """Ratios above it are pointed out."""
 
@@ -51,13 +51,13 @@ class SeamStatus:
 
     @property
     def is_provisional(self) -> bool:
-        """Whether cameras are missing: with few of them a ratio is often twice what it comes to."""
+        """Whether cameras are missing: with few of them a ratio is often twice the final one."""
         return self.n_cameras < self.n_all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualStatus:
-    """What is measured of every picture of the project.
+    """Measurements of every picture of the project.
 
     Attributes:
         seams: One per boundary between clips, in order.
@@ -70,7 +70,7 @@ class ResidualStatus:
         is_held_back: Whether that continues slowly only, because a clip trains or the user looks around.
         rate: Pictures per second; 0 when unknown.
         eta_s: Seconds until all are measured; None while it is not known well.
-        message: What went wrong, in sentences; empty when nothing did.
+        message: The failure, in sentences; empty without one.
         revision: Grows with every change of the figures.
     """
 
@@ -88,7 +88,7 @@ class ResidualStatus:
     revision: int = 0
 
     def worst(self, column: str, n_worst: int) -> list[tuple[float, int, int]]:
-        """The worst figures of a column: (value, frame_index, camera_index), worst first; only what is measured.
+        """The worst figures of a column: (value, frame_index, camera_index), worst first; only measured ones.
 
         Raises:
             ValueError: There is no such column.

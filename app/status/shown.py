@@ -1,4 +1,4 @@
-"""What is drawn, and what ought to be on screen. Plain values."""
+"""The picture that is drawn, and the one that ought to be on screen. Plain values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OVERLAY_NAMES = (
 )
 COMPARE_MODES = ("off", "wipe", "side", "blink")
 CAPTURED = "captured"
-"""Of Overlays.compare_with: what the camera took."""
+"""Of Overlays.compare_with: the camera's picture."""
 _VERSION = "version "
 BLINK_HZ = (0.25, 3.0)
 """Slowest and fastest blinking. More than three flashes a second can cause seizures."""
@@ -37,7 +37,7 @@ def version_number(other: str) -> int | None:
 
 @dataclass(slots=True)
 class Overlays:
-    """What is drawn over or beside the scene.
+    """Drawings over the scene or next to it.
 
     Attributes:
         show_points: The point cloud where a clip is not trained.
@@ -45,12 +45,12 @@ class Overlays:
         show_coverage: The space that inherited anchors cover, and how far residual anchors lie from it.
         show_trails: The ways that Gaussians took over the last frames.
         show_paths: The chosen camera path and its keys.
-        compare: "off", "wipe", "side" or "blink": another picture over, beside or in turn with the rendered one.
+        compare: "off", "wipe", "side" or "blink": another picture over, next to or in turn with the rendered one.
         compare_with: The other picture: CAPTURED, the name of a mode (see view_modes), or that of an earlier version of
             the clip, see `version_name`.
         wipe_position: Share of the width that shows the other picture, 0..1.
         blink_hz: How often a second each of the two pictures is seen.
-        mode, content: What colours mean and which part of a clip is drawn, by name; see app.playback.modes.view_modes.
+        mode, content: Meaning of colours and the drawn part of a clip, by name; see app.playback.modes.view_modes.
         heat: Name of the residual heat map over the picture, see app.residuals.heat_map.HEAT_KINDS; empty for none.
             Where no camera is looked through, the residual of each anchor is shown in its place.
         heat_opacity: Of the heat map, 0..1.
@@ -81,14 +81,14 @@ class Overlays:
 
 @dataclass(frozen=True, slots=True)
 class WantedFrame:
-    """What ought to be on screen, whatever is there by now.
+    """The picture that ought to be on screen, whatever is there by now.
 
     Attributes:
         clip_index, frame_index: Under the playhead.
         revision: The state of the clip that is to be shown; empty where none can be: it is not trained.
         camera_index: The capture camera looked through; None for a free view.
         look: From where and through which lens; see OrbitView.look_key.
-        shown_as: What colours mean and which part of the clip is drawn, in words; empty for the scene as it is.
+        shown_as: Meaning of colours and the drawn part of the clip, in words; empty for the scene as it is.
         is_loaded: Whether the clip is in memory, so that only its frame has to be made.
         has_failed: Whether the frame or its picture could not be made, so that it is not on its way.
     """

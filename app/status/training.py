@@ -1,4 +1,4 @@
-"""What the window shows of training: the run at hand, clips, queue, plans and versions. Plain values."""
+"""State of training for the window: the run at hand, clips, queue, plans and versions. Plain values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class TrainingStatus:
         n_running: How many clips train.
         step, n_steps: Optimiser steps of that clip.
         progress: Share of the current stage while preparing, of all steps later. 0..1
-        stage: What is done at the moment, as shown to the user.
+        stage: The present stage, as shown to the user.
         stage_number, n_stages: Which stage of the preparation that is, from 1; 0 where they are not counted.
         message: One line with counts and reasons.
         steps_per_s: Smoothed rate; 0 when unknown.
@@ -60,7 +60,7 @@ class ClipStatus:
 
     Attributes:
         state: untrained, queued, preparing, training, paused (its training holds and waits), stopped (its training
-            has ended before the last step and goes on there), trained, failed, stale (its reference was trained
+            has ended before the last step and resumes there), trained, failed, stale (its reference was trained
             again, or the clip that it continues from), or damaged (finished, but its file cannot be read).
         progress: Share of its steps, 0..1.
         held_out_psnr, held_out_whole: dB, and what it is over, see ClipRecord; None when not measured.
@@ -87,13 +87,13 @@ class ClipStatus:
 
 @dataclass(frozen=True, slots=True)
 class SequenceForecast:
-    """What training several clips one after another takes, as far as it is known.
+    """Cost of training several clips one after another, as far as it is known.
 
     Attributes:
         n_clips: How many are not finished.
         n_steps: Steps that are left.
         seconds: Until the last of them is finished; None where nobody can know.
-        disk_mb: What they will take on disk, 10^6 bytes; None where nobody can know.
+        disk_mb: Their size on disk, 10^6 bytes; None where nobody can know.
     """
 
     n_clips: int
@@ -120,7 +120,7 @@ class QueuedClip:
 
 @dataclass(frozen=True, slots=True)
 class QueueStatus:
-    """Clips that wait, those that failed, and what all of it takes.
+    """Clips that wait, those that failed, and the cost of all.
 
     Attributes:
         waiting: In the order in which they are trained.
@@ -151,7 +151,7 @@ class QueueStatus:
 
 @dataclass(frozen=True, slots=True)
 class UsageStatus:
-    """What the program's processes use of the machine; None where the system does not say.
+    """Use of the machine by the program's processes; None where the system does not say.
 
     Attributes:
         window_mb, training_mb: Memory, 10^6 bytes.
@@ -168,7 +168,7 @@ class UsageStatus:
 
 @dataclass(frozen=True, slots=True)
 class VersionStatus:
-    """What a clip was before it was trained again.
+    """An earlier result of a clip, kept when it was trained again.
 
     Attributes:
         number: Names it for RestoreVersion and RemoveVersion.
@@ -192,13 +192,13 @@ class VersionStatus:
 
 @dataclass(frozen=True, slots=True)
 class DependencyStatus:
-    """What a clip depends on, and what depends on it.
+    """The clips that a clip depends on, and those that depend on it.
 
     Attributes:
         needs: Clips that it starts from.
         needed_by: Clips that start from it, whether they are trained or not.
         trained_on_it: Finished clips that were trained on it as it is now.
-        outdated_seconds: What training these again is expected to take; None where nobody can know.
+        outdated_seconds: Expected time of training these again; None where nobody can know.
     """
 
     needs: tuple[int, ...] = ()
@@ -213,9 +213,9 @@ class SettingStatus:
 
     Attributes:
         name: In TrainConfig.
-        value: What it is, or is derived to be.
+        value: Its value, set or derived.
         is_set: Whether the user has set it; else it is derived or the default.
-        help_text: What it does and what it may be.
+        help_text: Its effect and its valid values.
     """
 
     name: str
@@ -227,7 +227,7 @@ class SettingStatus:
 
 @dataclass(frozen=True, slots=True)
 class PlanStatus:
-    """What training the next clip would do and take, while nothing trains.
+    """Plan and cost of training the next clip, while nothing trains.
 
     Attributes:
         summary: Steps, time, memory and disk in one line; empty until they are known.
@@ -236,7 +236,7 @@ class PlanStatus:
         preset: The one that the settings begin with.
         settings: The main ones.
         can_edit: Whether they may still change: no clip is finished.
-        discards: What a change throws away, as "the progress of clip 0 (step 331 of 720)"; empty for nothing.
+        discards: The progress that a change discards, as "the progress of clip 0 (step 331 of 720)"; empty for nothing.
     """
 
     clip_index: int

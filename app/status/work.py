@@ -1,4 +1,4 @@
-"""What the window shows of the project, its regions, and jobs. Plain values."""
+"""State of the project, its regions, and jobs for the window. Plain values."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ProjectStatus:
 
 @dataclass(frozen=True, slots=True)
 class RegionsStatus:
-    """Where the user says what is static and what moves.
+    """Where the user marks static and moving parts.
 
     Attributes:
         regions: As they are kept in the project; later ones overrule earlier ones.
@@ -49,7 +49,7 @@ class RegionsStatus:
 
 
 LEAST_TOLD = 0.05
-"""Before this share of a job is done, the time left is not told: it would be a guess."""
+"""Before this share of a job is done, the time left is not shown: it would be a guess."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class JobStatus:
 
     Attributes:
         done: Share that is finished, 0..1; 0 when unknown.
-        message: What it does at the moment.
+        message: Its work at the moment.
         began_s: When it began, by `time.monotonic`; None where nobody noted it.
         can_cancel: Whether the user may give it up.
     """
@@ -83,7 +83,7 @@ class JobStatus:
 
 @dataclass(frozen=True, slots=True)
 class OpeningForecast:
-    """What training all clips of a capture takes that has no project yet.
+    """Cost of training all clips of a capture that has no project yet.
 
     Attributes:
         n_clips: How many there are.

@@ -49,7 +49,7 @@ def free_dropped(ctx: moderngl.Context) -> int:
 
 
 def renderer_name(ctx: moderngl.Context) -> str:
-    """What the driver calls the machine that draws, such as "llvmpipe (LLVM 15.0.6, 256 bits)"."""
+    """The driver's name for the renderer, such as "llvmpipe (LLVM 15.0.6, 256 bits)"."""
     return str(ctx.info["GL_RENDERER"])
 
 

@@ -28,7 +28,7 @@ def depth_order(means: np.ndarray, view_row: np.ndarray, near: float) -> np.ndar
         Row numbers. [M] uint32, M <= N
     """
     row = np.asarray(view_row, dtype=np.float64)
-    # From the near plane on: seen from very far away the depths themselves are too coarse to tell neighbours apart.
+    # From the near plane on: seen from very far away the depths themselves are too coarse to distinguish neighbours.
     depths = means @ row[:3].astype(np.float32) + np.float32(row[3] - max(near, 0.0))  # [N]
     visible = np.flatnonzero(depths > 0.0)
     # Positive floats sort like their bit patterns, so depth and row number pack into one integer that an in-place
@@ -45,7 +45,7 @@ class DepthOrder:
     """A finished order.
 
     Attributes:
-        key: What was asked for.
+        key: Key of the request.
         ids: Row numbers, farthest first. [M] uint32
     """
 

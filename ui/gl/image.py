@@ -95,7 +95,7 @@ class ImageTexture:
 
         Args:
             image: RGB, top row first. [H, W, 3] uint8
-            key: What the picture shows. The same key as last time uploads nothing; None always uploads.
+            key: Contents of the picture. The same key as last time uploads nothing; None always uploads.
         Returns:
             Whether anything was uploaded.
         Raises:

@@ -140,7 +140,7 @@ class LineRenderer:
         opacity: float = 1.0,
         is_depth_tested: bool = False,
     ) -> None:
-        """Blend the lines over what the target holds.
+        """Blend the lines over the contents of the target.
 
         Args:
             target: Where to; may differ in size from width x height.

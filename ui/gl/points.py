@@ -1,6 +1,6 @@
 """Points as anti-aliased marks: disc, ring or diamond, of a size in pixels or in scene units.
 
-Shape as well as hue tells kinds of points apart, for eyes that do not tell the hues apart.
+Shape as well as hue distinguishes kinds of points, for eyes that do not distinguish the hues.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class PointRenderer:
         opacity: float = 1.0,
         is_depth_tested: bool = False,
     ) -> None:
-        """Blend the points over what the target holds.
+        """Blend the points over the contents of the target.
 
         Args:
             target: Where to; may differ in size from width x height.

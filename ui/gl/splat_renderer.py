@@ -100,7 +100,7 @@ class SplatRenderer:
 
     @property
     def n_dropped(self) -> int:
-        """Rows of what is drawn that were left out: not finite, no rotation, or too faint to pass ALPHA_MIN."""
+        """Rows left out of the drawing: not finite, no rotation, or too faint to pass ALPHA_MIN."""
         return 0 if self._packed is None else self._packed.n_dropped
 
     @property
@@ -122,7 +122,7 @@ class SplatRenderer:
         Args:
             gaussians: Arrays, which must not change afterwards. The same key as last time uploads nothing; a key of
                 None always uploads.
-            at_once: Do not wait for the thread: what is drawn must not be seen any more.
+            at_once: Do not wait for the thread: the present picture must no longer be seen.
         Returns:
             Whether it was another one.
         Raises:
@@ -141,7 +141,7 @@ class SplatRenderer:
         return True
 
     def update(self) -> None:
-        """Take up what was packed and sorted on the thread. `draw` does that too."""
+        """Take up the rows packed and sorted on the thread. `draw` does that too."""
         failure = self._sorter.take_error()
         if failure is not None:
             raise failure[1]
@@ -157,7 +157,7 @@ class SplatRenderer:
     def draw(
         self, target: Target, world_to_camera: np.ndarray, K: np.ndarray, width: int, height: int, near: float = NEAR
     ) -> None:
-        """Blend the Gaussians over what the target holds. They neither test nor write depth.
+        """Blend the Gaussians over the contents of the target. They neither test nor write depth.
 
         Args:
             target: Where to. Its size may differ from width x height: the picture then fills it, with the low-pass of

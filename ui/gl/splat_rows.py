@@ -1,4 +1,4 @@
-"""Gaussians as rows of textures: what is the same in all frames of a clip apart from what changes. Knows no GL."""
+"""Gaussians as rows of textures: the constant ones of a clip separate from those that change. Knows no GL."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FIELDS = (("means", (3,)), ("quats", (4,)), ("scales", (3,)), ("opacities", ())
 
 
 class SplatArrays(Protocol):
-    """What can be drawn: the fields of engine.raster.Gaussians as numpy arrays, and a name for the contents.
+    """Drawable Gaussians: the fields of engine.raster.Gaussians as numpy arrays, and a name for the contents.
 
     Attributes:
         means: Centres, world space, scene units. [N, 3]
@@ -70,7 +70,7 @@ class PackedSplats:
     """One set of Gaussians, ready for the graphics card.
 
     Attributes:
-        arrays: What it was made of.
+        arrays: Its source.
         still, moving: Its rows. Those that move begin in a row of the texture of their own.
         still_key: See SplatArrays; None where no rows stand still.
         means: Centres by row of the textures; not a number where a row is empty. [rows, 3] float32

@@ -58,7 +58,7 @@ class SplatTextures:
         self._still_key = self._still_colors = None
 
     def _hold(self, n_rows: int) -> None:
-        """Make room; what was there is gone if it was too small."""
+        """Make room; earlier contents are gone if it was too small."""
         if self._geometry is not None and self._geometry.height >= n_rows:
             return
         self.release()
@@ -80,7 +80,7 @@ class SplatTextures:
 
 
 def _write(texture: moderngl.Texture, values: np.ndarray, first_row: int) -> None:
-    """Whole rows of the texture at once, then what is left of the last one."""
+    """Whole rows of the texture at once, then the rest of the last one."""
     n_full, n_left = divmod(len(values), SPLATS_PER_ROW)
     texels = texture.width // SPLATS_PER_ROW
     if n_full:

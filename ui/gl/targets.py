@@ -50,7 +50,7 @@ class Target:
 
     @property
     def is_direct(self) -> bool:
-        """Is what is drawn shown as it is?"""
+        """Is the drawing shown as it is?"""
         return self._precision == "f1"
 
     @property
@@ -127,7 +127,7 @@ class Target:
         self._painter.draw(self, image, rect)
 
     def resolve(self, background: tuple[float, float, float] | None = BLACK) -> moderngl.Texture:
-        """Put what was drawn over a background and round it to 8 bits; a direct target has that behind it already.
+        """Put the drawing over a background and round it to 8 bits; a direct target has that behind it already.
 
         Args:
             background: Display-encoded RGB in 0..1. None keeps the picture transparent, with colours not multiplied by

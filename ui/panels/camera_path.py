@@ -36,10 +36,10 @@ from ui.style.theme import Icon
 
 MOST_PATH_ROWS, LEAST_KEY_ROWS = 5, 4
 FOV_DEG = (2.0, 150.0)
-"""What the slider of the lens offers."""
+"""Range of the slider for the lens."""
 LABEL_WIDTH, BUTTON_WIDTH = 54.0, 36.0
 ROWS_BELOW = 4.5
-"""What stands below the list of keys, in rows of buttons."""
+"""Room for widgets below the list of keys, in rows of buttons."""
 
 
 def draw_paths(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
@@ -93,7 +93,7 @@ def _draw_making(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _flowing_button(label: str, *, is_first: bool = False) -> bool:
-    """A button beside the one before, or in the next line where there is no room for it."""
+    """A button next to the one before, or in the next line where there is no room for it."""
     style = imgui.get_style()
     right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
     width = imgui.calc_text_size(label, True).x + 2 * style.frame_padding.x
@@ -243,6 +243,6 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _follow_gesture(ui: UiState) -> None:
-    """What is dragged from one press on is taken back at once."""
+    """Make the whole drag after one press a single step to undo."""
     if imgui.is_item_activated():
         ui.paths.begin_gesture()

@@ -1,4 +1,4 @@
-"""The capture panel: what was opened, and its cameras as a list; a click looks through one."""
+"""The capture panel: the open capture, and its cameras as a list; a click looks through one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The exports panel: what is being written, what waits and what has ended, each with what can be done about it."""
+"""The exports panel: those being written, waiting and ended, each with the commands for it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def bytes_text(n_bytes: float) -> str:
 
 
 def files_text(n_files: int, n_bytes: float) -> str:
-    """Files and what they hold."""
+    """Files and their contents."""
     files = "1 file" if n_files == 1 else f"{format_count(n_files)} files"
     return f"{files}, {bytes_text(n_bytes)}"
 

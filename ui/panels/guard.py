@@ -21,11 +21,11 @@ GOES_ON = "The rest of the window still works. This is a bug in the program: cop
 
 
 class Guard:
-    """Which parts of the window fail at present, and what the user was told about each.
+    """Which parts of the window fail at present, and the notice about each.
 
     Args:
         notices: Of the session.
-        on_failure: Called when something new was told.
+        on_failure: Called when a new failure was reported.
     """
 
     def __init__(self, notices: Callable[[], Notices], on_failure: Callable[[], None]) -> None:
@@ -39,7 +39,7 @@ class Guard:
         Args:
             part: Its name in a sentence, such as "the panel Timeline".
         Returns:
-            Whether it could be drawn. If not, the user has been told.
+            Whether it could be drawn. If not, the user has been notified.
         """
         stack = imgui.internal.ErrorRecoveryState()
         imgui.internal.error_recovery_store_state(stack)
@@ -48,7 +48,7 @@ class Guard:
         try:
             draw_part()
         except Exception as error:  # noqa: BLE001 - the edge of the frame loop, which continues
-            traceback.clear_frames(error.__traceback__)  # what they hold may end itself, while that is still possible
+            traceback.clear_frames(error.__traceback__)  # objects held there may end while that is still possible
             _recover(stack)
             while len(draw._clip_rect_stack) > n_clips:
                 draw.pop_clip_rect()
@@ -60,7 +60,7 @@ class Guard:
 
     @contextmanager
     def telling(self, part: str, title: str) -> Iterator[None]:
-        """For what is done between two frames: a failure ends here and is told."""
+        """For what is done between two frames: a failure ends here and is reported."""
         try:
             yield
         except Exception as error:  # noqa: BLE001 - the edge of the loop between frames
@@ -73,8 +73,8 @@ class Guard:
         return part in self._failing
 
     def _tell(self, part: str, error: Exception, title: str) -> None:
-        """Tell the user, and the log, about a failure: once until the part works again, and never while the user has
-        not dismissed what was told before."""
+        """Notify the user, and the log, of a failure: once until the part works again, and never before the user has
+        dismissed the earlier notice."""
         is_new = part not in self._failing and self._told.get(part) not in list(self._notices())
         self._failing.add(part)
         if is_new:

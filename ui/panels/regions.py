@@ -1,4 +1,4 @@
-"""The regions panel: the sphere that is being chosen, and the list of what is marked as static or as moving."""
+"""The regions panel: the sphere that is being chosen, and the list of marks, static or moving."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def draw_regions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _draw_choice(ui: UiState) -> None:
-    """What the sphere means, how large it is, and the two ways to be done."""
+    """Meaning and size of the sphere, and the two ways to finish."""
     tool = ui.regions
     half = (imgui.get_content_region_avail().x - 8) / 2
     for treat, words in REGION_WORDS.items():
@@ -167,7 +167,7 @@ def draw_region_mark(draw: imgui.ImDrawList, middle: ImVec2, treat: str, palette
 
 
 def draw_chosen_sphere(ui: UiState, draw: imgui.ImDrawList, area: Rect, counts: dict[str, int]) -> None:
-    """Over the picture, from the upper left corner of an area: what is being chosen, what it holds, and the keys."""
+    """Over the picture, from the upper left corner of an area: the sphere being chosen, its contents, and the keys."""
     tool = ui.regions
     text = f"      Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(counts)}"
     chip(draw, area.x0, area.y0, text)

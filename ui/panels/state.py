@@ -1,4 +1,4 @@
-"""What the panels share for the length of a window: fonts, widget rectangles, open popups. Not the program's state.
+"""Shared by the panels for the length of a window: fonts, widget rectangles, open popups. Not the program's state.
 
 Everything the program knows lives in the Session; nothing here survives the window.
 """
@@ -73,7 +73,7 @@ class UiState:
         scale: How large everything is drawn.
         preferences: Of the user; changed in place.
         keys: Which keys run which action.
-        wishes: What is asked of the shell.
+        wishes: Requests to the shell.
         is_picture_only: Are the panels around the picture hidden?
         keyed_panel: Title of the panel that arrow keys, Enter and Space belong to, or None.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
@@ -81,11 +81,11 @@ class UiState:
         selecting: The tool that selects, and its options.
         editing: Which edit is chosen, and what is being done to it.
         masks: The brush that paints what training does not see.
-        paths: What is being done to the keys of the camera path.
-        navigation: What mouse and keys do over a picture.
-        curves: What the plots of the training panel show.
+        paths: Editing of the camera path's keys.
+        navigation: Functions of mouse and keys over a picture.
+        curves: Contents of the training panel's plots.
         queue_chosen: The waiting clip that keys move; None without one.
-        timeline: What of time is shown.
+        timeline: The part of time that is shown.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?

@@ -90,7 +90,7 @@ FIRST_FRAMES = 6
 FRAMES_TO_DOCK = 2
 """Until all panels of a kept layout have their tabs; the one that got its tab last is in front."""
 TAB_PADDING_SHARE = 0.6
-"""How wide tabs are beside their words, as a share of other things: side by side, all of a side panel are seen."""
+"""Room of tabs around their words, as a share of that of other things: side by side, all of a side panel are seen."""
 TRAINING_REFRESH_S = 0.2
 """Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
 ATTENDED_S = 0.5
@@ -106,11 +106,11 @@ class Frame:
         window: pyglet window whose GL context is current.
         ctx: moderngl context adopted from it.
         session: The program's state; see app.session.session.Session.
-        fixed_delta_s: Seconds per frame as told to ImGui; tests fix it.
+        fixed_delta_s: Seconds per frame as reported to ImGui; tests fix it.
         on_input: Called after each input that wants a frame, so that it need not wait for the next tick.
-        memory: What the window looked like before; None starts afresh and keeps nothing.
+        memory: The window's earlier appearance; None starts afresh and keeps nothing.
         scale: How large everything is drawn.
-        preferences: What the user prefers; None takes what is usual and keeps nothing.
+        preferences: The user's preferences; None takes the defaults and keeps nothing.
     """
 
     def __init__(
@@ -198,7 +198,7 @@ class Frame:
         self._redraw.request(frames)
 
     def forget_shown(self) -> None:
-        """What was drawn is on the screen no more, as after a resize; draw it again even if it is the same."""
+        """The last drawing is no longer on the screen, as after a resize; draw it again even if it is the same."""
         self._shown = None
         self.request_redraw()
 
@@ -223,13 +223,13 @@ class Frame:
         return self._redraw.is_due
 
     def _drain(self) -> bool:
-        """Let the session take in what was finished; a fault there becomes a notice and never ends the loop."""
+        """Let the session take in finished work; a fault there becomes a notice and never ends the loop."""
         with self.guard.telling("the session", "A finished result could not be used"):
             return self.session.poll()
         return True
 
     def _move_on(self, dt_s: float) -> bool:
-        """Follow what was chosen, move time on, and ask for pictures; a fault there is told as well."""
+        """Follow the user's choices, move time on, and ask for pictures; a fault there is reported as well."""
         session = self.session
         with self.guard.telling("the loop", "An error occurred between two frames"):
             if self._theme.follow(self.ui.preferences.theme):

@@ -158,11 +158,11 @@ class ImGuiBackend:
     Args:
         window: A pyglet window whose GL context is current.
         on_input: Called after each event that was forwarded, so that the owner can plan a redraw.
-        fixed_delta_s: Seconds per frame as told to ImGui; None measures real time. Tests fix it.
+        fixed_delta_s: Seconds per frame as reported to ImGui; None measures real time. Tests fix it.
         scale: How large everything is drawn.
 
     Attributes:
-        pixels_per_unit: Of the newest frame. Everything that ImGui is told and tells is in units (ui.style.ui_scale).
+        pixels_per_unit: Of the newest frame. Everything that ImGui takes and gives is in units (ui.style.ui_scale).
         is_panel_keyed: Do arrow keys, Enter and Space move inside of a panel? Set before a frame.
         is_popup_open: Was a menu or another popup open when the newest frame began, or just before?
     """
@@ -266,7 +266,7 @@ class ImGuiBackend:
         return is_in_bar or len(self.context.open_popup_stack) > 0
 
     def end_frame(self) -> int:
-        """Finish the frame; returns the fingerprint of what it draws (ui.shell.redraw)."""
+        """Finish the frame; returns the fingerprint of its drawing (ui.shell.redraw)."""
         imgui.render()
         self._after_frame()
         return fingerprint(imgui.get_draw_data())
@@ -277,7 +277,7 @@ class ImGuiBackend:
 
     def _after_frame(self) -> None:
         is_closing = self._menu_frames > 0 and not self._is_menu_open()
-        is_late = len(self.context.input_events_queue) > 0  # ImGui has not taken in all that it was told
+        is_late = len(self.context.input_events_queue) > 0  # ImGui has not taken in all of its input
         # Else the next frame may give a field the keyboard, or the shortcuts their keys back.
         self._queue.after_frame(is_held=is_late or is_closing or self.context.nav_move_submitted)
         self._show_cursor()
@@ -292,7 +292,7 @@ class ImGuiBackend:
     # ---- events ----------------------------------------------------------------------------------------------
 
     def _pass_on(self, event: Callable[[], object]) -> None:
-        """Tell ImGui about an event, after those before it. True of an event asks for a frame before the next one."""
+        """Report an event to ImGui, after those before it. True of an event asks for a frame before the next one."""
         self._newest_press = None
         self._queue.add(lambda: event() is True)
         self._on_input()
@@ -375,7 +375,7 @@ class ImGuiBackend:
             self._add_key(imgui_key, False)
 
     def _released(self, symbol: int) -> list[imgui.Key]:
-        """Keys that go up. What a key is called depends on Shift, which may have been released since it was pressed:
+        """Keys that go up. The name of a key depends on Shift, which may have been released since it was pressed:
         under a name that was not pressed, the key of the same place goes up, else all of them."""
         imgui_key = _KEY_MAP.get(symbol)
         if imgui_key is not None and int(imgui_key) in _MODIFIER_OF:

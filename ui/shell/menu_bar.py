@@ -56,7 +56,7 @@ def _begin_menu(title: str, ui: UiState) -> bool:
 
 
 def _draw_items(menu: Menu, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """The actions of one menu, and what is added behind some of them."""
+    """The actions of one menu, and the entries added after some of them."""
     for item in menu.items:
         match item:
             case None:
@@ -91,7 +91,7 @@ def _draw_action(action: Action, session: SessionView, dispatch: Dispatch, ui: U
 
 
 def _train_label(session: SessionView) -> str:
-    """What the key for training does at the moment."""
+    """Label of the key for training at the moment."""
     if session.training.state in ("starting", "preparing", "running"):
         return f"{Icon.PAUSE}  Pause"
     return f"{Icon.PLAY}  Resume" if session.training.state == "paused" else next_label(session)

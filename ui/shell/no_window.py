@@ -1,4 +1,4 @@
-"""What is said where no window can be opened: OpenGL is too old or missing, or the display does not answer. In plain
+"""The message where no window can be opened: OpenGL is too old or missing, or the display does not answer. In plain
 words, without a traceback. Imports no window library: it may be that one which is broken.
 """
 
@@ -23,7 +23,7 @@ def reason(error: BaseException) -> str:
     """Why there is no window, as a sentence; empty for an error that is a bug in the program.
 
     Args:
-        error: What making the window has raised.
+        error: The error raised by making the window.
     """
     names = {kind.__name__ for kind in type(error).__mro__}
     modules = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}

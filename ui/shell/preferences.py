@@ -1,4 +1,4 @@
-"""The preferences: one dialog with pages. What a page changes is seen at once, and kept in the user's configuration."""
+"""The preferences: one dialog with pages. Changes on a page are seen at once, and kept in the user's configuration."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class PreferencesDialog:
 
 
 def label(words: str) -> None:
-    """What the next choice is about, in a column of its own."""
+    """Label of the next choice, in a column of its own."""
     imgui.align_text_to_frame_padding()
     imgui.text(words)
     imgui.same_line(LABEL_WIDTH)
@@ -175,7 +175,7 @@ def projects_words(chosen: str) -> str:
 
 
 def draw_navigation(ui: UiState) -> None:
-    """What the mouse does over a picture, and how the view gets to another place."""
+    """Mouse functions over a picture, and how the view gets to another place."""
     navigation = ui.navigation
     label("Mouse and keys")
     if imgui.begin_combo("##preset", navigation.preset.label):

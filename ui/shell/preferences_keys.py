@@ -21,7 +21,7 @@ BUTTONS_WIDTH = 68.0
 
 
 class KeysPage:
-    """Owns what is searched for, and the key that is being asked for."""
+    """Owns the text searched for, and the key that is being asked for."""
 
     def __init__(self) -> None:
         self._typed = ""

@@ -1,4 +1,4 @@
-"""The line at the bottom of the window: what the program does at the moment, and how it draws."""
+"""The line at the bottom of the window: the program's work at the moment, and how it draws."""
 
 from __future__ import annotations
 

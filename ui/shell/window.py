@@ -1,6 +1,6 @@
 """The pyglet window: a GL 3.3 core context, the loop, and the events that are not ImGui's (drop, close, resize).
 
-Owns the window and its context. What is drawn is ui.shell.frame's business.
+Owns the window and its context. Drawing is ui.shell.frame's business.
 """
 
 from __future__ import annotations
@@ -92,9 +92,9 @@ class StudioWindow:
     Args:
         session: See app.session.session.Session; closed by `close`.
         width, height: Pixels of the screen; None takes the size it had before, else the default one.
-        fixed_delta_s: Seconds per frame as told to ImGui; tests fix it, None measures.
-        memory: What the window looked like before; None starts afresh and keeps nothing.
-        preferences: What the user prefers; None takes what is usual and keeps nothing.
+        fixed_delta_s: Seconds per frame as reported to ImGui; tests fix it, None measures.
+        memory: The window's earlier appearance; None starts afresh and keeps nothing.
+        preferences: The user's preferences; None takes the defaults and keeps nothing.
     """
 
     def __init__(

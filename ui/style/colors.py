@@ -29,7 +29,7 @@ INHERITED = SKY
 RESIDUAL = ORANGE
 """Residual anchors; drawn as diamonds."""
 ROLE_COLORS: dict[str, Color] = {role: (*hue, 1.0) for role, hue in hues.ROLE_HUES.items()}
-"""Anchors by what they are; those that one clip alone has are drawn as diamonds."""
+"""Anchors by role; those that one clip alone has are drawn as diamonds."""
 REGION_COLORS = {"static": SKY, "dynamic": VERMILLION}
 """Regions that the user marks, like the anchors they make; drawn with whole lines and with dashes."""
 HELD_OUT = PURPLE

@@ -1,4 +1,4 @@
-"""Palette: every colour of the window, dark or light, as one value; and how far text stands out from what is behind it.
+"""Palette: every colour of the window, dark or light, as one value; and how far text stands out from its background.
 
 Plain numbers; imports no library. Pictures stay on the same dark grey in both, so what lies over a picture is written
 in the colours of `DARK`, whatever the panels are drawn in.
@@ -26,7 +26,7 @@ class ThemeColors:
         is_light: Whether text is darker than what is behind it.
         backdrop, panel, popup, raised, raised_hover, raised_active: Surfaces; the first ones lie deepest.
         outline: Borders and small ticks.
-        text, text_dim: Words, and what stands beside them.
+        text, text_dim: Words, and less important ones next to them.
         text_on_accent: Words on a surface of the colour `sky`.
         sky, orange, green, yellow, vermillion, purple: Hues that carry meaning, as light or dark as words in them have
             to be on all surfaces. sky_light and sky_dark are for a button under the pointer and when it is pressed.

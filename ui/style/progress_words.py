@@ -11,7 +11,7 @@ COUNTED_IN_STEPS = ("training", "paused", "stopped")
 
 
 def job_words(job: JobStatus | None, now_s: float) -> str:
-    """What a job does, how far it is, since when, and how long it will take, as far as that is known:
+    """A job's work, how far it is, since when, and how long it will take, as far as these are known:
     "Key points, 40 %, 0:32, about 0:48 left".
 
     Args:

@@ -58,7 +58,7 @@ class SystemTheme:
 
 
 def says_light(platform: str, answer: str, *, is_answered: bool) -> bool:
-    """What the answer of a desktop means. platform: "linux", "darwin" or "win32"."""
+    """Whether the answer of a desktop means a light theme. platform: "linux", "darwin" or "win32"."""
     if platform == "darwin":  # where the desktop is light there is no such entry
         return "dark" not in answer.lower()
     if not is_answered:

@@ -27,7 +27,7 @@ def u32(color: Color) -> int:
 
 
 ON_PICTURE = DARK
-"""What is written or drawn over a picture takes its colours from here: pictures lie on dark grey in every theme."""
+"""Words and drawings over a picture take their colours from here: pictures lie on dark grey in every theme."""
 
 # The colours in use. `use` gives them others, so they are looked up where something is drawn, as theme.SKY, and are
 # never kept: not in a module, not as the default of an argument.
@@ -165,7 +165,7 @@ def apply_style() -> None:
     style.window_menu_button_position = imgui.Dir.none
     col = imgui.Col_
     is_light = contrast(TEXT, (0.0, 0.0, 0.0, 1.0)) < contrast(TEXT, (1.0, 1.0, 1.0, 1.0))
-    (imgui.style_colors_light if is_light else imgui.style_colors_dark)()  # what is not in the table
+    (imgui.style_colors_light if is_light else imgui.style_colors_dark)()  # for colours not in the table
     (implot.style_colors_light if is_light else implot.style_colors_dark)()
     table: dict[int, Color] = {
         col.text: TEXT,

@@ -54,7 +54,7 @@ class UiScale:
 
     Attributes:
         chosen: By the user; None follows the screen.
-        of_screen: What the platform says, 1 on an ordinary screen.
+        of_screen: The platform's scale, 1 on an ordinary screen.
     """
 
     def __init__(self, chosen: float | None = None, *, of_screen: float = 1.0) -> None:

@@ -1,1 +1,1 @@
-"""What the viewport draws and what lies under the pointer."""
+"""The viewport's drawing, and the things under the pointer."""

@@ -21,7 +21,7 @@ class HeatImage:
 
     @property
     def texture(self) -> moderngl.Texture:
-        """What `set` was given last."""
+        """Texture of the image last given to `set`."""
         return self._image.texture
 
     def set(self, values: np.ndarray, map_name: str, low: float, high: float, *, key: Hashable) -> None:

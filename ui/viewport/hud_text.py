@@ -1,4 +1,4 @@
-"""What the viewport says of its picture: what it is of, what is on its way, and what is missing from it. Plain text.
+"""Words of the viewport about its picture: its contents, the picture on its way, and missing parts. Plain text.
 
 The label is always that of the picture on screen, never that of the playhead; where they differ it says so.
 """
@@ -36,7 +36,7 @@ PARTS = "   "
 
 @dataclass(frozen=True)
 class ShownPicture:
-    """What the picture on screen is of.
+    """Contents of the picture on screen.
 
     Attributes:
         kind: One of the words above.
@@ -64,12 +64,12 @@ class ShownPicture:
 
 @dataclass(frozen=True)
 class HudText:
-    """What stands over the picture, one plate each; empty ones are left out.
+    """Words over the picture, one plate each; empty ones are left out.
 
     Attributes:
-        label: What is on screen.
-        pending: What is on its way.
-        failure: What could not be made.
+        label: The picture on screen.
+        pending: The picture on its way.
+        failure: The picture that could not be made.
         note: Why it is not the trained result, or how far the training is.
         rate: Pictures per second while playing.
     """
@@ -115,7 +115,7 @@ def hud_text(
 
 
 def loading_text(n_ready: int, n_frames: int) -> str:
-    """What playing waits for."""
+    """Words while playback waits for frames."""
     return f"loading {n_ready} of {n_frames} frames"
 
 
@@ -132,7 +132,7 @@ def playing_text(rate: ShownRate) -> str:
 
 
 def captured_words(has_scene_colors: bool) -> str:
-    """What a captured picture beside the render is called. Both are in the same colours where it says so."""
+    """Name of a captured picture next to the render. It states when both are in the same colours."""
     return "Captured, in the scene's colours" if has_scene_colors else "Captured"
 
 

@@ -1,4 +1,4 @@
-"""What the user does to the keys of a camera path by pointer and keys. State of the window; no ImGui, no GL."""
+"""Editing of a camera path's keys by pointer and keyboard. State of the window; no ImGui, no GL."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class PictureRate:
         """A picture of this frame is on screen now, whether it is another one or not.
 
         Args:
-            course: What is played, in which direction and how fast.
+            course: The frames played, their direction and speed.
             now_s: Seconds of a clock that never goes back.
         """
         self._wanted_per_s = course.frames_per_s
@@ -73,7 +73,7 @@ class PictureRate:
             return ShownRate(None, is_every_frame=is_every_frame, wanted_per_s=self._wanted_per_s)
         if not recent:
             return ShownRate(0.0, is_every_frame=is_every_frame, wanted_per_s=self._wanted_per_s)
-        # From change to change, so that where the window happens to begin does not matter; what is late counts.
+        # From change to change, so that where the window happens to begin does not matter; late pictures count.
         seconds = recent[-1][0] - self._before_s
         late_s = now_s - recent[-1][0] - seconds / len(recent)
         per_s = len(recent) / max(seconds + max(late_s, 0.0), 1e-3)

@@ -28,7 +28,7 @@ SHIFT_SHARE = 0.25
 
 @dataclass(eq=False)
 class RegionTool:
-    """What the user is marking.
+    """The region that the user is marking.
 
     Attributes:
         is_active: Whether a sphere is being chosen.
@@ -50,7 +50,7 @@ class RegionTool:
     _rig: CameraRig | None = None
 
     def follow(self, rig: CameraRig | None, n_regions: int, *, can_mark: bool) -> None:
-        """Drop what belongs to another capture, to a region that is gone, or what cannot be marked any more."""
+        """Drop everything of another capture or of a removed region, and anything that can no longer be marked."""
         if rig is not self._rig:
             self._rig, self.radius = rig, 0.0
             self.leave()
@@ -90,7 +90,7 @@ class RegionTool:
             self.set_radius(FIRST_RADIUS_SHARE * float(np.linalg.norm(self.center - eye)))
 
     def shift(self, world_to_camera: np.ndarray, right: float, down: float, forward: float) -> None:
-        """Move the sphere along the axes of a view, in steps; the pointer does not lead it any more."""
+        """Move the sphere along the axes of a view, in steps; the pointer no longer leads it."""
         if self.is_active and self.center is not None:
             axes = np.asarray(world_to_camera, dtype=np.float64)[:3, :3]  # its rows are the view's axes
             self.center = self.center + SHIFT_SHARE * self.radius * (np.array([right, down, forward]) @ axes)

@@ -1,4 +1,4 @@
-"""What the viewport shows, drawn off screen into one texture: splats, or the CPU rasterizer's picture, or the cloud,
+"""The viewport's picture, drawn off screen into one texture: splats, or the CPU rasterizer's picture, or the cloud,
 with camera frusta, anchors, regions and the camera path on top.
 
 On a graphics card the Gaussians are drawn as splats. On software GL the session's own rasterizer is several times
@@ -78,7 +78,7 @@ class SceneView:
 
     @property
     def camera(self) -> tuple[np.ndarray, np.ndarray, int, int, float]:
-        """What marks and lines are drawn with: world_to_camera, K, width, height, near."""
+        """The camera of marks and lines: world_to_camera, K, width, height, near."""
         return self.world_to_camera, self.K, self.width, self.height, max(NEAR, self.near)
 
     @property
@@ -108,7 +108,7 @@ class CapturedPicture:
     Attributes:
         frame_index: The frame it was taken at, which need not be that of the playhead yet.
         has_scene_colors: Whether it was brought into the scene's colours, those of the render.
-        shown_as: What its colours mean; None of a captured picture.
+        shown_as: Meaning of its colours; None of a captured picture.
     """
 
     texture: moderngl.Texture
@@ -200,7 +200,7 @@ class ViewportScene:
     # ---- the picture -----------------------------------------------------------------------------------------
 
     def compose(self, session: SessionView, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
-        """Draw what belongs to the session's frame from this view, unless it is drawn already."""
+        """Draw the picture of the session's frame from this view, unless it is drawn already."""
         self._target.resize(view.width, view.height)
         is_cloud_chosen = bool(session.overlays.show_cloud)
         points_key = self._take_points(session) if is_cloud_chosen else None
@@ -264,8 +264,8 @@ class ViewportScene:
         return are_empty and self.marks.is_empty(session) and self.path.is_empty(session)
 
     def captured(self, session: SessionView, width_px: int) -> CapturedPicture | None:
-        """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
-        until anything was."""
+        """The picture that the camera looked through took at the playhead's frame, or at another one until that was
+        decoded; None until anything was."""
         camera_index = session.view.look_through
         if camera_index is None:
             self._asked_capture = None
@@ -283,7 +283,7 @@ class ViewportScene:
         )
 
     def other(self, session: SessionView, view: SceneView) -> CapturedPicture | None:
-        """What the rendered picture is compared with: see `captured`, or the same frame in another mode."""
+        """The picture that the rendered one is compared with: see `captured`, or the same frame in another mode."""
         self._asked_other = None
         if session.overlays.compare_with == CAPTURED_PICTURE:
             return self.captured(session, view.width)
@@ -300,7 +300,7 @@ class ViewportScene:
         return CapturedPicture(self._captured.texture, source.frame_index, picture.is_stale, shown_as=source.shown_as)
 
     def forget_other(self) -> None:
-        """Nothing is compared any more: ask for no other picture."""
+        """Stop comparing: ask for no other picture."""
         self._asked_other = None
 
     def _without_render(
@@ -400,8 +400,8 @@ class ViewportScene:
         return None if np.isnan(value) else value
 
     def anchor_text(self, session: SessionView, view: SceneView, x: float, y: float) -> str:
-        """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
-        out from the next frame on."""
+        """Role of the anchor under a pixel of the view, and its reason; empty where none is shown or that is unknown.
+        The anchor stands out from the next frame on."""
         found = self.marks.anchor_under(session, view, x, y, max(self._near, view.near))
         text = "" if found is None else found[0].text(found[1], session.regions.regions)
         self.marks.pointed_anchor = found[0].positions[found[1]] if found is not None and text else None

@@ -71,7 +71,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         seen = progress
         show()
 
-    outcome = run_calibration(request, report=report, alive=show)  # the time moves while nothing is told
+    outcome = run_calibration(request, report=report, alive=show)  # the time moves while nothing is reported
     line.finish()
     print(printable("\n".join(outcome.lines)))
     if not outcome.is_written:

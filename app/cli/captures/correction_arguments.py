@@ -16,7 +16,7 @@ from engine.doctor.finding import Finding
 from engine.errors import CaptureError
 
 APPLY_CERTAINTY = 0.8
-"""--apply does what is at least so certain, and no mere note."""
+"""Least certainty of the corrections of --apply; it ignores mere notes."""
 NONE = "none"
 
 
@@ -56,7 +56,7 @@ def add_correction_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def asked_corrections(options: argparse.Namespace) -> Corrections | None:
-    """What the flags ask for apart from --apply; None where none was given."""
+    """The corrections that flags other than --apply ask for; None where none was given."""
     if not (options.exclude or options.include or options.shift or options.hold_out or options.mask or options.fit):
         return None
     holdout = [name for name in options.hold_out if name.lower() != NONE] if options.hold_out else None
@@ -75,7 +75,7 @@ def as_fit(word: str) -> FrameFit:
 
 
 def sure_corrections(findings: Sequence[Finding]) -> Corrections | None:
-    """What --apply does: corrections of errors and warnings that are certain enough; None where there is nothing."""
+    """The corrections of --apply: of errors and warnings that are certain enough; None where there are none."""
     fixes = [
         finding.fix
         for finding in findings

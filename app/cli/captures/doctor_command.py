@@ -1,4 +1,4 @@
-"""clipgstream doctor: what was found on this machine, as text or JSON."""
+"""clipgstream doctor: findings about this machine, as text or JSON."""
 
 from __future__ import annotations
 

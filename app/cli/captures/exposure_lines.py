@@ -1,4 +1,4 @@
-"""What `clipgstream inspect` says of the cameras' exposure over a capture, as lines and as JSON."""
+"""Output of `clipgstream inspect` about the cameras' exposure over a capture, as lines and as JSON."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HEIGHTS = "_.-'"
 
 
 def exposure_lines(survey: ExposureSurvey) -> list[str]:
-    """One line per camera that changes, one for the others, and what training does about it."""
+    """One line per camera that changes, one for the others, and the correction in training."""
     frames = survey.frames
     lines = [f"Note: camera {name} could not be checked: {reason}" for name, reason in survey.unreadable.items()]
     if len(frames) < 2 or not survey.curves:

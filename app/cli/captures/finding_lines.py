@@ -1,4 +1,4 @@
-"""What `clipgstream inspect` says of the findings of the capture doctor, as lines and as JSON."""
+"""Output of `clipgstream inspect` about the findings of the capture doctor, as lines and as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SIGNS = {"error": "!!", "warning": "! ", "note": "- "}
 
 
 def finding_lines(findings: Sequence[Finding], *, path: str) -> list[str]:
-    """Two or three lines per finding: what, how certain, what to do, and the flags that do it."""
+    """Two or three lines per finding: the fault, its certainty, the remedy, and the flags for it."""
     lines = []
     for finding in findings:
         sign = SIGNS[finding.severity]

@@ -45,7 +45,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def _inspect_capture(options: argparse.Namespace) -> int:
-    """What a capture is, and what is wrong with it; or write what is to be corrected."""
+    """Describe a capture and its faults, or write corrections."""
     capture = open_capture(
         options.path,
         follow_links=options.follow_links,

@@ -20,7 +20,7 @@ from engine.text import printable
 
 SCHEMA = 1
 MIN_CONFIDENCE = 0.5
-"""What is applied has to be at least so likely right."""
+"""Least confidence of shifts that are applied."""
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:

@@ -1,1 +1,1 @@
-"""Commands that change a project or say what is in it."""
+"""Commands that change a project or list its contents."""

@@ -1,4 +1,4 @@
-"""clipgstream apply: what edits delete is taken out of the clips for good."""
+"""clipgstream apply: anchors that edits delete are taken out of the clips for good."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """clipgstream apply: write clips again without what is deleted. Returns the exit code."""
+    """clipgstream apply: write clips again without deleted anchors. Returns the exit code."""
     from app.applying.applying import apply_permanently
     from app.applying.deletions import find_deletions
 

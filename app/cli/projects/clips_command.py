@@ -34,7 +34,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """Change what was asked for, then list the clips. Returns the exit code."""
+    """Make the requested changes, then list the clips. Returns the exit code."""
     is_change = bool(options.split) or options.merge is not None or options.reference is not None
     project = open_project(options.project, is_writable=is_change and not options.dry_run)
     try:

@@ -1,4 +1,4 @@
-"""The arguments of `clipgstream edit` that describe an edit: what it acts on, what it does, and in which frames."""
+"""The arguments of `clipgstream edit` that describe an edit: its target, its action, and its frames."""
 
 from __future__ import annotations
 
@@ -91,12 +91,12 @@ def _add_scopes(group: argparse._ArgumentGroup) -> None:
 
 
 def has_action(options: argparse.Namespace) -> bool:
-    """Whether something was said of what an edit does."""
+    """Whether an action was given."""
     return bool(_given_actions(options))
 
 
 def has_target(options: argparse.Namespace) -> bool:
-    """Whether something was said of what an edit acts on."""
+    """Whether a target was given."""
     return any(_is_given(options, name) for name in _TARGET_OPTIONS)
 
 
@@ -111,7 +111,7 @@ def _is_given(options: argparse.Namespace, name: str) -> bool:
 
 
 def chosen_target(options: argparse.Namespace, project: ScriptedProject, read_text: Callable[[str], str]) -> Target:
-    """What the edit acts on.
+    """The target of the edit.
 
     Args:
         project: Where Gaussians are looked for, if their attributes are given.
@@ -151,7 +151,7 @@ def _shape(options: argparse.Namespace, read_text: Callable[[str], str]) -> Targ
 
 
 def chosen_action(options: argparse.Namespace, target: Target) -> tuple[Action, bool]:
-    """What the edit does, and whether it does that to everything but its target.
+    """The action of the edit, and whether it acts on everything but its target.
 
     Raises:
         ProjectError: Nothing or several things are asked for, or a number is out of range.
@@ -235,7 +235,7 @@ def _quat(numbers: list[float]) -> Quat:
 
 
 def _made(option: str, make: Callable[[], Made]) -> Made:
-    """What a constructor makes; a ValueError of its own becomes a ProjectError."""
+    """The value of a constructor; its ValueError becomes a ProjectError."""
     try:
         return make()
     except (TypeError, ValueError) as error:  # TypeError: a value is missing

@@ -67,7 +67,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """clipgstream edit: change what was asked for, then say what the stack is. Returns the exit code."""
+    """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
     chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
     is_new = not chosen and has_action(options)
     _check_options(options, chosen[0] if chosen else "")

@@ -1,4 +1,4 @@
-"""clipgstream exclude: cameras and pictures that training never sees, beside the cameras that are held out."""
+"""clipgstream exclude: cameras and pictures that training never sees, in addition to held-out cameras."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """Change what was asked for, then say what is excluded. Returns the exit code."""
+    """Make the requested changes, then list the exclusions. Returns the exit code."""
     is_change = bool(options.cameras or options.frames or options.forget or options.forget_masks)
     project = open_project(options.project, is_writable=is_change)
     try:

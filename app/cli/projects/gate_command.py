@@ -1,4 +1,4 @@
-"""clipgstream gate: what the gate decided in each trained clip, why, and where the user overrules it."""
+"""clipgstream gate: the gate's decisions in each trained clip, why, and where the user overrules it."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class _MarkAction(argparse.Action):
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """Mark regions if any are given, then say what is marked and what was decided."""
+    """Mark regions if any are given, then list marks and decisions."""
     marks = [parse_region(values) for values in options.marks]
     is_change = bool(marks) or options.forget
     project = open_project(options.project, is_writable=is_change)

@@ -1,4 +1,4 @@
-"""clipgstream repair: what is left of a project whose document or journal is damaged, and continuing with it."""
+"""clipgstream repair: the rest of a project whose document or journal is damaged, and continuing with it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """Say what is left, and repair the project where that was asked for. Bad input where it stays damaged."""
+    """Print the rest, and repair the project where that was asked for. Bad input where it stays damaged."""
     found = look_for_recovery(options.project)
     aside = repair_project(options.project) if found is not None and options.keep_good_steps else None
     missing = replayed(options.project).notes if found is None else ()
@@ -43,7 +43,7 @@ def described(found: Recovery | None, missing: Sequence[str]) -> dict[str, Any]:
 
     Args:
         found: None where nothing is damaged.
-        missing: What is gone although nothing is damaged, in sentences.
+        missing: Missing things although nothing is damaged, in sentences.
     Returns:
         schema; is_damaged; missing; of a damaged project also problem; step, the last one that can be kept, null where
         nothing can be read; step_name, what it did; n_replayed, steps of those that come from the journal;

@@ -1,4 +1,4 @@
-"""clipgstream versions: what clips were before they were trained again, and the room that it takes on the disk."""
+"""clipgstream versions: earlier results of clips that were trained again, and the room that they take on the disk."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """Bring back or delete what was asked for, then list what there is. Returns the exit code."""
+    """Bring back or delete the requested versions, then list all. Returns the exit code."""
     if options.restore is not None and options.clip is None:
         raise ProjectError("--restore needs --clip.", hint="Say which clip's version it is.")
     is_change = options.restore is not None or (options.free is not None and not options.dry_run)

@@ -1,1 +1,1 @@
-"""What a terminal shows: progress, results, and nothing that could command it."""
+"""Output for a terminal: progress, results, and nothing that could command it."""

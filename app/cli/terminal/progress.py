@@ -37,7 +37,7 @@ class ProgressLine:
         self._is_line_open = False
 
     def update(self, stage: str, done: float, detail: str = "") -> None:
-        """Show a stage, its share 0..1, and what else is known (rate, time left, figures)."""
+        """Show a stage, its share 0..1, and other known figures (rate, time left, figures)."""
         now_s = self._clock()
         is_new = stage != self._stage
         if is_new:

@@ -36,7 +36,7 @@ def show_status(line: ProgressLine, status: TrainingStatus) -> None:
 
 
 def show_event(line: ProgressLine, event: Event) -> None:
-    """Say what a training reports beside its progress."""
+    """Print a training's reports other than its progress."""
     match event:
         case StageReported(message=message) if message:
             line.say(f"  {message}")
@@ -62,7 +62,7 @@ class PlanLines:
 
     Args:
         line: Where to say it.
-        project, capture: What is trained.
+        project, capture: Those being trained.
         catalog: Says which trainings were stopped and continue.
         step_time: Asked where no clip of the same kind says how long training takes.
         is_quiet: Plan nothing.

@@ -26,7 +26,7 @@ class Action:
 
     Attributes:
         id: Its name in preferences; never changes.
-        text: What it does, for the help sheet, menus and the palette.
+        text: Its effect, for the help sheet, menus and the palette.
         group: Heading of the help sheet.
         keys: Its own ones as text, see ui.panels.actions.key; the user may give it others (ui.panels.actions.key_map).
             Empty where it has none.
@@ -39,7 +39,7 @@ class Action:
         needs_edit: Ignored unless an edit is chosen.
         is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
         is_on: Of what can be on or off, whether it is; menus show a tick.
-        lacks: What it needs and is not there at present, as a sentence; empty when it can be run.
+        lacks: Its missing condition at present, as a sentence; empty when it can be run.
         menu: Title of the menu it stands in; empty for that of its group, see ui.panels.actions.menus.
     """
 

@@ -14,7 +14,7 @@ logger = logging.getLogger(__name__)
 
 
 class Keyed(Protocol):
-    """What a key map has to know of an action."""
+    """The part of an action that a key map needs."""
 
     @property
     def id(self) -> str: ...
@@ -35,7 +35,7 @@ class KeyMap:
         self._parsed: dict[tuple[str, tuple[str, ...]], tuple[Key, ...]] = {}
 
     def drop_unknown(self, actions: Iterable[Keyed]) -> None:
-        """Forget what the user chose for actions that there are not, and labels that name no key; each gets a line in
+        """Forget the user's choices for actions that do not exist, and labels that name no key; each gets a line in
         the log."""
         known = {action.id for action in actions}
         for action_id, labels in list(self.chosen.items()):
@@ -48,7 +48,7 @@ class KeyMap:
                 logger.warning("ignoring invalid keys of %s: %s", action_id, ascii(labels)[:200])
                 if sound:
                     self.chosen[action_id] = sound
-                else:  # what cannot be read is not the wish to have no key
+                else:  # unreadable keys are not the wish to have none
                     del self.chosen[action_id]
 
     def labels(self, action: Keyed) -> tuple[str, ...]:

@@ -42,7 +42,7 @@ _ORDER: dict[str, tuple[str | None, ...]] = {
     "Train": ("train.next", "train.all", "train.from_here", "train.settings", "train.stop", None, OTHERS),
     "Help": ("window.help", "window.palette", None, OTHERS, None, "window.about"),
 }
-"""What people look for first, by the title of its menu: ids of actions, lines, and where the rest stands."""
+"""Entries that people look for first, by the title of its menu: ids of actions, lines, and where the rest stands."""
 _MENU_OF_GROUP = {
     TIME: "Time",
     VIEW: "View",
@@ -69,7 +69,7 @@ _MENU_OF_TOPIC = {
     "show": "View/Show",
     "timeline": "Time/Timeline",
 }
-"""By what an id begins with, up to the first dot."""
+"""By the beginning of an id, up to the first dot."""
 
 
 @dataclass

@@ -59,6 +59,6 @@ def handle_keys(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _say(notices: Notices, why_not: str, what: str) -> None:
-    """Tell once why a key does nothing, however often it is pressed."""
+    """Report once why a key does nothing, however often it is pressed."""
     if all((notice.title, notice.detail) != (why_not, what) for notice in notices):
         notices.add("info", why_not, what)

@@ -1,1 +1,1 @@
-"""One clip in the panels: what it depends on, its versions, and the room that it takes."""
+"""One clip in the panels: its dependencies, its versions, and the room that it takes."""

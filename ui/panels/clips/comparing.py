@@ -8,7 +8,7 @@ from app.status import Overlays, VersionStatus, version_number
 
 
 def compared_version(overlays: Overlays) -> int | None:
-    """The version that is beside the picture; None where none is."""
+    """The version that the picture is compared with; None where none is."""
     return None if overlays.compare == "off" else version_number(overlays.compare_with)
 
 

@@ -1,4 +1,4 @@
-"""The clip under the playhead in the training panel: what it depends on, its versions, and the room that it takes."""
+"""The clip under the playhead in the training panel: its dependencies, its versions, and the room that it takes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MAX_LISTED = 8
 
 
 def stale_text(queue: QueueStatus) -> str:
-    """What training again what is out of date comes to; empty where nothing is."""
+    """Cost of training all out-of-date clips again; empty where there are none."""
     stale = queue.stale
     if stale is None:
         return ""
@@ -49,7 +49,7 @@ def listed(indices: Sequence[int]) -> str:
 
 
 def dependency_lines(status: DependencyStatus) -> list[str]:
-    """What a clip depends on and what depends on it, in sentences."""
+    """The clips that a clip depends on and those that depend on it, in sentences."""
     lines = [f"It starts from {listed(status.needs)}." if status.needs else "It starts from no other clip."]
     if status.needed_by:
         others = listed(status.needed_by)
@@ -63,7 +63,7 @@ def dependency_lines(status: DependencyStatus) -> list[str]:
 
 
 def use_lines(use: DiskUse) -> list[tuple[str, int]]:
-    """What the whole project takes, part by part: name and bytes."""
+    """Size of the whole project, part by part: name and bytes."""
     rows = [
         ("Clips", sum(clip.clip for clip in use.clips)),
         (f"Earlier versions ({use.n_versions})", use.versions),

@@ -1,1 +1,1 @@
-"""The panel of the capture doctor: findings, what to look at, and where the cameras stand."""
+"""The panel of the capture doctor: findings, their evidence, and where the cameras stand."""

@@ -118,7 +118,7 @@ def _draw_sign(draw: imgui.ImDrawList, x: float, y: float, severity: str | None,
 
 
 def draw_legend(width: float) -> None:
-    """What the signs of the map mean, as much as there is room for, and everything as a tooltip."""
+    """Meanings of the map's signs, as much as there is room for, and everything as a tooltip."""
     words = f"Square: {SEVERITY_WORDS['error'].lower()}   Triangle: {SEVERITY_WORDS['warning'].lower()}   Dot: fine"
     imgui.text_disabled(elided(words, width))
     imgui.set_item_tooltip(words)

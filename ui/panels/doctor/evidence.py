@@ -1,4 +1,4 @@
-"""What a finding rests on, as pictures side by side: frames, or two cameras with matches and epipolar lines."""
+"""Evidence of a finding, as pictures side by side: frames, or two cameras with matches and epipolar lines."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Evidence:
         self._pictures.release()
 
     def draw(self, session: SessionView, finding: Finding, rig: CameraRig, dispatch: Dispatch, ui: UiState) -> None:
-        """Fill what is left of the window with the pictures of one finding; a click goes there."""
+        """Fill the rest of the window with the pictures of one finding; a click goes there."""
         self._pictures.begin()
         boxes: list[tuple[str, int, str]] = []
         pairs: dict[int, PairEvidence] = {}

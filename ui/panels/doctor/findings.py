@@ -1,4 +1,4 @@
-"""The list of findings: sign, word and certainty, what was found, what to do, and the button that does it."""
+"""The list of findings: sign, word and certainty, the fault, its remedy, and the button for that."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The capture doctor: what is wrong with the open capture, how certain that is, what it looks like, and what helps."""
+"""The capture doctor: faults of the open capture, their certainty, their evidence, and their remedies."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PROGRESS = 180.0
 SHARES = (0.34, 0.38)
 """Of the width that the list and the pictures have."""
 LOW, WORDS = 250.0, 28.0
-"""In a room lower than this the bars stand beside the map; and the height of a line of words."""
+"""In a room lower than this the bars stand next to the map; and the height of a line of words."""
 STACKED_HEIGHTS = (0.5, 0.3)
 
 

@@ -1,4 +1,4 @@
-"""Words, signs and colours of findings: severity is told by a sign and a word as well as by its colour."""
+"""Words, signs and colours of findings: severity is shown by a sign and a word as well as by its colour."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def certainty_text(finding: Finding) -> str:
 
 
 def fix_words(fix: Corrections) -> tuple[str, str]:
-    """What a button says, and the same with names for a question."""
+    """Label of a button, and the same with names for a question."""
     excluded = [name for name, value in fix.is_excluded.items() if value]
     if excluded:
         return "Exclude", f"Exclude {_named(excluded)}"

@@ -1,1 +1,1 @@
-"""Panels and pointer of what is edited."""
+"""Panels and pointer for editing."""

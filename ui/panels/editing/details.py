@@ -1,4 +1,4 @@
-"""The details of one edit in numbers: its name, where it holds, what it acts on and what it does."""
+"""The details of one edit in numbers: its name, where it holds, its target and its action."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FAR = 1e6
 """Largest coordinate that fields take, scene units."""
 LEAST_SIZE = 1e-6
 SPEED_SHARE = 2e-3
-"""Of a drag over a field, per unit: as a share of the size of what is changed."""
+"""Of a drag over a field, per unit: as a share of the size of the changed thing."""
 
 
 def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
@@ -128,7 +128,7 @@ def _draw_target(ui: UiState, target: Target) -> Target | None:
 
 
 def _draw_action(session: SessionView, ui: UiState, action: Action) -> Action | None:
-    """Fields of what an edit does; what it was changed to."""
+    """Fields of an edit's action; the changed action."""
     changed = action
     for one in settings_of(type(action)).values():
         found = _field(ui, one, getattr(action, one.name), session.timeline.last_frame)

@@ -1,8 +1,8 @@
 """Handles of what is edited under the pointer, over one picture: held, dragged, and given back with Escape; and points
 of the scene that are asked for.
 
-The window's own handles and not ImGuizmo's: those take no press over an item, and the picture is one; nor do they tell
-apart what a press on them means from what it means beside them.
+The window's own handles and not ImGuizmo's: those take no press over an item, and the picture is one; nor do they
+distinguish a press on them from one next to them.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class EditGrip:
 
 
 def _given(session: SessionView, tool: EditTool) -> SetUpByGround | SetScaleByLength:
-    """What enough points say."""
+    """The command from enough points."""
     points = [_vector(point) for point in tool.points]
     if tool.asking == "length":
         return SetScaleByLength(points[0], points[1], tool.length_m)
@@ -158,7 +158,7 @@ def _vector(values: np.ndarray) -> Vector:
 
 
 def select_drawn(dispatch: Dispatch, ui: UiState) -> None:
-    """Let what was drawn be selected as it is now."""
+    """Select the contents of the drawn volume as it is now."""
     if ui.selecting.volume is not None:
         dispatch(SelectVolume(ui.selecting.volume, ui.selecting.how(), ui.selecting.is_by_extent))
         if ui.editing.is_outside:

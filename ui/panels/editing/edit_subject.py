@@ -18,7 +18,7 @@ from ui.viewport.editing.handles import Thing, axes_of, middle_of
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What has handles.
+    """A thing with handles.
 
     Attributes:
         thing: A box, a sphere or a movement.
@@ -43,14 +43,14 @@ def drawn_volume(ui: UiState) -> Box | Sphere | None:
 
 
 def invert_selection(dispatch: Dispatch, ui: UiState) -> None:
-    """Select what is not selected; of a box or sphere that was drawn, everything outside of it is meant then."""
+    """Select all that is not selected; of a box or sphere that was drawn, everything outside of it is meant then."""
     dispatch(InvertSelection())
     if drawn_volume(ui) is not None:
         ui.editing.is_outside = not ui.editing.is_outside
 
 
 def subject_of(session: SessionView, ui: UiState) -> Subject | None:
-    """What has handles now: what was drawn, else what belongs to the chosen edit."""
+    """The thing with handles now: the drawn one, else that of the chosen edit."""
     volume = drawn_volume(ui)
     if volume is not None:
         return Subject(volume)
@@ -60,7 +60,7 @@ def subject_of(session: SessionView, ui: UiState) -> Subject | None:
 
 
 def meant(session: SessionView, ui: UiState) -> tuple[Box | Sphere | None, str]:
-    """What a new edit would act on: the box or sphere that was drawn, with its words; None stands for what is selected.
+    """Target of a new edit: the box or sphere that was drawn, with its words; None stands for the selection.
     No words where there is neither."""
     volume = drawn_volume(ui)
     if volume is not None:
@@ -69,7 +69,7 @@ def meant(session: SessionView, ui: UiState) -> tuple[Box | Sphere | None, str]:
 
 
 def pivot_of(session: SessionView, volume: Box | Sphere | None) -> Vector:
-    """Where a movement turns about: the middle of what it moves, as it is shown. Scene units"""
+    """Where a movement turns about: the middle of the things it moves, as shown. Scene units"""
     if volume is not None:
         return _vector(middle_of(volume))
     means = _selected_means(session)
@@ -91,7 +91,7 @@ def bounds_of(session: SessionView, volume: Box | Sphere | None) -> tuple[Vector
 
 
 def _selected_means(session: SessionView) -> np.ndarray:
-    """Centres of what is selected, as far as it is shown. [N, 3]"""
+    """Centres of the selection, as far as it is shown. [N, 3]"""
     gaussians = session.shown_gaussians()
     if gaussians is None or gaussians.rows is None or not session.selection.n_gaussians:
         return np.zeros((0, 3))

@@ -1,4 +1,4 @@
-"""Numeric fields of an edit: what is dragged or typed in one of them is one step of the history."""
+"""Numeric fields of an edit: a drag or an input in one of them is one step of the history."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def numbers(
     high: float,
     text_format: str = "%.3f",
 ) -> tuple[float, ...] | None:
-    """One or three numbers beside each other. The new ones, once they were changed. name: In ui.rects."""
+    """One or three numbers side by side. The new ones, once they were changed. name: In ui.rects."""
     label_before(label)
     flags = imgui.SliderFlags_.always_clamp
     if len(values) == 1:
@@ -51,7 +51,7 @@ def numbers(
 def whole_numbers(
     ui: UiState, name: str, label: str, values: Sequence[int], *, low: int, high: int
 ) -> tuple[int, ...] | None:
-    """One or two whole numbers beside each other; otherwise as `numbers`."""
+    """One or two whole numbers side by side; otherwise as `numbers`."""
     label_before(label)
     flags = imgui.SliderFlags_.always_clamp
     if len(values) == 1:

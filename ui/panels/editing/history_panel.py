@@ -21,7 +21,7 @@ class HistoryPanel:
         self._seen = -1
 
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-        """The first step on top; what was taken back follows the present one, paler."""
+        """The first step on top; undone steps follow the present one, paler."""
         if session.capture is None:
             text_wrapped_dim("Your steps appear here once a capture is open.")
             return

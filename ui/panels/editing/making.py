@@ -22,7 +22,7 @@ from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
 from ui.panels.state import EDITS, Dispatch, UiState
 
 FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
-"""What new edits begin with."""
+"""First values of new edits."""
 
 
 First = Callable[[SessionView, Box | Sphere | None], Action]
@@ -35,7 +35,7 @@ class Making:
     Attributes:
         name: In ids of actions and names of buttons.
         label: On the button.
-        words: What it does, for menus and tooltips.
+        words: Its effect, for menus and tooltips.
         action: Made where it is wanted; None has no use of its own for the frame and the pivot.
         keys: See ui.panels.actions.action.Action.
         is_inverted: Whether it acts on everything else.
@@ -123,7 +123,7 @@ def _reach(session: SessionView, volume: Box | Sphere | None, scope: Scope, *, i
 
 
 def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """What new edits act on, where they are to hold, and a button for each kind."""
+    """The target of new edits, where they are to hold, and a button for each kind."""
     volume, words = meant(session, ui)
     if words:
         is_outside = volume is not None and ui.editing.is_outside

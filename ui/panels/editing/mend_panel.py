@@ -1,4 +1,4 @@
-"""The window of mending: what is to be mended, how far it is, and what came of it, with figures before and after.
+"""The window of mending: the seam to mend, the progress, and the outcome, with figures before and after.
 
 It lies over the picture and takes nothing away from it: one can play around the seam, look at the heat map and compare
 while it is up.
@@ -30,7 +30,7 @@ TITLE = "Mend###mend"
 WIDTH = 372.0
 MARGIN = 12.0
 BELOW_HINT = 72.0
-"""Below two lines of what a tool in use does."""
+"""Below two lines about a tool in use."""
 HELD_OUT = "Held-out PSNR"
 METHOD_WORDS = {
     "auto": "Automatic",

@@ -1,4 +1,4 @@
-"""How the scene lies in the world: what is up, and how long a unit of the scene is."""
+"""How the scene lies in the world: its upward direction, and how long a unit of the scene is."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SCALES = (1e-9, 1e9)
 
 
 def view_up(view: OrbitView) -> Vector:
-    """What is up in the picture of a view."""
+    """The upward direction in the picture of a view."""
     x, y, z = (float(value) for value in -view.pose().rotation[1])
     return x, y, z
 

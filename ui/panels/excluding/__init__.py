@@ -1,1 +1,1 @@
-"""What of the capture training never sees: menus, painting over pictures, and how it is shown."""
+"""Parts of the capture that training never sees: menus, painting over pictures, and how they are shown."""

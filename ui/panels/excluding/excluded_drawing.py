@@ -1,4 +1,4 @@
-"""What of a camera's picture is excluded from training, hatched over it; and the brush."""
+"""The part of a camera's picture that is excluded from training, hatched over it; and the brush."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class ExcludedDrawing:
 
 
 def brush_hint(tool: MaskTool, name: str) -> str:
-    """What the brush does, in one line."""
+    """The function of the brush, in one line."""
     return (
         f"Masking part of {name} in {SCOPES[tool.scope]}: drag paints, Shift erases, Ctrl+wheel sizes, "
         "the same key or menu entry ends it"

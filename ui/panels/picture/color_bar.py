@@ -67,7 +67,7 @@ def draw_color_bar(
 
 
 def bar_number(value: float, low: float, high: float) -> str:
-    """A value with as many digits as tell about a thousand steps of the range apart, and two where it is near zero, in
+    """A value with as many digits as separate about a thousand steps of the range, and two where it is near zero, in
     the fewest characters."""
     span = max(abs(low), abs(high))
     least = 9.5 if abs(value) >= span / 1000.0 else 0.0

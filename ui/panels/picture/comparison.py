@@ -1,4 +1,4 @@
-"""The rendered picture beside another one: whether they are compared, how much of each shows, and their names."""
+"""The rendered picture compared with another one: whether they are compared, how much each shows, and their names."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ def covered_share(session: SessionView, ui: UiState, *, is_held: bool) -> float:
 
 
 def kind_words(kind: str, mode_label: str) -> str:
-    """What a rendered picture is called beside another one."""
+    """Name of a rendered picture next to another one."""
     return f"{kind}, {mode_label.lower()}" if kind == RENDERED and mode_label else kind
 
 
 def missing_words(overlays: Overlays, versions: Sequence[VersionStatus]) -> str:
-    """What stands where the other picture is not there. versions: Of the clip under the playhead."""
+    """Words where the other picture is missing. versions: Of the clip under the playhead."""
     if overlays.compare_with == CAPTURED:
         return "Reading the captured picture"
     number = version_number(overlays.compare_with)
@@ -60,7 +60,7 @@ def missing_words(overlays: Overlays, versions: Sequence[VersionStatus]) -> str:
 
 
 def other_label(overlays: Overlays) -> str:
-    """What the other picture is called in menus."""
+    """Name of the other picture in menus."""
     if overlays.compare_with == CAPTURED:
         return "Captured picture"
     number = version_number(overlays.compare_with)

@@ -1,4 +1,4 @@
-"""Gestures: what the buttons and the wheel of the mouse do over the picture, as one table per preset.
+"""Gestures: functions of the mouse's buttons and wheel over the picture, as one table per preset.
 
 A preset is chosen, never guessed: a wheel and a touchpad cannot be distinguished by what they send.
 """
@@ -33,7 +33,7 @@ FLY_KEYS: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """What a mouse does.
+    """Functions of a mouse.
 
     Attributes:
         name: In preferences.
@@ -52,17 +52,17 @@ class Preset:
 
     @property
     def title(self) -> str:
-        """The label without what explains it."""
+        """The label without its explanation."""
         return self.label.partition(":")[0]
 
     def drag(self, button: Button, modifiers: str, *, is_flying: bool = False) -> Gesture:
-        """What dragging with a button does."""
+        """The gesture of dragging with a button."""
         if is_flying and button == self.look_button:
             return "look"
         return self.drags.get((button, modifiers), self.drags.get((button, ""), "none"))
 
     def turn(self, modifiers: str) -> Gesture:
-        """What turning the wheel does."""
+        """The gesture of turning the wheel."""
         return self.wheel.get(modifiers, self.wheel[""])
 
 
@@ -100,7 +100,7 @@ PRESETS: dict[str, Preset] = {
         ),
     )
 }
-"""By name; the first one is what a new user gets."""
+"""By name; the first one is that of a new user."""
 
 
 @dataclass

@@ -60,7 +60,7 @@ def gizmo_tips(view: OrbitView, rect: Rect) -> list[Tip]:
 
 
 def tip_under(view: OrbitView, rect: Rect, x: float, y: float) -> Tip | None:
-    """The end under the pointer, the nearest of those that are; None beside them all."""
+    """The end under the pointer, the nearest of those that are; None off them all."""
     near = [tip for tip in gizmo_tips(view, rect) if (tip.x - x) ** 2 + (tip.y - y) ** 2 <= (TIP_RADIUS + 1.5) ** 2]
     return near[-1] if near else None
 

@@ -34,7 +34,7 @@ class HeatOverlay:
     """Owns the texture of one view's heat map. GL thread only.
 
     Attributes:
-        shown: What was drawn last; None without a heat map.
+        shown: The map drawn last; None without a heat map.
     """
 
     def __init__(self, ctx: moderngl.Context) -> None:
@@ -48,7 +48,7 @@ class HeatOverlay:
         self._image.release()
 
     def beside(self, area: Rect) -> Rect:
-        """What is left of an area: left of the colour bar, or above its words where that is too narrow; all of it
+        """The rest of an area: left of the colour bar, or above its words where that is too narrow; all of it
         where there is no heat map."""
         if self._said is None:
             return area
@@ -87,12 +87,12 @@ class HeatOverlay:
         self._draw_bar(ui, pane, kind, kind.value_range, heat_words(kind, heat), pointed)
 
     def draw_words(self) -> None:
-        """Say what was drawn, over everything else in the pane."""
+        """Name the drawn map, over everything else in the pane."""
         if self._draw_words is not None:
             self._draw_words()
 
     def _draw_anchors(self, session: SessionView, ui: UiState, pane: Rect) -> None:
-        """What the points of anchors mean; the points themselves belong to the scene."""
+        """Meaning of the anchors' points; the points themselves belong to the scene."""
         heat = session.anchor_heat(anchor_column(session.overlays.heat))
         if heat is None or heat.is_stale or heat.n_cameras < heat.n_cameras_all:
             ui.redraw_within(BUSY_REDRAW_S)
@@ -144,7 +144,7 @@ def heat_words(kind: HeatKind, heat: HeatMap | None) -> str:
 
 
 def anchor_words(kind: HeatKind, heat: AnchorHeat | None) -> str:
-    """What the points show, of which frame, and from how many cameras; or why there are none."""
+    """Quantity of the points, of which frame, and from how many cameras; or why there are none."""
     label = f"{kind.label}, of anchors"
     if heat is None:
         return f"{label}: being measured"

@@ -34,16 +34,16 @@ BUSY_REDRAW_S = 0.25
 LINE_HEIGHT, GAP, MARGIN = 24.0, 8.0, 12.0
 BUSY_WIDTH = 20.0
 BELOW_NAME = 44.0
-"""What names a picture at its top takes so much."""
+"""Height of a picture's name at its top."""
 LEGEND_WIDTH = 760.0
-"""In a picture at least this wide, units, the legend stands beside what is being chosen."""
+"""In a picture at least this wide, units, the legend stands next to the choice in progress."""
 
 
 def wrapped(text: str, width: float, measure: Callable[[str], float], *, between: str = " ") -> list[str]:
     """Text in lines that fit a width, broken between words; a word that is too long stands alone.
 
     Args:
-        between: What stands between two words, or between parts that stay whole.
+        between: Separator between two words, or between parts that stay whole.
     """
     lines: list[str] = []
     for word in text.split(between):
@@ -61,7 +61,7 @@ class Hud:
     def __init__(self) -> None:
         self._rate = PictureRate()
         self.text: HudText | None = None
-        """What the newest frame says."""
+        """Words of the newest frame."""
         self.legend_x0 = 0.0
         """Where the legend begins; right of it there is no room for other words."""
 
@@ -90,7 +90,7 @@ class Hud:
             self._draw_color_bars(session, ui, scene, free, value)
         self.legend_x0 = legend_at[0]
         is_tool_used = ui.regions.is_active or ui.selecting.is_active
-        if not is_tool_used or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
+        if not is_tool_used or area.width >= LEGEND_WIDTH:  # the choice in progress needs the room
             self._draw_legend(session, scene, free, *legend_at)
 
     def _text(self, session: SessionView, scene: ViewportScene) -> HudText | None:
@@ -167,7 +167,7 @@ class Hud:
     def _draw_color_bars(
         self, session: SessionView, ui: UiState, scene: ViewportScene, free: Rect, value: float | None
     ) -> None:
-        """What the colours of the picture on screen mean, at its lower right above the plates, and at its lower left
+        """Meaning of the colours of the picture on screen, at its lower right above the plates, and at its lower left
         those of the picture that it is compared with."""
         width, height = COLOR_BAR_SIZE
         shown, other, coverage = (
@@ -230,7 +230,7 @@ def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: Color) -> None:
 
 
 def legend_rows(session: SessionView, scene: ViewportScene) -> list[tuple[str, Color, str]]:
-    """Shape, colour and words of what is marked."""
+    """Shape, colour and words of marks."""
     counts = scene.counts
     rows = [("disc", (*hue, 1.0), words) for hue, words in MODES[scene.shown.source.shown_as.mode].legend]
     clip_index, frame_index = counts.source.clip_index, counts.source.frame_index
@@ -252,7 +252,7 @@ def legend_rows(session: SessionView, scene: ViewportScene) -> list[tuple[str, C
 
 
 def _role_rows(shape: str, counts: dict[str, int]) -> Sequence[tuple[str, Color, str]]:
-    """Legend of anchors by what they are; nothing where they are all the same."""
+    """Legend of anchors by role; nothing where they are all the same."""
     if len(counts) < 2:
         return []
     return [(shape, ON_PICTURE.role_colors[role], f"of them {format_count(n)} {role}") for role, n in counts.items()]

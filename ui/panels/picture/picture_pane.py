@@ -113,7 +113,7 @@ class PicturePane:
             self._draw_hints(ui, Rect(area.x0 + 12, top, self.hud.legend_x0 - 8, area.y1))
 
     def _draw_hints(self, ui: UiState, free: Rect) -> None:
-        """What the tool in use does."""
+        """The function of the tool in use."""
         draw = imgui.get_window_draw_list()
         if ui.editing.asking is not None or ui.editing.held is not None:
             draw_edit_hint(draw, ui.editing, free)
@@ -318,7 +318,7 @@ class PicturePane:
 
 
 def _fitting_name(words: str, room: float) -> str:
-    """What a picture is called, in so much of its width: without the frame, which the label below names too, and cut
+    """Name of a picture, in so much of its width: without the frame, which the label below names too, and cut
     only where even that is too long."""
     width = room - 34
     return words if imgui.calc_text_size(words).x <= width else elided(words.partition(",")[0], width)

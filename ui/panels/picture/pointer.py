@@ -1,4 +1,4 @@
-"""What the pointer and held keys do over one picture: presses, drags, the wheel and flying, as changes of the view.
+"""Input by pointer and held keys over one picture: presses, drags, the wheel and flying, as changes of the view.
 
 Which gesture a button or the wheel makes is looked up in the preset in use (ui.panels.picture.gestures).
 """
@@ -48,7 +48,7 @@ class Pointer:
     """The press and drag in progress over one picture.
 
     Attributes:
-        drag: What is being dragged: "view", "wipe", "gizmo", "nothing" after a double click, "turn" once a press
+        drag: The thing being dragged: "view", "wipe", "gizmo", "nothing" after a double click, "turn" once a press
             that could have been a click has moved, or what somebody else took the press for; None while nothing is.
         button: imgui.MouseButton_ of the press.
         pressed_at: Where it was pressed, logical pixels.
@@ -163,7 +163,7 @@ class Pointer:
         self.note_moved()
 
     def _aim_of_wheel(self, at: tuple[float, float], pick: Pick) -> np.ndarray | None:
-        """What was under the pointer when the wheel began to turn here: a point that comes nearer must not be left for
+        """The point under the pointer when the wheel began to turn here: a point that comes nearer must not be left for
         another one behind it."""
         now_s = time.perf_counter()
         if self._wheel_aim is not None and self._wheel_aim[0] == at and now_s - self._wheel_aim[2] < AIM_AGAIN_S:

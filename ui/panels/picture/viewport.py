@@ -58,12 +58,12 @@ class ViewportPanel:
 
     @property
     def scene(self) -> ViewportScene:
-        """What the active view's picture is drawn with."""
+        """The scene that draws the active view's picture."""
         return self.active.scene
 
     @property
     def hud(self) -> Hud:
-        """What stands over the active view's picture."""
+        """The words over the active view's picture."""
         return self.active.hud
 
     def has_news(self, session: SessionView) -> bool:
@@ -139,7 +139,7 @@ class ViewportPanel:
 
 
 def _name(index: int) -> str:
-    """What a view is called where it fails."""
+    """Name of a view where it fails."""
     return f"view {index + 1}"
 
 

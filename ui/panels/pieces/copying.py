@@ -16,13 +16,13 @@ COMMAND, PYTHON = "Copy as command", "Copy as Python"
 
 
 def copy_command(make: Callable[[], CommandText]) -> None:
-    """The line for a terminal goes onto the clipboard; what cannot be said leaves it as it is."""
+    """Copy the line for a terminal; a command without such a line leaves the clipboard as it is."""
     with suppress(EngineError):
         imgui.set_clipboard_text(make().shell())
 
 
 def copy_python(make: Callable[[], CommandText]) -> None:
-    """The lines for a script go onto the clipboard; what cannot be said leaves it as it is."""
+    """Copy the lines for a script; a command without such lines leaves the clipboard as it is."""
     with suppress(EngineError):
         imgui.set_clipboard_text(make().python)
 

@@ -1,4 +1,4 @@
-"""Undo and redo as buttons: what each of them would do, whatever was edited."""
+"""Undo and redo as buttons with the step of each, whatever was edited."""
 
 from __future__ import annotations
 

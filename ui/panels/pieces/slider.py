@@ -11,7 +11,7 @@ def slider(
     """A slider; label and value follow it. Its width is that of the next item, without them.
 
     Args:
-        label: What it sets; may be empty behind "##" where that is said elsewhere.
+        label: Name of its setting; may be empty before "##" where that is shown elsewhere.
         words: The value in words, such as "%.1f anchors".
         flags: See imgui.SliderFlags_.
     Returns:
@@ -21,5 +21,5 @@ def slider(
 
 
 def slider_text(label: str, value: float, words: str) -> str:
-    """What stands behind a slider."""
+    """Text after a slider."""
     return "  ".join(filter(None, (label.partition("##")[0], words % value)))

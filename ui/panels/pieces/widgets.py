@@ -18,7 +18,7 @@ LEAST_WITH_ARROW = 92.0
 
 
 def text_right(text: str, color: Color | None = None) -> None:
-    """Text at the right end of the current line, pushed right rather than overlapping what is there."""
+    """Text at the right end of the current line, pushed right rather than overlapping other things."""
     imgui.same_line()
     free = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(free, 0.0))
@@ -47,7 +47,7 @@ def draw_job_bar(job: JobStatus | None, ui: UiState, width: float, height: float
 
 
 def text_warning(text: str) -> None:
-    """What is in the way, wrapped at the panel's edge."""
+    """A warning, wrapped at the panel's edge."""
     imgui.push_text_wrap_pos(0.0)
     imgui.text_colored(ImVec4(*theme.ORANGE), f"{theme.Icon.WARNING}  {text}")
     imgui.pop_text_wrap_pos()

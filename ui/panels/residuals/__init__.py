@@ -1,1 +1,1 @@
-"""The residuals panel: how far every picture is from what its camera took, and where clips do not meet."""
+"""The residuals panel: how far every picture is from its camera's picture, and where clips do not meet."""

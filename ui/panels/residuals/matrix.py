@@ -23,7 +23,7 @@ NAME_WIDTH = 74.0
 ROW_HEIGHTS = (3.0, 16.0)
 """Least and most of a row, units."""
 HEIGHT = 250.0
-"""What the matrix takes where there are many cameras, units."""
+"""Of the matrix where there are many cameras, units."""
 NAME_HEIGHT = 12.0
 """A name takes as much, units; where rows are lower, some are left out."""
 NOTHING = (0.17, 0.19, 0.23)
@@ -133,7 +133,7 @@ def _draw_names(
     row_height: float,
     shown: int | None,
 ) -> None:
-    """As many names as there is room for; a bar of their colour beside held-out cameras in any case."""
+    """As many names as there is room for; a bar of their colour next to held-out cameras in any case."""
     named = named_rows(len(rig.names), row_height, shown)
     for index, name in enumerate(rig.names):
         y = area.y0 + index * row_height

@@ -110,7 +110,7 @@ class ResidualsPanel:
         self._worst_key: object = None
         self._worst: Sequence[tuple[float, int, int]] = ()
         self.column = "psnr"
-        """What the matrix and the list show; one of CELL_COLUMNS."""
+        """The figure in the matrix and the list; one of CELL_COLUMNS."""
 
     def release(self) -> None:
         """Free GL objects. GL thread only."""

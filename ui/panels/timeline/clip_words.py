@@ -25,7 +25,7 @@ def state_words(state: str) -> str:
 
 
 def state_note(status: ClipStatus) -> str:
-    """What there is to say of a clip's state beyond its word; empty where that says it all."""
+    """Details of a clip's state beyond its word; empty where the word is enough."""
     texts = [status.reason]
     if status.resume_step is not None and status.state in ("trained", "stale", "damaged"):
         texts.append(f"Retraining stopped at step {format_count(status.resume_step)}.")

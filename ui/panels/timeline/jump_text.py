@@ -22,11 +22,11 @@ _RELATIVE = re.compile(r"([+-])\s*([0-9]+)")
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """What a typed time means.
+    """Meaning of a typed time.
 
     Attributes:
         frame_index: The frame to go to; None where the text means nothing.
-        words: What the user has to know; empty where all is as typed.
+        words: A note for the user; empty where all is as typed.
     """
 
     frame_index: int | None
@@ -34,7 +34,7 @@ class Jump:
 
 
 def parse_jump(text: str, frame_index: int, clips: Sequence[Clip], fps: float) -> Jump:
-    """What a text means, at a playhead in a capture of some clips."""
+    """Meaning of a text, at a playhead in a capture of some clips."""
     typed = text.strip().lower()
     if not typed or len(typed) > MAX_CHARACTERS or not clips:
         return Jump(None, f"Type a time, for example: {HINT}")

@@ -32,7 +32,7 @@ def edit_marker(timeline: Timeline, dispatch: Dispatch, ui: UiState, frame_index
 
 
 def draw_marker_box(timeline: Timeline, dispatch: Dispatch, ui: UiState, track: Rect) -> None:
-    """While it is open; what is typed counts at once, Enter and Escape only close it."""
+    """While it is open; typed text counts at once, Enter and Escape only close it."""
     view = ui.timeline
     if view.is_marker_wanted:
         view.is_marker_wanted = False

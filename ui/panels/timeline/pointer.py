@@ -1,4 +1,4 @@
-"""What the pointer does over the track: scrub, zoom, pan, play around a seam, go to a marker, move or edit it, and move
+"""The pointer's use over the track: scrub, zoom, pan, play around a seam, go to a marker, move or edit it, and move
 keys of the camera path.
 """
 
@@ -18,11 +18,11 @@ from ui.panels.timeline.rows.stage import TimelineStage
 
 LEFT, MIDDLE = 0, 2
 EDGE_PAN_SHARE = 0.02
-"""Share of what is shown by which the view moves on per drawn frame, while a scrub is held beyond its edge."""
+"""Share of the shown part by which the view moves on per drawn frame, while a scrub is held beyond its edge."""
 
 
 def handle_track(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> None:
-    """For the item drawn last, the invisible button of the track. Changes what is shown from the next frame on."""
+    """For the item drawn last, the invisible button of the track. Changes the shown part from the next frame on."""
     _handle_wheel(stage, session)
     _handle_middle_drag(stage, session)
     _handle_left(stage, session, dispatch)

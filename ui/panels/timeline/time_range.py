@@ -95,7 +95,7 @@ class TimeScale:
         object.__setattr__(self, "per_frame", self.width / self.shown.length)
 
     def left_of(self, frame_index: float) -> float:
-        """Left edge of a frame's cell; may lie outside of what is shown."""
+        """Left edge of a frame's cell; may lie outside of the shown part."""
         return self.x0 + (frame_index - self.shown.start) * self.per_frame
 
     def middle_of(self, frame_index: float) -> float:
@@ -107,7 +107,7 @@ class TimeScale:
         return self.shown.start + (x - self.x0) / self.per_frame
 
     def frame_at(self, x: float) -> int:
-        """The frame whose cell lies under x, held inside of what is shown."""
+        """The frame whose cell lies under x, held inside of the shown part."""
         if self.n_frames < 1:
             return 0
         first = max(math.floor(self.shown.start), 0)

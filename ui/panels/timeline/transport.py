@@ -29,7 +29,7 @@ def speed_text(speed: float) -> str:
 
 
 def draw_transport(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """Buttons, the frame's number, what is played, and the clip at the right end."""
+    """Buttons, the frame's number, the frames played, and the clip at the right end."""
     timeline = session.timeline
     width = imgui.get_content_region_avail().x
     _draw_buttons(session, dispatch, ui)

@@ -23,7 +23,7 @@ def frames_per_second_of_timecode(fps: float) -> int:
 
 
 def unit_note(unit: str, fps: float) -> str:
-    """What there is to know of a unit."""
+    """A note on a unit."""
     if unit == FRAMES:
         return "Frames, counted from 0"
     if unit == SECONDS:
@@ -66,7 +66,7 @@ class Ticks:
 
 
 def ruler_ticks(shown: TimeRange, width: float, fps: float, unit: str, n_frames: int) -> Ticks:
-    """Ticks of what is shown: at round values, as far apart as their labels need.
+    """Ticks of the shown part: at round values, as far apart as their labels need.
 
     Args:
         width: Of the ruler, units of the screen.

@@ -1,4 +1,4 @@
-"""What of time a window shows, and in which unit. State of widgets; the playhead is in app.playback.timeline."""
+"""The part of time that a window shows, and its unit. State of widgets; the playhead is in app.playback.timeline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ui.panels.timeline.units import FRAMES, UNITS
 ZOOM_STEP = 1.25
 """By how much one tick of the wheel or one press of a key zooms."""
 PAN_SHARE = 0.15
-"""Share of what is shown by which one tick of the wheel or one press of a key moves."""
+"""Share of the shown part by which one tick of the wheel or one press of a key moves."""
 
 
 @dataclass
@@ -108,7 +108,7 @@ class TimelineView:
         self.zoom(n_steps, at if is_seen else (shown.start + shown.stop) / 2, timeline.n_frames)
 
     def pan(self, n_steps: float, n_frames: int) -> None:
-        """Later by a share of what is shown, or earlier where negative."""
+        """Later by a share of the shown part, or earlier where negative."""
         self.pan_by(n_steps * PAN_SHARE * self.range_of(n_frames).length, n_frames)
 
     def pan_by(self, n_moved: float, n_frames: int) -> None:
@@ -136,7 +136,7 @@ class TimelineView:
         self.folded ^= {name}
 
     def restore(self, unit: str, folded: Sequence[str]) -> None:
-        """Take up what was kept, as far as it makes sense."""
+        """Take up the kept state, as far as it is valid."""
         self.unit = unit if unit in UNITS else FRAMES
         self.folded = {*folded} & {*LANES}
 

@@ -17,7 +17,7 @@ from ui.style.axis import ticks_that_fit, whole_ticks
 
 PLOT_HEIGHT = 76.0
 TICK_ROOM = 52.0
-"""What the numbers on the left and the margins take of a plot, units."""
+"""Room of a plot for the numbers on the left and the margins, units."""
 MIN_TICK_DISTANCE = 30.0
 LEAST_CLIPS = 2
 """With fewer there is nothing to compare."""
@@ -51,7 +51,7 @@ class ClipQuality:
 
     @property
     def exposure_text(self) -> str:
-        """How far exposure goes, and what became of that."""
+        """How far exposure goes, and its correction."""
         largest = np.nanmax(self.exposure) if np.isfinite(self.exposure).any() else 0.0
         if largest < LEAST_CHANGE_PERCENT:
             return "The cameras' exposure does not change between clips."

@@ -1,4 +1,4 @@
-"""What can be done about the training of one clip, as entries of its context menu, in timeline and training panel."""
+"""Commands for the training of one clip, as entries of its context menu, in timeline and training panel."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ GOING = ("preparing", "training", "paused")
 
 
 def train_label(status: ClipStatus) -> str:
-    """What training this clip would be."""
+    """Label for training this clip."""
     if status.state in ("trained", "damaged"):
         return "Retrain this clip"
     if status.state == "failed":

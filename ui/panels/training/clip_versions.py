@@ -19,7 +19,7 @@ MAX_DIFFERENCES = 6
 
 
 def version_text(version: VersionStatus) -> str:
-    """What a version is, in one line."""
+    """Description of a version, in one line."""
     psnr = version.held_out_psnr
     psnr = "" if psnr is None else f", {psnr_label(psnr, is_whole=version.held_out_whole)} dB"
     steps = f", {format_count(version.step)} steps" if version.step else ""

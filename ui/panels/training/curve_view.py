@@ -1,4 +1,4 @@
-"""CurveView: which curves are shown and which part of them: what the user chose in the plots of the training panel."""
+"""CurveView: which curves are shown and which part of them: the user's choice in the plots of the training panel."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class CurveView:
     pointer_step: float | None = None
 
     def toggle(self, clip_index: int) -> None:
-        """Show the curves of a clip, or not any more; the one chosen first gives way to one too many."""
+        """Show the curves of a clip, or no longer; the one chosen first gives way to one too many."""
         if clip_index in self.chosen:
             self.chosen.remove(clip_index)
         else:

@@ -25,13 +25,13 @@ MAX_PLOT_POINTS = 600
 LOWEST, HIGHEST = 84.0, 130.0
 """Height of a plot, units: as much as a panel has to spare."""
 ROOM_BELOW = 210.0
-"""For what comes below the plots, units."""
+"""For the parts below the plots, units."""
 MAX_MARKED = 30
 """Points; more of them stand so close that marks hide the line."""
 TICK_DISTANCE = 52.0
 ROW_DISTANCE = 24.0
 TICK_ROOM = 52.0
-"""What the numbers on the left and the margins take of a plot, units."""
+"""Room of a plot for the numbers on the left and the margins, units."""
 CLIP_HUES = (SKY, ORANGE, GREEN, PURPLE, VERMILLION, YELLOW)
 MENU_HEIGHT = 260.0
 HELP = "Wheel: zoom. Drag: move. Double click: everything."

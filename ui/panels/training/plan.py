@@ -1,4 +1,4 @@
-"""The plan of the next clip in the training panel: what it takes, and the main settings while they may change."""
+"""The plan of the next clip in the training panel: its cost, and the main settings while they may change."""
 
 from __future__ import annotations
 

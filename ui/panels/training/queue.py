@@ -77,7 +77,7 @@ def usage_text(usage: UsageStatus) -> str:
 
 
 def draw_train_all(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """The button that trains everything that is left, and what that takes; nothing where at most one clip is."""
+    """The button that trains everything that is left, and the cost; nothing where at most one clip is."""
     queue = session.queue
     everything, queued = queue.everything, queue.queued
     n_queued = 0 if queued is None else queued.n_clips

@@ -1,4 +1,4 @@
-"""The training panel: what runs, how fast, how well, what waits, and the buttons that start, pause and stop it."""
+"""The training panel: the running clip, its speed and quality, the waiting clips, and buttons for training."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
 
 
 def next_label(session: SessionView) -> str:
-    """What starts the next clip, with its icon: a clip that was stopped resumes where that was."""
+    """Label for starting the next clip, with its icon: a clip that was stopped resumes where that was."""
     index, step = session.training.next_clip_index, session.training.resume_step
     if index is None:
         is_all = all(state.state == "trained" for state in session.clip_states)
@@ -158,7 +158,7 @@ def anchors_text(n_inherited: int, n_own: int) -> str:
 
 
 def clip_note(status: ClipStatus) -> str:
-    """What the PSNR of a clip is over, and what was done about its exposure."""
+    """Pictures behind the PSNR of a clip, and the change of its exposure."""
     change = status.exposure_change
     lines = ["Not measured" if status.held_out_psnr is None else psnr_note(is_whole=status.held_out_whole)]
     lines += [f"Exposure {100.0 * change:.1f} % from the reference clip's, removed"] if change else []

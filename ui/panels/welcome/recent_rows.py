@@ -27,7 +27,7 @@ BUTTON = 28.0
 
 
 def open_recent(entry: RecentProject) -> OpenProject | OpenCapture:
-    """What opens an entry of the list of recent projects."""
+    """The command that opens an entry of the list of recent projects."""
     return OpenProject(entry.folder) if entry.project else OpenCapture(entry.folder, is_asking=True)
 
 

@@ -1,4 +1,4 @@
-"""Small pictures of what cameras took, kept on the GPU as long as they are looked at."""
+"""Small pictures from cameras, kept on the GPU as long as they are looked at."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Thumbnails:
         self._textures.clear()
 
     def draw(self, session: SessionView, camera_index: int, frame_index: int, box: Rect, ui: UiState) -> None:
-        """Draw what a camera took into a box, cut to its shape; a camera's sign until it is there."""
+        """Draw a camera's picture into a box, cut to its shape; a camera's sign until it is there."""
         texture = self._get(session, camera_index, frame_index, ui)
         draw = imgui.get_window_draw_list()
         if texture is None:

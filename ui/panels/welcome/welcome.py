@@ -1,4 +1,4 @@
-"""What the viewport shows before a capture is open: how to open one, and the sample."""
+"""The viewport before a capture is open: how to open one, and the sample."""
 
 from __future__ import annotations
 

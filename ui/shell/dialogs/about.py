@@ -1,4 +1,4 @@
-"""What the program is, and where its documents and its log are."""
+"""A description of the program, and where its documents and its log are."""
 
 from __future__ import annotations
 

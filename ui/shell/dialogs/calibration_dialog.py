@@ -49,7 +49,7 @@ ABOUT = (
 
 
 class CalibrationDialog:
-    """Owns what was chosen so far."""
+    """Owns the choices so far."""
 
     def __init__(self) -> None:
         self._folder: Path | None = None
@@ -246,7 +246,7 @@ def lines_below(result: CalibrationResult) -> list[str]:
 
 
 def _draw_failed_answers(ui: UiState, *, is_agreed: bool) -> Command | None:
-    """Enter closes: what has failed is kept only where that is chosen."""
+    """Enter closes: a failed calibration is kept only where that is chosen."""
     is_kept = imgui.button("Keep anyway", BUTTON)
     ui.mark("calibration.keep")
     imgui.set_item_tooltip("Writes capture.json with all cameras in use, for inspection.")

@@ -84,7 +84,7 @@ def _buttons(ui: UiState, yes: Sequence[tuple[str, str, Command]], no: str) -> C
 
 
 def clip_question_texts(question: ClipQuestion) -> list[str]:
-    """What the dialog says, paragraph by paragraph."""
+    """Text of the dialog, paragraph by paragraph."""
     match question:
         case CutQuestion():
             return _cut_texts(question)

@@ -22,7 +22,7 @@ from ui.style import theme
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 OPEN, CALIBRATE, READ_ONLY, RELOCATE = "open", "calibrate", "read only", "relocate"
-"""What a folder is asked for."""
+"""Purposes of asking for a folder."""
 _TITLES = {
     OPEN: "Open a capture or project folder",
     CALIBRATE: "Calibrate a folder of plain videos",

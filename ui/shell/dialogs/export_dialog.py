@@ -1,6 +1,6 @@
 """The dialog that asks what is exported, of which frames and where, and says beforehand what will be written.
 
-Enter exports where nothing is wrong, Escape closes. What is asked follows from the jobs: app.export.jobs.
+Enter exports where nothing is wrong, Escape closes. The questions follow from the jobs: app.export.jobs.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ MAX_RADIOS = 6
 
 
 class ExportDialog:
-    """Owns what was chosen so far."""
+    """Owns the choices so far."""
 
     def __init__(self) -> None:
         self._modal = Modal()

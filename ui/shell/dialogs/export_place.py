@@ -1,4 +1,4 @@
-"""Where an export goes, and what it comes to: the lower part of the export dialog."""
+"""Where an export goes, and its size: the lower part of the export dialog."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ExportPlace:
         return now.changed(out=found)
 
     def draw(self, choices: ExportChoices, ui: UiState) -> ExportChoices:
-        """Draw the field; returns the choices with what was typed or chosen."""
+        """Draw the field; returns the choices with the typed or chosen one."""
         label("Written to", imgui.get_style().window_padding.x)
         choices = self._take_native(choices, ui)
         imgui.set_next_item_width(-48 if self._has_native else -1)
@@ -84,7 +84,7 @@ class ExportPlace:
 
 
 def draw_plan(plan: ExportPlan | None, ui: UiState) -> None:
-    """What will be written, or what is wrong with it; None while that is looked at."""
+    """The planned export, or its fault. plan: None while it is being made."""
     if plan is None:
         text_wrapped_dim("Estimating the size ...")
         return

@@ -28,7 +28,7 @@ class ModalKeys:
 
 
 class Modal:
-    """Owns what was asked in the frame before, and whether a list was open in the dialog."""
+    """Owns the question of the frame before, and whether a list was open in the dialog."""
 
     def __init__(self) -> None:
         self._asked: object = None

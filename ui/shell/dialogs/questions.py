@@ -118,7 +118,7 @@ class QuestionDialogs:
             dispatch(answer)
 
     def leave(self, session: SessionView, dispatch: Dispatch) -> None:
-        """What Escape does, for a question that cannot be drawn: it would be asked for ever."""
+        """Answer as Escape does, for a question that cannot be drawn: it would be asked for ever."""
         if session.question is not None:
             dispatch(_closing(session.question))
 
@@ -185,7 +185,7 @@ class QuestionDialogs:
 
 
 def _closing(question: Question) -> Command:
-    """What Escape and the cross of a dialog mean."""
+    """The command for Escape and the cross of a dialog."""
     return CancelSaveAs() if isinstance(question, SavingQuestion) else CloseQuestion()
 
 
@@ -270,14 +270,14 @@ def _cancelled(ui: UiState) -> bool:
 
 
 def project_words(project: RecentProject, now: datetime, *, is_open: bool) -> str:
-    """What a row of the list says of a project: preset, how far it is trained, when it was open."""
+    """Words of a project's row in the list: preset, how far it is trained, when it was open."""
     preset = f"preset {project.preset}" if project.preset else ""
     when = "open now" if is_open else ago_text(project.opened, now)
     return ", ".join(filter(None, (preset, project.trained_text, when)))
 
 
 def leaving_texts(question: LeaveQuestion) -> list[str]:
-    """What the dialog says before a training is stopped by opening another project."""
+    """Text of the dialog before a training is stopped by opening another project."""
     step = ""
     if question.step:
         step = f", step {format_count(question.step)} of {format_count(question.n_steps)}"
@@ -292,7 +292,7 @@ def leaving_texts(question: LeaveQuestion) -> list[str]:
 
 
 def correction_texts(question: CorrectionQuestion) -> list[str]:
-    """What the dialog says before a capture is corrected, paragraph by paragraph."""
+    """Text of the dialog before a capture is corrected, paragraph by paragraph."""
     kept = " with its progress" if question.has_progress else ""
     return [
         f"{question.words}: this is written to capture.json in {question.capture}. No other file of the capture "
@@ -303,7 +303,7 @@ def correction_texts(question: CorrectionQuestion) -> list[str]:
 
 
 def retrain_texts(question: RetrainQuestion) -> list[str]:
-    """What the dialog says of the clip itself, paragraph by paragraph."""
+    """Text of the dialog about the clip itself, paragraph by paragraph."""
     clip = f"Clip {question.clip_index}"
     if question.is_damaged:
         texts = [
@@ -326,7 +326,7 @@ def retrain_texts(question: RetrainQuestion) -> list[str]:
 
 
 def outdated_text(question: RetrainQuestion) -> str:
-    """What the dialog says of the clips that depend on it."""
+    """Text of the dialog about the clips that depend on it."""
     n = len(question.outdated)
     listed = ", ".join(str(index) for index in question.outdated[:MAX_LISTED])
     more = f" and {n - MAX_LISTED} more" if n > MAX_LISTED else ""

@@ -20,7 +20,7 @@ Value = int | float | str | bool
 
 
 class SettingsDialog:
-    """Owns what was typed until it is answered."""
+    """Owns the typed settings until the dialog is answered."""
 
     def __init__(self) -> None:
         self._asked: SettingsQuestion | None = None

@@ -1,4 +1,4 @@
-"""The dialog for a project whose document or journal is damaged: what is wrong, and three ways to continue."""
+"""The dialog for a project whose document or journal is damaged: the fault, and three ways to continue."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Way:
     """One way to continue.
 
     Attributes:
-        title, detail: What it is and what it means.
-        command: What is sent for it.
+        title, detail: Its name and its consequences.
+        command: The command sent for it.
     """
 
     title: str
@@ -95,7 +95,7 @@ class RecoveryDialog:
         return answer
 
     def _draw_way(self, index: int, way: Way, ui: UiState) -> bool:
-        """A row: title and what it means. True when it is taken by a double click."""
+        """A row: title and its consequences. True when it is taken by a double click."""
         start, width = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
         flags = imgui.SelectableFlags_.allow_double_click | imgui.SelectableFlags_.no_auto_close_popups
         is_clicked = imgui.selectable(f"##way{index}", index == self._chosen, flags, ImVec2(width, ROW_HEIGHT))[0]

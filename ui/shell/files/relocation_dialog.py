@@ -16,7 +16,7 @@ BUTTON = ImVec2(170, 34)
 
 
 def relocation_texts(question: RelocationQuestion) -> list[str]:
-    """What the dialog says, paragraph by paragraph."""
+    """Text of the dialog, paragraph by paragraph."""
     texts = [f"The capture of this project is no longer at {question.capture}."]
     if question.refused is not None:
         texts.append(

@@ -20,7 +20,7 @@ BUTTON = ImVec2(170, 34)
 
 
 class SaveAsDialog:
-    """Owns what is typed."""
+    """Owns the typed text."""
 
     def __init__(self) -> None:
         self._text = ""

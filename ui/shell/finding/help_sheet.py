@@ -1,4 +1,4 @@
-"""The F1 sheet: every key and what the mouse does, with a search."""
+"""The F1 sheet: every key and the functions of the mouse, with a search."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ui.style import theme
 
 
 class HelpSheet:
-    """Owns what is searched for."""
+    """Owns the text searched for."""
 
     def __init__(self) -> None:
         self._typed = ""

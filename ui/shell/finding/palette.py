@@ -27,7 +27,7 @@ _FLAGS = (
 
 
 class ActionPalette:
-    """Owns what is typed and which row is chosen, as long as it is open."""
+    """Owns the typed text and the chosen row, as long as it is open."""
 
     def __init__(self) -> None:
         self._typed = ""
@@ -75,7 +75,7 @@ class ActionPalette:
         self._chosen, self._is_scroll_wanted = 0, True
 
     def _draw_inside(self, ui: UiState) -> PaletteEntry | None:
-        """Returns what was chosen."""
+        """Returns the chosen entry."""
         if self._is_new:
             self._is_new = False
             imgui.set_keyboard_focus_here()
@@ -156,7 +156,7 @@ class ActionPalette:
         return is_clicked
 
     def _mark_letters(self, draw: imgui.ImDrawList, text: str, positions: tuple[int, ...], at: ImVec2) -> None:
-        """A line below each letter that was meant: not told by colour alone."""
+        """A line below each letter that was meant: colour alone is not enough."""
         bottom = at.y + imgui.get_text_line_height() + 1
         for position in positions:
             if position < len(text):

@@ -1,4 +1,4 @@
-"""What the palette offers: every action of the table, and what depends on what is open: projects, cameras, clips, kept
+"""Entries of the palette: every action of the table, and those for things that are open: projects, cameras, clips, kept
 layouts.
 """
 
@@ -30,8 +30,8 @@ class PaletteEntry:
 
     Attributes:
         id: Its name among those that were used lately.
-        text: What it does.
-        group: What it belongs to.
+        text: Its effect in words.
+        group: The group it belongs to.
         keys: Its keys as text; empty where it has none.
         why_not: Why it cannot be run now; empty when it can.
         is_numbered: One of many that differ by a number; where there are too many of them, one has to be typed.

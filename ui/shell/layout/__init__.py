@@ -1,1 +1,1 @@
-"""Where panels are, and what the window remembers of that."""
+"""Where panels are, and the window's memory of that."""

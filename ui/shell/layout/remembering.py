@@ -1,4 +1,4 @@
-"""Brings back what the window looked like, and keeps it: layout, scale, marks, and each project's frame and view.
+"""Brings back the window's appearance, and keeps it: layout, scale, marks, and each project's frame and view.
 
 Written a while after something changed and when the window closes, so that a killed program has lost seconds of it.
 """
@@ -92,7 +92,7 @@ class Remembering:
             memory.keep_view(folder, view_of(session))
 
     def _take_over_markers(self, session: WindowSession, kept: dict[str, Any]) -> None:
-        """Markers that an earlier version has kept beside the project become part of it, once."""
+        """Markers that an earlier version has kept next to the project become part of it, once."""
         if session.edits.can_edit and not session.timeline.markers:
             gesture = self._ui.timeline.begin_gesture()
             for frame_index, text in markers_of(kept, session.timeline):

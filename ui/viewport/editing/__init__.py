@@ -1,1 +1,1 @@
-"""Editing over the picture: the tools that select, and how what is selected shows."""
+"""Editing over the picture: the tools that select, and how the selection shows."""

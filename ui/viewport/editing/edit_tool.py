@@ -1,4 +1,4 @@
-"""What the user does to edits in the picture and in the panel. State of the window; no ImGui, no GL."""
+"""Editing by the user, in the picture and in the panel. State of the window; no ImGui, no GL."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class EditTool:
         is_outside: Of a box or sphere that was drawn: whether everything outside of it is meant.
         gesture: Number of what is being done; see app.session.editing.edit_commands.
         held: The handle that is dragged; None while none is.
-        held_thing, held_at: What it belonged to when the drag began, and where in the picture that was, px.
+        held_thing, held_at: The thing it belonged to when the drag began, and where in the picture that was, px.
         has_dragged: Whether the drag has changed anything.
         pointed: The handle under the pointer; None without one.
-        asking: What points of the scene are being asked for; None while none are.
+        asking: Purpose of the scene points being asked for; None while none are.
         points: Those that were given, scene units, [3] each.
         length_m: Known length between two points, m.
         is_new: Whether the chosen edit was made just now, so that its details are brought into sight.
@@ -59,7 +59,7 @@ class EditTool:
     _pressed_s: float = -1e9
 
     def follow(self, edits: tuple[Edit, ...]) -> None:
-        """Drop what belongs to an edit that is gone."""
+        """Drop everything of an edit that is gone."""
         if self.chosen is not None and all(edit.edit_id != self.chosen for edit in edits):
             self.choose(None)
 
@@ -107,7 +107,7 @@ class EditTool:
             self.choose(None)
 
     def shown_thing(self, edit: Edit | None) -> Thing | None:
-        """What has handles of the chosen edit: the movement that it makes, else the box or sphere it acts on."""
+        """The part of the chosen edit with handles: the movement that it makes, else the box or sphere it acts on."""
         if edit is None:
             return None
         has_shape = isinstance(edit.target, Box | Sphere)

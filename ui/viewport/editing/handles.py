@@ -19,7 +19,7 @@ from engine.editing.actions import Quat, Transform, Vector
 from engine.editing.edit import Box, Sphere
 
 Thing = Box | Sphere | Transform
-"""What has handles: a place that an edit acts on, or the movement that it makes."""
+"""A thing with handles: a place that an edit acts on, or the movement that it makes."""
 HandleKind = Literal["face", "radius", "center", "arrow", "ring", "scale"]
 RING_PX, ARROW_PX, SCALE_PX = 62.0, 84.0, 112.0
 """How far from the middle rings, arrows and the handle that scales are seen, units."""
@@ -56,7 +56,7 @@ class Handle:
 
     @property
     def verb(self) -> str:
-        """What dragging it does."""
+        """The effect of dragging it, as a verb."""
         return {"face": "resize", "radius": "resize", "ring": "rotate", "scale": "scale"}.get(self.kind, "move")
 
 
@@ -67,7 +67,7 @@ class HandleView:
     Attributes:
         world_to_camera: Rigid map, OpenCV axes. [4, 4]
         K: Intrinsics in pixels of the picture. [3, 3]
-        near: What is nearer is not seen, scene units.
+        near: Nothing nearer is seen, scene units.
         pixels_per_unit: Of the picture, per unit in which handles are measured.
     """
 
@@ -136,7 +136,7 @@ def ring_of(thing: Thing, handle: Handle, lens: HandleView) -> np.ndarray:
 
 
 def handle_under(thing: Thing, lens: HandleView, x: float, y: float, *, reach_px: float) -> Handle | None:
-    """The handle under a pixel; None beside all of them. reach_px: How near the pointer has to be."""
+    """The handle under a pixel; None off all of them. reach_px: How near the pointer has to be."""
     best: tuple[float, Handle] | None = None
     for handle in handles_of(thing):
         is_ring = handle.kind == "ring"
@@ -160,7 +160,7 @@ def dragged(
     step: float = 0.0,
     is_whole: bool = False,
 ) -> Thing:
-    """What a drag makes of a thing. It stays where the drag means nothing.
+    """A thing after a drag. It stays where the drag means nothing.
 
     Args:
         thing: As it was when the drag began.

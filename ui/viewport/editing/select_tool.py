@@ -65,18 +65,18 @@ STANDING_SHARE = 0.95
 
 @dataclass(eq=False)
 class SelectTool:
-    """What the user selects with.
+    """The tool for selecting, and its settings.
 
     Attributes:
         kind: The tool in use; None while the pointer leads the view.
-        mode: What becomes of the selection while no modifier is held.
+        mode: How a drag changes the selection while no modifier is held.
         is_visible_only, is_by_extent, is_whole_anchors: See app.session.editing.selection_commands.
         brush_px: Radius of the brush, logical pixels.
         color_tolerance: Of the flood, 0..1.
         box_height: Of a box that is drawn, in lengths of its longer side on the surface.
         near_share: How far neighbours are apart at most, in distances between anchors.
         points: Of the drag in progress; empty without one. Logical pixels.
-        held_mode: What becomes of the selection in that drag.
+        held_mode: How that drag changes the selection.
         surface: Place on the surface where a volume began, scene units, [3]; None without one.
         volume: The box or sphere that was drawn last or typed; None before the first.
         attribute: Name of the one that the panel shows.
@@ -118,7 +118,7 @@ class SelectTool:
         self.kind = None if is_same else kind
 
     def leave(self) -> None:
-        """Drop what is being drawn; without that, put the tool away."""
+        """Drop the drawing in progress; without one, put the tool away."""
         if not self.is_dragging:
             self.kind = None
         self.points, self.surface = [], None
@@ -128,7 +128,7 @@ class SelectTool:
         return How(self.mode if mode is None else mode, self.is_whole_anchors)
 
     def mode_held(self, *, is_shift: bool, is_ctrl: bool, is_alt: bool) -> SelectMode:
-        """What becomes of the selection with these modifiers held."""
+        """How a drag changes the selection with these modifiers held."""
         if is_shift and (is_ctrl or is_alt):
             return "intersect"
         if is_shift:
@@ -186,7 +186,7 @@ class SelectTool:
     def volume_under(
         self, view: SeenFrom, low: tuple[float, float], density: float, up: np.ndarray
     ) -> Box | Sphere | None:
-        """What the drag means in space: a sphere around the place of the press, or a box that stands on the surface
+        """The volume of the drag in space: a sphere around the place of the press, or a box that stands on the surface
         there; None where nothing was pressed, or it is too small. Arguments as of `shape`; up: [3]"""
         if self.surface is None or len(self.points) < 2 or self.kind not in ("box", "sphere"):
             return None
@@ -211,7 +211,7 @@ class SelectTool:
     def command(
         self, view: SeenFrom, low: tuple[float, float], density: float, up: np.ndarray, spacing: float
     ) -> SelectInPicture | SelectVolume | SelectFlood | None:
-        """What the drag that ends now selects; None where it means nothing. spacing: Between anchors, scene units."""
+        """The command of the drag that ends now; None where it means nothing. spacing: Between anchors, scene units."""
         how = self.how(self.held_mode)
         shape = self.shape(low, density)
         if shape is not None:

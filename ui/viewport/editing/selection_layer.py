@@ -60,7 +60,7 @@ class SelectionLayer:
         return len(self._dots) == 0 and not self.is_share_shown
 
     def take(self, session: SessionView, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
-        """Take up what is selected now.
+        """Take up the present selection.
 
         Args:
             gaussians: Of the picture below; None where it is something else.
@@ -85,7 +85,7 @@ class SelectionLayer:
         return (*dots_key, id(share), self.pixels_per_unit)
 
     def draw(self, target: Target, view: SceneView) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         unit = self.pixels_per_unit
         if self.is_share_shown and self._share is not None:
             self._draw_share(target, view)

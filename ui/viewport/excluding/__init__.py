@@ -1,1 +1,1 @@
-"""Painting over what a camera took: the brush, and the hatching of what is painted."""
+"""Painting over a camera's picture: the brush, and the hatching of the painted part."""

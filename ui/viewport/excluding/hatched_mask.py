@@ -1,4 +1,4 @@
-"""Diagonal lines over what is painted, as segments in shares of a picture. Arithmetic only."""
+"""Diagonal lines over the painted part, as segments in shares of a picture. Arithmetic only."""
 
 from __future__ import annotations
 

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 POINT_SIZE = 5.0
 """Diameter, units."""
 ANCHOR_RANGES = {"E": (0.0, 8.0), "error": (0.0, 25.5)}
-"""What colours span, 1/255, one range for all frames: a mean over many pixels is lower than the worst of them."""
+"""Ranges of the colours, 1/255, one range for all frames: a mean over many pixels is lower than the worst of them."""
 FAINT_SHARE = 0.06
-"""Least opacity, of an anchor without any residual: what is hot has to stand out."""
+"""Least opacity, of an anchor without any residual: hot ones have to stand out."""
 
 
 def anchor_column(kind: str) -> str:
@@ -32,14 +32,14 @@ def anchor_column(kind: str) -> str:
 
 
 def shown_anchor_heat(session: SessionView) -> AnchorHeat | None:
-    """What is to be shown; None where no heat map is chosen, a camera is looked through, or nothing is there yet."""
+    """The heat to show; None where no heat map is chosen, a camera is looked through, or nothing is there yet."""
     if not session.overlays.heat or session.view.look_through is not None:
         return None
     return session.anchor_heat(anchor_column(session.overlays.heat))
 
 
 def heat_points(heat: AnchorHeat) -> tuple[np.ndarray, np.ndarray]:
-    """Places and colours of the anchors that were seen, the coldest first, so that nothing hides what is hot.
+    """Places and colours of the anchors that were seen, the coldest first, so that nothing hides the hot ones.
 
     Returns:
         [A', 3] float32 and RGBA in 0..1 [A', 4] float32
@@ -56,7 +56,7 @@ def heat_points(heat: AnchorHeat) -> tuple[np.ndarray, np.ndarray]:
 
 
 class AnchorHeatLayer:
-    """Owns what is drawn. GL thread only."""
+    """Owns the drawn points. GL thread only."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._points = PointRenderer(ctx)
@@ -74,7 +74,7 @@ class AnchorHeatLayer:
         return not self._is_shown
 
     def take(self, session: SessionView, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
-        """Take up the anchors' residuals; asks for what is missing.
+        """Take up the anchors' residuals; asks for missing ones.
 
         Args:
             gaussians: Of the picture below: what they hide is not drawn. None where it is something else.
@@ -97,6 +97,6 @@ class AnchorHeatLayer:
         return key
 
     def draw(self, target: Target, view: SceneView, opacity: float, pixels_per_unit: float) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         if self._is_shown:
             self._points.draw(target, *view.camera, shape="circle", size=POINT_SIZE * pixels_per_unit, opacity=opacity)

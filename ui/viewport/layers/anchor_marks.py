@@ -47,10 +47,10 @@ class AnchorMarks:
     counts: dict[str, int]
 
     def text(self, row: int, regions: Sequence[GateRegion] = ()) -> str:
-        """What an anchor is and why, in one to three lines; empty where unknown.
+        """Role of an anchor and its reason, in one to three lines; empty where unknown.
 
         Args:
-            regions: What is marked by now; the clip may have been trained before.
+            regions: Those marked by now; the clip may have been trained before.
         """
         if self.roles is None:
             return ""

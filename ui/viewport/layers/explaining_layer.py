@@ -1,5 +1,5 @@
-"""What explains a clip over its picture: the spheres that inherited anchors cover, how far residual anchors lie from
-them, and the trails of what moves.
+"""Explanations of a clip over its picture: the spheres that inherited anchors cover, how far residual anchors lie from
+them, and the trails of moving Gaussians.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ TRAIL_WIDTH = 1.6
 
 
 class ExplainingLayer:
-    """Owns what is drawn. GL thread only.
+    """Owns the drawn explanations. GL thread only.
 
     Attributes:
-        coverage: What is drawn of it; None where nothing is.
+        coverage: The part that is drawn; None where nothing is.
     """
 
     def __init__(self, ctx: moderngl.Context) -> None:
@@ -56,7 +56,7 @@ class ExplainingLayer:
         return self.coverage is None and self._trails is None
 
     def take(self, session: SessionView, view: SceneView) -> Hashable:
-        """Take up what belongs to the session's frame; gives a key that differs whenever what is drawn does."""
+        """Take up the explanations of the session's frame; gives a key that differs whenever the drawing does."""
         overlays = session.overlays
         self.coverage = session.shown_coverage() if overlays.show_coverage else None
         self._trails = session.shown_trails() if overlays.show_trails else None
@@ -73,7 +73,7 @@ class ExplainingLayer:
         return coverage_key, trails_key
 
     def draw(self, target: Target, view: SceneView, pixels_per_unit: float) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         if self.coverage is not None:
             self._outlines.draw(target, *view.camera, width_px=1.2 * pixels_per_unit, opacity=OUTLINE_OPACITY)
             size = DISTANCE_SIZE * pixels_per_unit

@@ -47,7 +47,7 @@ def camera_under(
     Args:
         world_to_camera: Of the view. [4, 4]
         K: Of the picture in which x and y are pixels. [3, 3]
-        near: What is nearer than this is not drawn, scene units.
+        near: Nothing nearer than this is drawn, scene units.
         reach_px: How near to a line the pointer has to be.
     """
     corners = frusta_lines(rig, frustum_size(rig))[0].astype(np.float64)  # two per line

@@ -53,7 +53,7 @@ class AnchorCounts:
     """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited.
 
     Attributes:
-        source: What they are of.
+        source: The picture source they are of.
         inherited_roles, residual_roles: Likewise by what they are; empty where unknown.
     """
 
@@ -66,7 +66,7 @@ class AnchorCounts:
 
 
 class MarkLayer:
-    """Owns what is drawn as marks. GL thread only.
+    """Owns the drawn marks. GL thread only.
 
     Attributes:
         counts: Of the anchors that were taken last.
@@ -148,11 +148,11 @@ class MarkLayer:
         return colors
 
     def _sort(self, anchors: AnchorArrays) -> None:
-        """Marks and counts of what is inherited and of what is the clip's own."""
+        """Marks and counts of inherited anchors and of the clip's own."""
         inherited = (anchors.inherited_positions, anchors.inherited_roles, anchors.inherited_reasons)
         own = (anchors.own_positions, anchors.own_roles, anchors.own_reasons)
         is_reference = len(inherited[0]) == 0
-        if is_reference:  # what the reference clip learns is what the others inherit
+        if is_reference:  # its own anchors are those that the others inherit
             inherited, own = own, inherited
         first = anchor_marks(*inherited, most=MAX_INHERITED_MARKS, color=INHERITED_ANCHOR_COLOR)
         second = anchor_marks(*own, most=MAX_RESIDUAL_MARKS, color=RESIDUAL_ANCHOR_COLOR)
@@ -167,7 +167,7 @@ class MarkLayer:
         )
 
     def draw(self, target: Target, view: SceneView, session: SessionView) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         overlays, unit = session.overlays, self.pixels_per_unit
         size, opacity = self._look(session)
         room = np.sqrt(view.width * view.height) / (ROOMY_SIDE * unit)

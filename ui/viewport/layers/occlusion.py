@@ -49,7 +49,7 @@ class OcclusionMap:
             gaussians: Of the picture.
             world_to_camera: Rigid map, OpenCV axes. [4, 4]
             K: Intrinsics in pixels of width x height. [3, 3]
-            near: What is nearer than this is not drawn, whatever the Gaussians say. Scene units
+            near: Nothing nearer than this is drawn, whatever the Gaussians say. Scene units
             set_back: How much farther away the camera stands than it seems to, scene units.
         """
         self._choose(gaussians)

@@ -69,7 +69,7 @@ class PathLayer:
         return self.shown_path(session) is None
 
     def take(self, session: SessionView) -> Hashable:
-        """Take up what is to be drawn. Returns a key that differs whenever that does."""
+        """Take up the path to draw. Returns a key that differs whenever the drawing does."""
         path = self.shown_path(session)
         if path is None:
             return None
@@ -108,7 +108,7 @@ class PathLayer:
         )
 
     def draw(self, target: Target, view: SceneView, session: SessionView) -> None:
-        """Draw over what the target holds."""
+        """Draw over the contents of the target."""
         if self.is_empty(session):
             return
         unit = self.pixels_per_unit

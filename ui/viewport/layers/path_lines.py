@@ -17,7 +17,7 @@ SAMPLES, MOST_PER_PIECE, LEAST_PER_PIECE = 256, 24, 6
 PICTURE_SIZE = (160, 90)
 """Shape of the pictures at the keys."""
 MOST_PYRAMIDS = 400
-"""Keys beyond this number have no pyramid: nobody could tell them apart."""
+"""Keys beyond this number have no pyramid: nobody could distinguish them."""
 
 
 def path_line(path: CameraPath) -> np.ndarray:
@@ -73,7 +73,7 @@ def key_under(
     Args:
         world_to_camera: Of the view. [4, 4]
         K: Of the picture in which x and y are pixels. [3, 3]
-        near: What is nearer than this is not drawn, scene units.
+        near: Nothing nearer than this is drawn, scene units.
         reach_px: How near to the point the pointer has to be.
     """
     if not keys:

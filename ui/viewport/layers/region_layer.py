@@ -63,7 +63,7 @@ class RegionLayer:
             thing.release()
 
     def take(self, shown: ShownRegions, anchors: AnchorArrays | None, eye: np.ndarray) -> Hashable:
-        """Take what is to be drawn, as seen from somewhere. Returns a key that differs whenever the picture would.
+        """Take the regions to draw, as seen from somewhere. Returns a key that differs whenever the picture would.
 
         Args:
             anchors: Of the shown frame; needed for the chosen sphere only.
@@ -100,7 +100,7 @@ class RegionLayer:
         return key
 
     def draw(self, target: Target, camera: tuple[Any, ...]) -> None:
-        """Draw what was taken. camera: Of ui.viewport.scene.SceneView."""
+        """Draw the regions taken. camera: Of ui.viewport.scene.SceneView."""
         self._anchors.draw(target, *camera, shape="circle", size=4.5, outline_px=1.0, opacity=0.9)
         for lines, halo, width_px in zip(self._lines, self._halos, (THIN_PX, THICK_PX), strict=True):
             halo.draw(target, *camera, width_px=width_px + HALO_PX, opacity=0.45)

@@ -15,7 +15,7 @@ N_SEGMENTS, N_EDGE_SEGMENTS = 64, 24
 N_SMALL_DASH, N_LARGE_DASH = 4, 2
 """Segments of a dash, and of the gap after it, for regions that look small and for large ones."""
 LARGE_SHARE = 0.1
-"""What is larger than this share of its distance looks large."""
+"""Regions larger than this share of their distance look large."""
 BACK_ALPHA = 0.35
 
 

@@ -1,4 +1,4 @@
-"""Actions on the clip under the playhead: versions, cuts, the reference, and what is out of date."""
+"""Actions on the clip under the playhead: versions, cuts, the reference, and clips that are out of date."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from ui.panels.state import Dispatch, UiState
 
 
 def _mend_seam(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """Ask about the seam that is played around, else about the nearest one; what is asked already begins."""
+    """Ask about the seam that is played around, else about the nearest one; a question already asked is started."""
     timeline = session.timeline
     clips, around = timeline.clips, timeline.around
     frame = timeline.frame_index if around is None else (around[0] + around[1]) / 2

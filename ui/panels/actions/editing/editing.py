@@ -25,7 +25,7 @@ def _make(making: Making) -> Run:
 
 
 def _show_again(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """Switch off what was hidden last."""
+    """Switch off the edit that hid something last."""
     for edit in reversed(session.edits.edits):
         if edit.is_on and isinstance(edit.action, Hide):
             dispatch(ToggleEdit(edit.edit_id))

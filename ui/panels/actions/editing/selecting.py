@@ -1,4 +1,4 @@
-"""Actions that select: tools, and what becomes of the selection."""
+"""Actions that select: tools, and changes of the selection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Actions on what is shown beside or over the picture."""
+"""Actions on things shown next to or over the picture."""
 
 from __future__ import annotations
 

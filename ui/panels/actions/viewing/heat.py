@@ -10,7 +10,7 @@ from ui.panels.actions.viewing.view import nearest_camera
 from ui.panels.state import Dispatch, UiState
 
 FIRST_KIND = "E"
-"""What is shown where none was chosen before: flicker is what one looks for in a clip stream."""
+"""The kind shown where none was chosen before: flicker is what one looks for in a clip stream."""
 
 
 def _toggle(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:

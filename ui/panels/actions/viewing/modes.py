@@ -1,4 +1,4 @@
-"""Actions on what colours mean, and on which part of a clip is drawn."""
+"""Actions on the meaning of colours, and on the drawn part of a clip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Actions on how the view is turned, what it frames, and its lens."""
+"""Actions on the view's direction, framing and lens."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ui.panels.state import Dispatch, UiState
 LEAN_STEP = math.radians(5.0)
 FOV_STEP = 1.1
 ANCHOR_SHARE = 0.04
-"""What is framed around an anchor, as a share of the scene's radius."""
+"""Size of the part framed around an anchor, as a share of the scene's radius."""
 _AXIS_KEYS = {
     "front": ("Num 1", "Alt+1"),
     "back": ("Ctrl+Num 1", "Ctrl+Alt+1"),

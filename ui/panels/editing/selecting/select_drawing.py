@@ -1,4 +1,4 @@
-"""What a tool that selects draws over the picture: its shape, its size under the pointer, and its hint."""
+"""Drawings of a selecting tool over the picture: its shape, its size under the pointer, and its hint."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ui.viewport.scene import SceneView
 
 N_SEGMENTS = 48
 WIDTH, RIM_WIDTH = 1.6, 3.6
-"""What the axes in the upper right corner take."""
+"""Of lines, and of their dark rims, units."""
 LEAST_SHARE = 0.02
 """Of the distance of what is drawn: lines nearer to the eye than this are cut off."""
 
@@ -46,7 +46,7 @@ def draw_tool(
 
 
 def draw_hint(draw: imgui.ImDrawList, tool: SelectTool, area: Rect) -> None:
-    """In the upper left corner of an area: what the tool does, and below where there is no room beside."""
+    """In the upper left corner of an area: the tool in use, and its keys next to it or below."""
     if tool.kind is None:
         return
     mode = tool.held_mode if tool.is_dragging else tool.mode

@@ -1,4 +1,4 @@
-"""The selection panel: what is selected, the tools that select, and what can be done with it by buttons and numbers."""
+"""The selection panel: the selection, the tools that select, and commands on the selection by buttons and numbers."""
 
 from __future__ import annotations
 

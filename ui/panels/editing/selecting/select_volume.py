@@ -20,7 +20,7 @@ LARGEST = 1e6
 
 
 def draw_volume_numbers(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """Numbers of the volume, and what is done with them."""
+    """Numbers of the volume, and the commands that use them."""
     tool, width = ui.selecting, (imgui.get_content_region_avail().x - 4) / 2
     for name in ("box", "sphere"):
         if name == "sphere":

@@ -18,7 +18,7 @@ SLIDER_WIDTH = 120.0
 
 
 def compare_words(session: SessionView) -> str:
-    """What the box says."""
+    """Label of the box."""
     shown = shown_compare(session)
     return "Compare" if shown == "off" else COMPARE_WORDS[shown]
 

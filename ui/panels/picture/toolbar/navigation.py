@@ -1,4 +1,4 @@
-"""The popup of the toolbar on how one looks: lens, axes, what is up, and the bookmarks of the project."""
+"""The popup of the toolbar on how one looks: lens, axes, the upward direction, and the bookmarks of the project."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ViewPopup:
         self._has_frame = False
 
     def draw_button(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-        """The button of the toolbar, and what it opens."""
+        """The button of the toolbar, and its popup."""
         if imgui.button(f"{Icon.COMPASS}##look") or ui.is_view_popup_wanted:
             ui.is_view_popup_wanted = False
             imgui.open_popup(POPUP)

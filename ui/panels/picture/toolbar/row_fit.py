@@ -1,4 +1,4 @@
-"""What of a row of widgets fits into its width: how wide each is, and which have to go into a menu at its end."""
+"""The part of a row of widgets that fits its width: how wide each is, and which go into a menu at its end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RowFit:
-    """What a row shows.
+    """Contents of a row.
 
     Attributes:
         style: Number of the style of which everything is; 0 is the roomiest.
@@ -31,7 +31,7 @@ def fit_row(
         room: Of the row, units.
         gap: Between two widgets.
         menu: Width of the button that shows what is hidden.
-        can_hide: What can be hidden, first what is missed least.
+        can_hide: Widgets that can be hidden, those missed least first.
     """
     for number, widths in enumerate(styles):
         if _total(widths, gap) <= room:

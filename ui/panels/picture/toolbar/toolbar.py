@@ -1,4 +1,4 @@
-"""The row over the picture: which camera, what it is compared with, what is shown over it, and marking."""
+"""The row over the picture: which camera, the comparison, the overlays, and marking."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MARK_SLIDER = imgui.SliderFlags_.always_clamp
 STYLES = ((True, True), (False, True), (False, False))
 """Whether buttons have words, and whether boxes have arrows however short their word is; the roomiest first."""
 HIDDEN_FIRST = ("views", "heat", "compare", "mark")
-"""What goes into the menu at the end of the row where there is no room for it."""
+"""Parts that go into the menu at the end of the row where there is no room for them."""
 HIDDEN_WORDS = {"compare": "Compare", "heat": "Heat map", "views": "Views"}
 HIDDEN_X = 90.0
 BOX = 150.0
@@ -37,7 +37,7 @@ BOX = 150.0
 
 
 def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: ViewPopup) -> None:
-    """The row of choices over the picture; what has no room is in a menu at its end."""
+    """The row of choices over the picture; those without room are in a menu at its end."""
     imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + GAP, imgui.get_cursor_pos_y() + 6))
     room = imgui.get_content_region_avail().x - GAP
     words = {
@@ -54,7 +54,7 @@ def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: V
     boxes = [name for name in words if name in fit.widths]
 
     def box(name: str) -> float:
-        """Width of a box: what it needs, and its part of what is left; less than it needs in a very narrow row."""
+        """Width of a box: its least width, and its part of the rest; less than it needs in a very narrow row."""
         more = free / len(boxes) if has_arrows or free < 0.0 else 0.0  # a wider one would get an arrow
         return min(fit.widths[name] + more, max(fit.widths[name], BOX))
 
@@ -85,7 +85,7 @@ def draw_toolbar(session: SessionView, dispatch: Dispatch, ui: UiState, popup: V
 
 
 def _widths(words: dict[str, str], is_wordy: bool, has_arrows: bool) -> dict[str, float]:
-    """What each part of the row needs in a style, in its order."""
+    """Width of each part of the row in a style, in its order."""
     widths = {name: box_width(text, has_arrow=has_arrows) for name, text in words.items()}
     widths["show"] = _button_width(f"{Icon.EYE}  Show" if is_wordy else Icon.EYE)
     widths["look"] = _button_width(Icon.COMPASS)
@@ -99,7 +99,7 @@ def _button_width(label: str) -> float:
 
 
 def _draw_more(session: SessionView, dispatch: Dispatch, ui: UiState, hidden: tuple[str, ...]) -> None:
-    """The button at the end of the row, and what it shows."""
+    """The button at the end of the row, and its menu."""
     if imgui.button(f"{Icon.MORE}##more"):
         imgui.open_popup("more")
     ui.mark("viewport.more")
@@ -143,7 +143,7 @@ def _draw_camera_box(session: SessionView, dispatch: Dispatch, ui: UiState, widt
         if imgui.selectable("Free", shown is None)[0]:
             dispatch(LookThrough(None))
         for index, name in enumerate(names):
-            imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would tell apart
+            imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would distinguish
             is_chosen = imgui.selectable("##camera", shown == index)[0]
             ui.mark(f"viewport.camera{index}")
             imgui.same_line(0, 0)
@@ -226,7 +226,7 @@ _CLAMPED = imgui.SliderFlags_.always_clamp
 
 
 def heat_words(session: SessionView) -> str:
-    """What the box says."""
+    """Label of the box."""
     return HEAT_KINDS[session.overlays.heat].label if session.overlays.heat else "Heat"
 
 
@@ -254,7 +254,7 @@ def draw_heat_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: 
 
 
 def mode_words(session: SessionView) -> str:
-    """What the box says: the mode, or the part of a clip and then the mode."""
+    """Label of the box: the mode, or the part of a clip and then the mode."""
     overlays = session.overlays
     words = MODES[overlays.mode].label
     if overlays.content == ALL:
@@ -267,7 +267,7 @@ def draw_mode_box(session: SessionView, dispatch: Dispatch, ui: UiState, width: 
     overlays = session.overlays
     imgui.set_next_item_width(width)
     is_plain = overlays.mode == COLOR and overlays.content == ALL
-    if not is_plain:  # what is seen is not the scene: that should be noticed
+    if not is_plain:  # not the plain scene: that should be noticed
         imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.YELLOW))
     is_open = imgui.begin_combo("##mode", box_words(mode_words(session), width), box_flags(width))
     if not is_plain:

@@ -38,7 +38,7 @@ def clips_in_sight(session: SessionView, scale: TimeScale) -> tuple[int, int]:
 
 
 def draw_clip_lane(stage: TimelineStage, session: SessionView) -> None:
-    """Bands or runs of what is in sight, and the note of the clip under the pointer."""
+    """Bands or runs in sight, and the note of the clip under the pointer."""
     first, stop = clips_in_sight(session, stage.scale)
     if first == stop:
         return
@@ -87,7 +87,7 @@ def state_runs(
 
 
 def _band(stage: TimelineStage, session: SessionView, first: int, last: int) -> Rect:
-    """What is in sight of a band, so that its words are, too."""
+    """The visible part of a band, so that its words are visible, too."""
     row, scale = stage.rows[CLIPS], stage.scale
     x0 = max(scale.left_of(session.clips[first].start) + 1, scale.x0)
     x1 = min(scale.left_of(session.clips[last].stop) - 1, scale.x1)

@@ -1,4 +1,4 @@
-"""Figures of all clips as columns, and columns thinned to what a screen can show. Arithmetic only."""
+"""Figures of all clips as columns, and columns thinned for the screen. Arithmetic only."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def shown_ratio(seam: SeamStatus) -> float | None:
 
 
 def provisional_text(seam: SeamStatus) -> str:
-    """What is known of a seam of which cameras are missing; empty of others."""
+    """Figures so far of a seam whose cameras are incomplete; empty for others."""
     if not seam.is_provisional or seam.ratio is None:
         return ""
     return f"~{seam.ratio:.1f} ({seam.n_cameras} of {seam.n_all} cameras)"

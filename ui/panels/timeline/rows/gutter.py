@@ -53,7 +53,7 @@ def draw_gutter(rows: dict[str, Rect], x: float, session: SessionView, ui: UiSta
 
 
 def _draw_unit(cell: Rect, session: SessionView, ui: UiState) -> None:
-    """The unit of the ruler, and the button of the lanes beside it."""
+    """The unit of the ruler, and the button of the lanes next to it."""
     draw, view = imgui.get_window_draw_list(), ui.timeline
     imgui.set_cursor_screen_pos(cell.low)
     if imgui.invisible_button("unit", ImVec2(cell.width - LANES_BUTTON, cell.height)):

@@ -51,7 +51,7 @@ def window_rect(shown: TimeRange, whole: TimeScale, row: Rect) -> Rect:
 
 
 def _drag(view: TimelineView, whole: TimeScale, timeline: Timeline) -> None:
-    """Hold the window where it was taken, or bring its middle under the pointer where it was pressed beside it."""
+    """Hold the window where it was taken, or bring its middle under the pointer where it was pressed outside of it."""
     if not (imgui.is_item_active() or imgui.is_item_deactivated()):
         view.overview_grip = None
         return

@@ -64,7 +64,7 @@ def _draw_key(stage: TimelineStage, index: int, x: float, y: float, *, is_chosen
 
 
 def keys_in_sight(stage: TimelineStage, path: CameraPath) -> range:
-    """Numbers of the keys between the ends of what is shown."""
+    """Numbers of the keys within the shown part."""
     frames = np.array([key.frame for key in path.keys])
     shown = stage.scale.shown
     first, stop = np.searchsorted(frames, [shown.start - 0.5, shown.stop + 0.5])

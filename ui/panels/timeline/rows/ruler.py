@@ -1,4 +1,4 @@
-"""The ruler: ticks in the chosen unit, what is played, the playhead, and a line under the pointer."""
+"""The ruler: ticks in the chosen unit, the frames played, the playhead, and a line under the pointer."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def seams_in_sight(stage: TimelineStage, session: SessionView) -> list[tuple[int
 
 
 def draw_seam_lane(stage: TimelineStage, session: SessionView) -> None:
-    """The marks in sight, and what is known of the one under the pointer."""
+    """The marks in sight, and a note on the one under the pointer."""
     row = stage.rows[SEAMS]
     marks = seams_in_sight(stage, session)
     for place, (clip_index, ratio) in enumerate(marks):

@@ -30,11 +30,11 @@ _FIT_CHOICES: dict[FrameFit, str] = {
     "cropped_start": "Cropped left and above",
     "cropped_middle": "Cropped on both sides",
 }
-"""What may have become of frames of another shape than their calibration."""
+"""Possible changes to frames of another shape than their calibration."""
 
 
 class AnswersForm:
-    """Owns what was answered until it is taken. `answers` is always possible; see `CaptureOpening.problem`."""
+    """Owns the answers until they are taken. `answers` is always possible; see `CaptureOpening.problem`."""
 
     def __init__(self) -> None:
         self._page: OpeningPage | None = None
@@ -47,7 +47,7 @@ class AnswersForm:
         self._pointed: str | None = None
 
     def begin(self, page: OpeningPage) -> None:
-        """Begin with what is offered, once for each page."""
+        """Begin with the offered answers, once for each page."""
         if page is self._page:
             return
         self._page, answers = page, page.answers
@@ -188,7 +188,7 @@ class AnswersForm:
 
 
 def forecast_lines(found: OpeningForecast, *, is_final: bool) -> list[str]:
-    """What the dialog says of a forecast."""
+    """Text of the dialog about a forecast."""
     if found.total_s is None:
         time = "not known before the first clip has begun" if is_final else "measuring this machine ..."
     else:

@@ -46,12 +46,12 @@ LEAST_PICTURE_WIDTH, PICTURE_SHAPE = 120.0, 0.62
 """Of the small pictures: units, and height by width."""
 WORD_WIDTH = 92.0
 INDENT = 23.0
-"""Of what belongs to words behind a sign."""
+"""Of the parts that belong to words after a sign."""
 MORE = 'Once it is open, "Examine the capture" checks the pictures, too.'
 
 
 class OpeningDialog:
-    """Owns what was answered so far, and textures of small pictures. GL thread only.
+    """Owns the answers so far, and textures of small pictures. GL thread only.
 
     Args:
         make_texture: Makes an empty texture.
@@ -71,7 +71,7 @@ class OpeningDialog:
         self._textures.clear()
 
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-        """Draw the dialog, if there is something to be asked or told."""
+        """Draw the dialog, if there is a question or a message."""
         opening = session.opening
         shown = opening.page or opening.refused
         is_new = shown is not self._shown
@@ -161,7 +161,7 @@ class OpeningDialog:
         self._draw_pictures(report, opening.pictures, ui)
 
     def _draw_pictures(self, report: CaptureReport, pictures: Mapping[int, Picture], ui: UiState) -> None:
-        """What each camera took first, side by side."""
+        """The first picture of each camera, side by side."""
         spacing = 8.0
         room = imgui.get_content_region_avail().x - 4
         n_columns = max(int((room + spacing) / (LEAST_PICTURE_WIDTH + spacing)), 1)

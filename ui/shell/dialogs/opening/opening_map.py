@@ -47,7 +47,7 @@ def draw_map(report: CaptureReport, holdout: frozenset[str], box: Rect, ui: UiSt
     """Draw it into a box.
 
     Args:
-        pointed: Name of the camera that stands out, as in the list beside the map.
+        pointed: Name of the camera that stands out, as in the list next to the map.
     Returns:
         The camera that was clicked, None without a click.
     """

@@ -1,4 +1,4 @@
-"""Why a folder does not open, and what helps: its videos are calibrated, or files outside of it are allowed."""
+"""Why a folder does not open, and the remedy: its videos are calibrated, or files outside of it are allowed."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from ui.style.theme import Icon
 BUTTON = ImVec2(150, 34)
 MAX_NAMED = 4
 INDENT = 34.0
-"""Of what belongs to words behind a dot."""
+"""Of the parts that belong to words after a dot."""
 ALLOW = "Open it, the files are mine"
 
 
 def draw_refused(
     found: RefusedFolder, ui: UiState, *, is_agreed: bool
 ) -> CloseQuestion | LookAtVideos | OpenCapture | None:
-    """Draw all of the dialog; returns what was answered. is_agreed: Enter was pressed."""
+    """Draw all of the dialog; returns the answer. is_agreed: Enter was pressed."""
     width = imgui.get_content_region_avail().x
     if imgui.begin_child("why", ImVec2(0, -(BUTTON.y + 18)), imgui.ChildFlags_.nav_flattened):
         push_bold(ui, ui.fonts.body_size + 2)
@@ -76,7 +76,7 @@ def draw_refused(
         return CloseQuestion() if is_closed or is_agreed else None
     is_closed = imgui.button("Close", BUTTON)
     ui.mark("refused.close")
-    if found.needs_links:  # nothing that Enter does by itself
+    if found.needs_links:  # Enter alone does not do it
         imgui.set_item_default_focus()
     imgui.same_line()
     if found.needs_links:
