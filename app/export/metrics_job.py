@@ -44,7 +44,7 @@ _WHICH: tuple[tuple[Choice, Precision], ...] = (
     ("quick", "float"),
     ("quick", "8bit"),
 )
-"""What may be kept of a picture; the first that is there counts."""
+"""Kinds of figures that may be kept of a picture; the first that is there counts."""
 
 
 def estimate(opened: TrainedProject, job: MetricsJob) -> ExportEstimate:
@@ -96,7 +96,7 @@ class _Chosen:
         self.said: tuple[str, ...] = ()
 
     def lines(self) -> tuple[str, ...]:
-        """What the user should know beforehand."""
+        """Sentences that the user should know beforehand."""
         n = len(self.untrained)
         if not n:
             return ()

@@ -36,7 +36,7 @@ class Share:
         weight: All weights of a moment add up to 1.
         trained: The clip, for its colours and near plane.
         clip_time: In it.
-        gaussians: What is drawn.
+        gaussians: The Gaussians to draw.
     """
 
     weight: float
@@ -52,7 +52,7 @@ class SceneFrames:
         opened: A project opened for reading.
         n_threads: Threads to decode with; None for all.
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
-        edits: What is applied; None for the edits of the project, empty for the scene as it was trained.
+        edits: Edits to apply; None for the edits of the project, empty for the scene as it was trained.
     """
 
     def __init__(
@@ -167,12 +167,12 @@ class SceneFrames:
             frame: In frames of the capture; its field is evaluated there.
             part: "static": what stands still in the whole clip, "moving": the rest, "all": both.
         Raises:
-            ProjectError: What `trained` raises; an edit is damaged.
+            ProjectError: As `trained`; an edit is damaged.
         """
         return self._part(frame, part).decode(self.clip_time(frame), self.effects(frame)).gaussians
 
     def shares(self, frame: float) -> Iterator[Share]:
-        """What is shown of a moment, to be drawn one by one and mixed by weight.
+        """The parts of a moment's picture, to be drawn one by one and mixed by weight.
 
         Anchors of what moves stand still and exist at some frames only, and a clip ends with its last frame. Between
         two frames the field is evaluated at the moment itself, but what exists at the frame before fades out while what
@@ -180,7 +180,7 @@ class SceneFrames:
         one fades into the first frame of the other, where both are trained.
 
         Raises:
-            ProjectError: What `trained` raises.
+            ProjectError: As `trained`.
         """
         before, effects = math.floor(frame), self.effects(frame)
         fraction = frame - before

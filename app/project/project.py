@@ -72,12 +72,12 @@ class Project:
 
     @property
     def document(self) -> ProjectDocument:
-        """What the project is made to be."""
+        """The project's present document."""
         return self.history.present
 
     @property
     def settings(self) -> ProjectSettings:
-        """What every clip has in common."""
+        """The settings that all clips share."""
         return self.history.present.settings
 
     @property
@@ -92,7 +92,7 @@ class Project:
 
     @property
     def prep_dir(self) -> Path:
-        """What clips share."""
+        """The folder of files that clips share."""
         return self.folder / PREP
 
     @property

@@ -60,7 +60,7 @@ def copy_project(project: Project, target: Path, report: Callable[[float, str], 
 
 
 def copy_bytes(project: Path) -> int:
-    """What a copy takes at most, bytes."""
+    """The most that a copy takes, bytes."""
     return sum(size for _, size in _files(project))
 
 

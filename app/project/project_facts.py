@@ -1,4 +1,4 @@
-"""What a project's files say without its capture: settings, trained clips, how long they took and what they weigh."""
+"""Facts of a project from its files, without its capture: settings, trained clips, how long they took and what they weigh."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> P
 
     Args:
         name: Of the result.
-        leave_out_damaged: List files of clips that cannot be read beside the others, as long as there are others.
+        leave_out_damaged: List unreadable files of clips apart from the others, as long as there are others.
 
     Raises:
         ProjectError: It is not a project, nothing is trained yet, or a clip cannot be read.

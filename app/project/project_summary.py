@@ -1,4 +1,4 @@
-"""What a project folder holds, in bytes, for `clipgstream inspect PROJECT`: per clip and component, and what a minute
+"""The size of a project folder, in bytes, for `clipgstream inspect PROJECT`: per clip and component, and of a minute
 of video comes to. Reads headers only; the figures are those of the report page."""
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ class RecentProject:
 
     @property
     def folder(self) -> Path:
-        """What is opened: the project where it is known."""
+        """The folder to open: the project where it is known."""
         return Path(self.project or self.capture)
 
     @property
@@ -76,7 +76,7 @@ def with_entry(entries: Sequence[RecentProject], entry: RecentProject) -> list[R
 
 
 def missing_folders(entries: Iterable[RecentProject]) -> frozenset[Path]:
-    """Folders of entries that are not there any more. Asks the disk."""
+    """Folders of entries that no longer exist. Asks the disk."""
     return frozenset(entry.folder for entry in entries if not _is_there(entry))
 
 

@@ -47,7 +47,7 @@ def moment_files(name: str, suffix: str, frames: Sequence[int], part: WrittenPar
 
 
 def static_file(name: str, suffix: str, frame: int | None, n_frames: int) -> GaussianFile:
-    """What stands still from a frame on; None where it is the same in all frames, and has no number."""
+    """The file of still parts from a frame on; of None, where they are the same in all frames, without a number."""
     end = "" if frame is None else f"_{_number(frame, n_frames)}"
     return GaussianFile(f"{name}_static{end}{suffix}", frame or 0, "static")
 

@@ -44,7 +44,7 @@ class GaussianSequence:
     Args:
         scene: Where frames come from.
         frames: Of the capture, at least one.
-        part: What is written of each.
+        part: The part of each frame to write.
         kind: The format.
         placement: Where the scene lies in the files.
         n_threads: To write with; no more than a few are of use.
@@ -139,7 +139,7 @@ class GaussianSequence:
         return min((value for written in self.files for value in (written.psnr_db or {}).values()), default=None)
 
     def document(self) -> dict[str, Any]:
-        """What is written beside the files."""
+        """The document that is written next to the files."""
         return {
             "schema": SCHEMA,
             "program": "ClipGStream Studio",

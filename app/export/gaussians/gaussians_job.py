@@ -1,5 +1,5 @@
 """Frames of a trained project as files of Gaussians: a folder with a file per frame, read back and measured, and a
-document beside them that says what they are."""
+document next to them that describes them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     started_s = time.monotonic()
     scene = _scene(opened, job)
     frames = _frames(scene, job)
-    n_threads = use_threads(None)  # of this process: a job beside a training has but one
+    n_threads = use_threads(None)  # of this process: next to a training, a job has but one
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job), n_threads=n_threads)
     check_target(job.out, opened=opened, is_folder=True)
     report(ExportProgress(0, len(frames), message="Checking the clips"))

@@ -1,4 +1,4 @@
-"""ReadBack: an exported file of Gaussians is read again and looked at beside the live scene, from capture cameras."""
+"""ReadBack: an exported file of Gaussians is read again and compared with the live scene, from capture cameras."""
 
 from __future__ import annotations
 

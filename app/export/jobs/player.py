@@ -11,7 +11,7 @@ from engine.setting import Flag
 
 
 class PlayerJob(ExportJob, frozen=True):
-    """What is asked for: an HTML page."""
+    """An export of a player to an HTML page."""
 
     kind: ClassVar[str] = "player"
     title: ClassVar[str] = "Player"

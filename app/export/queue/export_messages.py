@@ -1,4 +1,4 @@
-"""What the window hears of an export."""
+"""The window's messages about an export."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ STAGE = "Rendering"
 
 @dataclass(frozen=True, slots=True)
 class WrittenVideo:
-    """What was written.
+    """The written video or sequence of pictures.
 
     Attributes:
         out: The file, or the folder of a sequence.
@@ -40,7 +40,7 @@ class WrittenVideo:
         fps: Pictures per second.
         n_bytes: Size of the file, or of all of them.
         depth_unit: Scene units per level of 16-bit depths; None where none were written.
-        notes: What was done otherwise than asked for, in sentences.
+        notes: Differences from what was asked for, in sentences.
     """
 
     out: Path

@@ -33,7 +33,7 @@ class ClipRecord:
 
     Attributes:
         state: untrained; stopped, with a checkpoint that its training continues from; trained; stale, trained on
-            something that is not there any more; damaged, a finished clip that cannot be read.
+            something that no longer exists; damaged, a finished clip that cannot be read.
         step, n_steps: Of the state that is shown.
         held_out_psnr: dB: an evaluation's where there is one, else what the training measured last; None when not
             measured.
@@ -45,7 +45,7 @@ class ClipRecord:
         reason: Why it is stale or damaged, what became of its checkpoint, or that it was trained with other pictures;
             empty otherwise.
         blocked_by: A damaged clip without which this one cannot be trained.
-        seconds: What it took when it was trained; None where not recorded.
+        seconds: Duration of its training; None where not recorded.
         exposure_change: How far the cameras' exposure is from the reference clip's, a share; None where not known.
         n_anchors: Inherited ones, and those of the clip itself; zeros where the file does not say.
         origin: By which edits name the anchors of a trained clip, see ClipHeader.origin; empty of others.

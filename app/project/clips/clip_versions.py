@@ -1,4 +1,4 @@
-"""Versions of finished clips: what a clip was before it was trained again, kept beside it and brought back on request.
+"""Versions of finished clips: earlier results of a clip that was trained again, kept next to it and brought back on request.
 
 PROJECT/versions/0003/0002.safetensors is the second version of clip 3 that was set aside, 0002.jsonl its curves. Both
 are the files that lay in clips/ and metrics/, with their own checksums. A version that comes back is moved; the clip
@@ -153,7 +153,7 @@ def best_version(project: Project, clip_index: int) -> ClipVersion | None:
 
 
 def recovery_hint(project: Project, clip_index: int) -> str:
-    """What can be done about a damaged clip, as a sentence for an error."""
+    """The remedy for a damaged clip, as a sentence for an error."""
     version = best_version(project, clip_index)
     if version is None:
         return f"Restore it from a backup, or train clip {clip_index} again."

@@ -19,16 +19,16 @@ WHAT = {
     "checkpoints": "progress of stopped trainings",
     "unused": "clips of other cuts, and damaged files that were put aside",
 }
-"""What can be freed, in words."""
+"""Kinds of files that can be freed, in words."""
 
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """What can go.
+    """Files that can be deleted.
 
     Attributes:
         paths: The files.
-        n_bytes: What they take.
+        n_bytes: Their size.
         n_clips: How many of them hold a clip or the progress of one.
     """
 
@@ -38,7 +38,7 @@ class Room:
 
 
 def room_of(project: Project, n_clips: int, what: str, clip_index: int | None = None) -> Room:
-    """What would go.
+    """The files that would be deleted.
 
     Args:
         project: May be read-only.

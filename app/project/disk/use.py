@@ -1,4 +1,4 @@
-"""What a project takes on the disk: of each clip, its versions and checkpoint, and what all clips share."""
+"""A project's disk use: of each clip, its versions and checkpoint, and what all clips share."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ClipUse:
 
     Attributes:
         clip: The finished clip with its curves.
-        versions: What it was before, with curves.
+        versions: Its earlier results, with curves.
         n_versions: How many of these there are.
         checkpoint: Its unfinished training, with curves and the pieces of its preparation.
     """
@@ -44,7 +44,7 @@ class DiskUse:
         unused: Clips, versions and checkpoints under names that no clip has now: those of other cuts of the capture,
             and damaged files that were put aside.
         n_unused: Files among them that hold a clip.
-        preparation: What clips share, such as backgrounds.
+        preparation: Files that clips share, such as backgrounds.
         other: Settings, logs, figures and whatever else lies in the folder.
     """
 

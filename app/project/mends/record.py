@@ -35,17 +35,17 @@ class MendedClip(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MendRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What came of mending once. A value.
+    """The outcome of mending once. A value.
 
     Attributes:
-        words: What was mended, as "the seam at frame 20".
+        words: The mended place, as "the seam at frame 20".
         first, stop: Frames that the stretch covers.
         clips: Those that changed; none where nothing helped.
         before, after: Figures.
         attempts: All that was tried, in order.
-        diagnosis: What jumps, in a sentence.
-        advice: What else would help; empty where enough was reached.
-        seconds: What it took.
+        diagnosis: The cause of the jump, in a sentence.
+        advice: Other remedies; empty where enough was reached.
+        seconds: Its duration.
         made: When, as ISO 8601 with minutes.
     """
 

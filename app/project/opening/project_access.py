@@ -148,7 +148,7 @@ def open_project(
         return Project(folder, plain_history(folder), None, why_read_only=why_read_only)
     store = DocumentStore(folder)
     lock = None
-    if is_writable and is_project(folder):  # what is not a project says so below
+    if is_writable and is_project(folder):  # any other folder raises its error below
         check_folders(folder)
         lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()

@@ -39,7 +39,7 @@ class FilmWriter:
         fps: Pictures per second.
         background: Behind the scene, levels 0 to 255.
         is_transparent: Keep the opacity.
-        sound: What is heard, opened; None for silence.
+        sound: The sound, opened; None for silence.
     Raises:
         FFmpegError: The disk or the encoder refused.
     """
