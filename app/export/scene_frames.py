@@ -165,7 +165,7 @@ class SceneFrames:
 
         Args:
             frame: In frames of the capture; its field is evaluated there.
-            part: "static": what stands still in the whole clip, "moving": the rest, "all": both.
+            part: "static": still parts of the whole clip, "moving": the rest, "all": both.
         Raises:
             ProjectError: As `trained`; an edit is damaged.
         """
@@ -174,7 +174,7 @@ class SceneFrames:
     def shares(self, frame: float) -> Iterator[Share]:
         """The parts of a moment's picture, to be drawn one by one and mixed by weight.
 
-        Anchors of what moves stand still and exist at some frames only, and a clip ends with its last frame. Between
+        Anchors of moving things stand still and exist at some frames only, and a clip ends with its last frame. Between
         two frames the field is evaluated at the moment itself, but what exists at the frame before fades out while what
         exists at the frame after fades in; all at once it would be seen twice. Between two clips the last frame of the
         one fades into the first frame of the other, where both are trained.

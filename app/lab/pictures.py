@@ -23,7 +23,7 @@ class Pictures(Protocol):
     def pair(
         self, clip_index: int, frame_index: int, camera: str, features: Features = "both"
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What a camera took [H, W, 3] uint8, and the render in its colours [H, W, 3] float32.
+        """A camera's picture [H, W, 3] uint8, and the render in its colours [H, W, 3] float32.
 
         Args:
             features: Which features of the anchors are used, see engine.metrics.clips.features_apart.

@@ -22,7 +22,7 @@ class PictureSource:
         camera_index: The capture camera that took it, or that it is looked at through; None for a free view.
         look: From where and through which lens, whatever the size; see OrbitView.look_key.
         has_scene_colors: Whether a captured picture was brought into the scene's colours.
-        shown_as: What its colours mean, and which part of the clip it shows.
+        shown_as: The meaning of its colours, and which part of the clip it shows.
     """
 
     clip_index: int | None = None

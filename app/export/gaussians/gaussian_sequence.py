@@ -169,7 +169,7 @@ class GaussianSequence:
         }
 
     def lines(self) -> tuple[str, ...]:
-        """What the user should know: where the scene lies, how near files come, and what was left out."""
+        """Sentences for the user: where the scene lies, how near files come, and what was left out."""
         lines = [f"Coordinates: {self._placement.text}."]
         lines += self._measured_lines()
         for note, n in Counter(note for written in self.files for note in written.notes).items():

@@ -41,7 +41,7 @@ COLUMNS = {
         Column("lpips_unscaled", "1", False, False, "the same with inputs left in 0..1, as many tables have it"),
     )
 }
-"""What is added to the rows of pictures; `tof` is added to those of pairs."""
+"""Columns added to the rows of pictures; `tof` is added to those of pairs."""
 Found = dict[str, dict[str, dict[str, float | None]]]
 """Figures by camera and frame, the latter as text."""
 

@@ -38,7 +38,7 @@ class StepWindow:
 
 @dataclass(frozen=True, slots=True)
 class StepOutcome:
-    """What one step computed, copies.
+    """The results of one step, copies.
 
     Attributes:
         image: Picture before the gain. [H, W, 3]
@@ -58,7 +58,7 @@ class StepRun:
 
     Args:
         recipe: Sizes of the clip; the same recipe makes the same clip.
-        backend: What to compute with.
+        backend: The back end to compute with.
         window: Part of the picture that is drawn and compared, by the same camera; None for all of it.
     """
 

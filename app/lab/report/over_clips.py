@@ -28,7 +28,7 @@ _LINES = {"psnr": "raw colours", "psnr_fit": "after the colour fit", "psnr_light
 
 @dataclass(frozen=True, slots=True)
 class ClipExposure:
-    """What a clip file says beside its model.
+    """The exposure that a clip file states next to its model.
 
     Attributes:
         reference_index: The clip it inherits from; its own index where it inherits nothing, or that is not there.

@@ -164,7 +164,7 @@ SURROUNDINGS: dict[str, Callable[[], tuple[Part, ...]]] = {
     "bare room": lambda: make_room(textures.bare_room),
     "outdoors": make_outdoors,
 }
-"""What may be around the things of the scene, by name."""
+"""Surroundings of the scene's things, by name."""
 
 
 def placed(x: float, y: float, z: float, *, turn_deg: float = 0.0) -> np.ndarray:

@@ -153,7 +153,7 @@ PLAIN = ShownAs()
 
 
 def decoded_as(shown_as: ShownAs) -> ShownAs:
-    """What has to be decoded for it: most modes are made of the same Gaussians as the scene in its own colours."""
+    """Its mode and content to decode: most modes are made of the same Gaussians as the scene in its own colours."""
     return shown_as if shown_as.mode == "changed" else ShownAs(content=shown_as.content)
 
 
@@ -162,7 +162,7 @@ _DEPTH_REACH = 2.0
 
 
 def range_of(mode: str, rig: CameraRig | None) -> tuple[float, float]:
-    """Lowest and highest value that colours of a mode tell apart: the same in all frames and from everywhere.
+    """Lowest and highest value that colours of a mode distinguish: the same in all frames and from everywhere.
 
     Args:
         rig: Depths follow from its size; None takes a rig of size 1.

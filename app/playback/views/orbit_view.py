@@ -35,21 +35,21 @@ FLAT_REACH = 0.9
 """An orthographic view is cut off so many scene radii before the pivot, where the cameras stand: a wall behind them
 would hide everything. Farther away where one has moved away farther."""
 FRAME_SHARE = 1.15
-"""What is framed leaves a little room at the border."""
+"""A framed subject leaves a little room at the edge."""
 
 
 class OrbitView:
     """A camera on a sphere around a pivot.
 
     Attributes:
-        pivot: What the free view looks at, scene units. [3]
+        pivot: The point that the free view looks at, scene units. [3]
         distance: From where it seems to stand to the pivot, scene units.
         yaw, pitch, roll: Radians; a positive pitch looks down, a positive roll leans to the right.
         fov_y: Vertical field of view of the free view, radians.
         is_orthographic: Whether parallel lines stay parallel in the free view.
         up_axis: One of UP_AXES.
         up: Unit vector. [3]
-        scene_up: What is up in the scene, where the user has said so, instead of what the cameras agree on. [3]
+        scene_up: The scene's upward direction, where the user has said so, instead of what the cameras agree on. [3]
         look_through: Index of a capture camera, or None.
         is_eased: Whether jumps are shown as short moves.
         radius: Of the scene, scene units.
@@ -363,7 +363,7 @@ class OrbitView:
 
     @contextmanager
     def jump(self) -> Iterator[None]:
-        """What is changed in here is shown as a move, from what is shown now. Jumps inside of a jump are part of it."""
+        """Changes in here are shown as a move, from the pose shown now. Jumps inside of a jump are part of it."""
         start = ViewMotion(self.shown_pose, None if self._motion else self.look_through)
         yield
         self._motion = start if self.is_eased else None

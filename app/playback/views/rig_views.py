@@ -1,4 +1,4 @@
-"""What a view takes from a rig: the lens and the pose of a camera, and the camera that the home view begins at."""
+"""A view's facts from a rig: the lens and the pose of a camera, and the camera that the home view begins at."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def home_camera(rig: CameraRig, focus: np.ndarray, up: np.ndarray) -> int:
     A dome's mean direction points straight up; only its level part counts, so that the home view is not from above.
 
     Args:
-        focus: What the cameras look at, scene units. [3]
+        focus: The point that the cameras look at, scene units. [3]
         up: Unit vector. [3]
     """
     offsets = rig.centers - focus

@@ -20,7 +20,7 @@ UP_AXES: dict[str, tuple[float, float, float] | None] = {
     "+z": (0.0, 0.0, 1.0),
     "-z": (0.0, 0.0, -1.0),
 }
-"""What can be up: an axis of the world, or what the cameras agree on."""
+"""Choices of the upward direction: an axis of the world, or the one that the cameras agree on."""
 AXIS_VIEWS = ("front", "back", "right", "left", "top", "bottom")
 """Views along an axis, named by where one stands."""
 

@@ -52,7 +52,7 @@ class Views:
 
     @property
     def current(self) -> ViewState:
-        """What belongs to `current_index`."""
+        """The state of view `current_index`."""
         return self._looks[self.current_index]
 
     @property
@@ -77,7 +77,7 @@ class Views:
         """
         if n not in COUNTS:
             raise ValueError(f"there can be {', '.join(str(count) for count in COUNTS)} views, not {n}")
-        if n < self.n_shown and self._active >= n:  # what one looks at stays
+        if n < self.n_shown and self._active >= n:  # the active view stays
             self._looks[0], self._looks[self._active] = self._looks[self._active], self._looks[0]
             self._active = 0
         while len(self._looks) < n:

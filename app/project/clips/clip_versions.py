@@ -1,4 +1,4 @@
-"""Versions of finished clips: earlier results of a clip that was trained again, kept next to it and brought back on request.
+"""Versions of finished clips: earlier results, kept next to the clip and brought back on request.
 
 PROJECT/versions/0003/0002.safetensors is the second version of clip 3 that was set aside, 0002.jsonl its curves. Both
 are the files that lay in clips/ and metrics/, with their own checksums. A version that comes back is moved; the clip

@@ -28,7 +28,7 @@ class Discarded:
     Attributes:
         room: The files and what they take.
         n_clips: Finished clips, damaged ones and those of other cuts of the capture included.
-        n_versions: Of clips that were trained again.
+        n_versions: Earlier results of clips that were trained again.
         seconds: Duration of training the finished clips; None where nothing was recorded.
         progress: Of each training that was stopped: the name of its clip, the step and all steps; 0 and 0 where its
             checkpoint cannot be read.

@@ -43,7 +43,7 @@ class MendRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         clips: Those that changed; none where nothing helped.
         before, after: Figures.
         attempts: All that was tried, in order.
-        diagnosis: The cause of the jump, in a sentence.
+        diagnosis: The component that jumps, in a sentence.
         advice: Other remedies; empty where enough was reached.
         seconds: Its duration.
         made: When, as ISO 8601 with minutes.

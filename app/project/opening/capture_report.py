@@ -1,4 +1,4 @@
-"""The contents recognised in a folder, in words, before anything is made of it; or why it does not open and what to do."""
+"""The contents of a folder in words, before anything is made of it; or why it does not open and what to do."""
 
 from __future__ import annotations
 
