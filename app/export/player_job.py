@@ -151,7 +151,7 @@ def _scene(opened: TrainedProject, job: PlayerJob) -> SceneFrames:
 
 def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
     """Clips with the frames of each that are wanted; one comes several times where different edits hold in it, so that
-    what stands still does so in each stretch. Raises ProjectError where one is not trained."""
+    still parts are still in each stretch. Raises ProjectError where one is not trained."""
     frames = scene.trained_frames if job.frames is None else job.frames
     scene.check_trained(frames)
     clips: list[tuple[Clip, list[int]]] = []

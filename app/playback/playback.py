@@ -115,7 +115,7 @@ class Playback:
         return None if model is None else model.decoder.gaussians_per_anchor
 
     def coverage(self, timeline: Timeline) -> CoveredSpace | None:
-        """The space covered by inherited anchors in the clip under the playhead; None until it is loaded and measured."""
+        """The space covered by inherited anchors in the clip under the playhead; None until it was measured."""
         request = self._request(timeline)
         anchors = None if request is None else self.decoder.anchors(request)
         return None if anchors is None else self._coverage.find(anchors)

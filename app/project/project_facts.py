@@ -66,7 +66,7 @@ class ClipFacts:
 
 @dataclass(frozen=True, slots=True)
 class ProjectFacts:
-    """One project. `name` distinguishes it from the others on the page; `clips` are the trained ones, at least one; `damaged`
+    """One project. `name` is unique on the page; `clips` are the trained ones, at least one; `damaged`
     are files of trained clips that cannot be read."""
 
     name: str

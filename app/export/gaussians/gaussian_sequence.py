@@ -71,7 +71,7 @@ class GaussianSequence:
 
     def write(self, folder: Path, report: Report) -> None:
         """Write every file into a folder. The first, one in the middle and the last are read back, and every file of
-        what stands still.
+        still parts.
 
         Raises:
             ProjectError: A clip is damaged, or a value does not fit the format.

@@ -26,7 +26,7 @@ def curves_of(lines: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     Args:
         lines: Of the table.
     Returns:
-        Per variant: `variant`, `points` (each with source_steps, later_s and FIGURES, rising in steps) and, next to
+        Per variant: `variant`, `points` (each with source_steps, later_s and FIGURES, rising in steps) and, except for
         "full", `at_equal`: per figure the PSNR, `seconds`, `seconds_full`, `ratio`, and `is_least` where "full" is
         already better at its first point, so that the ratio is at least that. None where the curves do not meet, or
         where the other one is already better at its first point: how much earlier it was as good is unknown.

@@ -1,4 +1,4 @@
-"""Errors of a training step: picture, loss, gradients and update, compared with the same step in float64 and plain torch.
+"""Errors of a training step: picture, loss, gradients and update, against the same step in float64 and plain torch.
 
 Clip, frame and camera are those of the step that is timed, and all its anchors are decoded. Only the picture is cut
 down to its middle, because the rasterizer's slow truth draws every Gaussian against every pixel.
