@@ -1,4 +1,4 @@
-"""A step of a document as a command: what turned one document into the other."""
+"""A step of a document as a command, which turns one document into the other."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TAKEN = "Another running or waiting export writes to this place."
 _SAME = {".htm": ".html"}
 _OWN_SUFFIXES = (".mp4", ".webm", ".html")
-"""They say what a file is."""
+"""Suffixes that state the kind of a file."""
 _FILE_SUFFIXES = (*_OWN_SUFFIXES, ".csv", ".json")
 """Of everything that is one file."""
 

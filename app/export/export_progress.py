@@ -9,7 +9,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class ExportProgress:
-    """How far an export is.
+    """Progress of an export.
 
     Attributes:
         n_done, n_all: In units; nothing is known while n_all is 0.

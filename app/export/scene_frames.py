@@ -148,7 +148,7 @@ class SceneFrames:
         return self._loaded
 
     def _part(self, frame: float, part: Part) -> EditedClip:
-        """The part of the clip that shows a moment. Raises what `trained` raises."""
+        """The part of the clip that shows a moment. Raises as `trained` does."""
         from engine.editing.edited_clip import EditedClip
 
         trained = self.trained(frame)

@@ -1,4 +1,4 @@
-"""Pictures of a trained project for its report: truth and render of a frame, maps of what changes between frames."""
+"""Pictures of a trained project for its report: truth and render of a frame, maps of changes between frames."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Pictures(Protocol):
-    """Where a report gets its pictures; tests bring small ones."""
+    """Source of a report's pictures; tests bring small ones."""
 
     def pair(
         self, clip_index: int, frame_index: int, camera: str, features: Features = "both"

@@ -172,7 +172,7 @@ class Ahead:
 
 
 def n_ahead(course: Course) -> int:
-    """How many frames are made ready while it plays."""
+    """Number of frames made ready during playback."""
     if course.is_loaded_first:
         return course.n_frames
     return min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)

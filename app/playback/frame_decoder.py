@@ -197,7 +197,7 @@ class FrameDecoder:
 
     @property
     def n_that_fit(self) -> int:
-        """How many frames like the newest one can be kept."""
+        """Number of frames like the newest one that can be kept."""
         return max(self._cache.max_bytes // max(self._frame_bytes, 1), 1)
 
     def plan(self, requests: Sequence[FrameRequest], distance: Callable[[FrameKey], float]) -> None:

@@ -1,4 +1,4 @@
-"""PictureSource: what something on screen is of. It travels from the decoder to the words over the picture."""
+"""PictureSource: the source of something on screen. It travels from the decoder to the words over the picture."""
 
 from __future__ import annotations
 
@@ -37,4 +37,4 @@ class PictureSource:
 
 
 UNKNOWN = PictureSource()
-"""Of what belongs to no frame."""
+"""The source of contents that belong to no frame."""

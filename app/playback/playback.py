@@ -83,7 +83,7 @@ class Playback:
             worker.start()
 
     def show(self, opened: OpenedProject) -> None:
-        """Take up what is open. What was made of another project is forgotten."""
+        """Take up the open project. Contents of another project are forgotten."""
         if self._opened is not None and self._opened.generation != opened.generation:
             for store in (*self._stores, self.ahead, self._modes):
                 store.clear()
@@ -98,7 +98,7 @@ class Playback:
 
     def frame(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> ShownFrame | None:
         """The drawn contents of the frame under the playhead, or the newest there is until that was decoded; None where
-        nothing is trained. It says itself what it is of."""
+        nothing is trained. The frame states its source."""
         request = self._request(timeline, shown_as)
         shown = None if request is None else self.decoder.frame(request)
         return None if shown is None else replace(shown, gaussians=self._modes.of(shown, shown_as.mode))
@@ -218,7 +218,7 @@ class Playback:
         return None
 
     def favour(self, view_id: Hashable) -> None:
-        """Draw what is asked for this place first."""
+        """Draw this place's request first."""
         self.renderer.worker.active_lane = view_id
 
     def work_ahead(self, timeline: Timeline, *, is_busy: bool = False) -> None:

@@ -51,7 +51,7 @@ class Course:
 
     @property
     def n_frames(self) -> int:
-        """How many frames are played in all."""
+        """Number of frames that are played in all."""
         return self.last - self.first + 1
 
     def ahead(self, n: int) -> list[int]:

@@ -120,7 +120,7 @@ def make_cloud(job: CloudJob, context: JobContext) -> Path:
 
 
 def write_cloud(job: CloudJob, parent: Parent[str]) -> None:
-    """Build and write the first cloud. Runs in the child, which reports what it does."""
+    """Build and write the first cloud. Runs in the child, which reports its progress."""
 
     def report(line: str) -> None:
         logger.debug(line)

@@ -151,7 +151,7 @@ class Renderer:
         return self._cache.revision
 
     def n_that_fit(self, look: RenderView) -> int:
-        """How many pictures of a size can be kept."""
+        """Number of pictures of a size that can be kept."""
         return max(self._cache.max_bytes // (3 * look.width * look.height), 1)
 
     def plan(self, requests: Sequence[RenderRequest], distance: Callable[[PictureKey], float]) -> None:

@@ -120,7 +120,7 @@ class Project:
         return finished_files(self.folder, self.settings.clip_bounds, self.settings.clip_length)
 
     def files(self, clip_index: int) -> ClipPaths:
-        """Where the files of a clip lie."""
+        """The place of a clip's files."""
         return ClipPaths(self.folder, self.clip_name(clip_index))
 
     def clip_path(self, clip_index: int) -> Path:

@@ -1,4 +1,4 @@
-"""Where projects go that are made without a place of their own, and what such a folder is called."""
+"""The place and the names of projects that are made without a place of their own."""
 
 from __future__ import annotations
 

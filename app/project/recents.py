@@ -40,7 +40,7 @@ class RecentProject:
 
     @property
     def trained_text(self) -> str:
-        """How far it is trained, in words."""
+        """Progress of its training, in words."""
         if not self.project:
             return "capture"
         return f"{self.n_trained} of {self.n_clips} clips trained" if self.n_clips else "project"

@@ -9,7 +9,7 @@ from app.export.jobs.gaussians import WrittenPart
 from app.export.scene_frames import Part
 
 SIDECAR = "_export.json"
-"""End of the name of the file that says what the others are."""
+"""End of the name of the file that describes the others."""
 _N_DIGITS = 4
 _MAX_NAME_BYTES = 120
 """Of a project's name in the name of a file: the rest has to fit too."""

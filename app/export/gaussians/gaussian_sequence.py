@@ -99,7 +99,7 @@ class GaussianSequence:
         report(ExportProgress(len(self._frames), len(self._frames)))
 
     def _contents(self, report: Report) -> Iterator[tuple[GaussianFile, Gaussians]]:
-        """Each file and what it holds. What stands still comes again only where it is another than before."""
+        """Each file and its contents. Still parts come again only where they have changed."""
         suffix, n_frames = self._kind.suffix, self._n_frames
         moments = {file.frame: file for file in moment_files(self.name, suffix, self._frames, self._part, n_frames)}
         still: Gaussians | None = None

@@ -24,7 +24,7 @@ from engine.storage.json_files import json_text
 
 
 def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
-    """How many files and bytes, of the headers of the clips. Raises ProjectError where a frame is not trained."""
+    """Numbers of files and bytes, from the headers of the clips. Raises ProjectError where a frame is not trained."""
     scene = _scene(opened, job)
     frames = _frames(scene, job)
     stretches = Counter((scene.clip_at(frame).clip_index, scene.effects(frame)) for frame in frames)
@@ -86,7 +86,7 @@ def _kind(job: GaussiansJob) -> Format:
 
 
 def _world(opened: TrainedProject, job: GaussiansJob) -> FileWorld:
-    """Where the scene lies in the files."""
+    """The scene's place in the files."""
     said = opened.project.document.world.meters_per_unit
     scale = job.scale if job.scale is not None else 1.0 if said is None else said
     scene_up = opened.up if job.scene_up is None else np.array(job.scene_up)

@@ -59,7 +59,7 @@ class JobModule(Protocol):
         ...
 
     def run(self, opened: TrainedProject, job: Any, report: Report) -> ExportResult:
-        """Write it. Raises EngineError, and what `report` raises."""
+        """Write the export. Raises EngineError, and as `report` does."""
         ...
 
 
@@ -119,7 +119,7 @@ class ExportJob(Declared, frozen=True, tag=True):
 
     @property
     def format_name(self) -> str:
-        """Which of `formats` it is."""
+        """The name in `formats` of the job's format."""
         return next(name for name, value in self.formats().items() if value == getattr(self, "format", ""))
 
     @classmethod

@@ -105,7 +105,7 @@ class ExportQueue:
         self.revision += 1
 
     def retry(self, export_id: int) -> None:
-        """Begin one that failed or was cancelled anew, after those that wait. Raises what `add` raises."""
+        """Begin one that failed or was cancelled anew, after those that wait. Raises as `add` does."""
         status = self._find(export_id)
         if status is not None and status.state in ("failed", "cancelled"):
             self._check_free(status.path)

@@ -183,7 +183,7 @@ def _camera(capture: Capture, name: str) -> int:
 
 
 def _sound(job: VideoJob, capture: Capture, runs: list[range]) -> tuple[tuple[Path, float] | None, tuple[str, ...]]:
-    """Where the sound is, and a note where it is left out."""
+    """The place of the sound, and a note where it is left out."""
     if job.sound is None:
         return None, ()
     source = sound_source(capture, _camera(capture, job.sound), runs[0].start)

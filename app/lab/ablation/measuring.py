@@ -151,6 +151,6 @@ def _read(path: Path, key: dict[str, Any]) -> VariantFigures | None:
 
 
 def _measured(figures: dict[str, float | None], n_frames: int) -> VariantFigures:
-    """With what follows from the figures."""
+    """Figures of a variant with those derived from them."""
     size = figures.get("megabytes")
     return VariantFigures(figures | {"mb_per_frame": None if size is None else size / n_frames}, n_frames)

@@ -45,7 +45,7 @@ TABLE_FILE = "ablation.csv"
 
 @dataclass(frozen=True, slots=True)
 class Callbacks:
-    """Where progress goes.
+    """Receivers of progress.
 
     Attributes:
         on_variant: Name, seed, how many are done, and how many there are.
@@ -147,7 +147,7 @@ def rendering_of(rates: FrameRates) -> dict[str, Any]:
 
 
 def project_folder(folder: Path, name: str, seed: int) -> Path:
-    """Where a variant lies."""
+    """The folder of a variant."""
     return folder / f"{name}-seed{seed}"
 
 
@@ -191,7 +191,7 @@ class _Task:
         check_settings(self.settings, capture)
 
     def place(self, folder: Path) -> Path:
-        """Where its project lies."""
+        """The folder of its project."""
         return project_folder(folder, self.variant.name, self.settings.seed)
 
 

@@ -32,7 +32,7 @@ N_CHECK_RUNS = 3
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """One forward and backward pass: leaves with gradients, what was drawn, milliseconds of each."""
+    """One forward and backward pass: leaves with gradients, the picture, milliseconds of each."""
 
     leaves: Gaussians
     rendering: Rendering

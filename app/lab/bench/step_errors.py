@@ -20,7 +20,7 @@ WINDOW_PX = 64, 48
 """Width and height of the part that is compared; smaller pictures are compared whole."""
 N_CHECK_RUNS = 2
 N_UPDATES = 3
-"""Steps of Adam that are compared: the first one alone would not show what it remembers."""
+"""Steps of Adam that are compared: the first one alone would not show its memory."""
 
 
 def measure_errors(recipe: ClipRecipe, *, scene: str, fast: Backend = FAST) -> tuple[StepErrors, dict[str, SpeedError]]:

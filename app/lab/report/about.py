@@ -1,4 +1,4 @@
-"""Sections that say what was measured: set-up, capture, split, settings."""
+"""Sections on the measured project: set-up, capture, split, settings."""
 
 from __future__ import annotations
 

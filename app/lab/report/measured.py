@@ -1,4 +1,4 @@
-"""Sections on what was measured: figures per clip, error over time, worst frames."""
+"""Sections on measurements: figures per clip, error over time, worst frames."""
 
 from __future__ import annotations
 

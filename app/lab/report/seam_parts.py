@@ -1,4 +1,4 @@
-"""The section on seams: what changes at clip boundaries that does not change in the truth."""
+"""The section on seams: changes at clip boundaries that are not in the truth."""
 
 from __future__ import annotations
 

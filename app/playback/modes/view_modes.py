@@ -158,7 +158,7 @@ def decoded_as(shown_as: ShownAs) -> ShownAs:
 
 
 _DEPTH_REACH = 2.0
-"""Depths are shown up to this many times the usual distance from a camera to what all of them look at."""
+"""Depths are shown up to this many times the usual distance from a camera to the focus of all of them."""
 
 
 def range_of(mode: str, rig: CameraRig | None) -> tuple[float, float]:
@@ -179,7 +179,7 @@ def range_of(mode: str, rig: CameraRig | None) -> tuple[float, float]:
 
 
 def rig_distance(rig: CameraRig | None) -> float:
-    """Mean distance from a camera to what all of them look at, to two digits, scene units; 1 where that is unknown."""
+    """Mean distance from a camera to the focus of all of them, to two digits, scene units; 1 where that is unknown."""
     if rig is None or len(rig) == 0:
         return 1.0
     offsets = rig.centers - rig.focus_point()

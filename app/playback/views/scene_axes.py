@@ -26,7 +26,7 @@ AXIS_VIEWS = ("front", "back", "right", "left", "top", "bottom")
 
 
 def rig_radius(rig: CameraRig) -> float:
-    """Mean distance of the cameras from what they look at, scene units."""
+    """Mean distance of the cameras from their focus, scene units."""
     return float(np.linalg.norm(rig.centers - rig.focus_point(), axis=1).mean())
 
 

@@ -21,7 +21,7 @@ COUNTS = (1, 2, 4)
 
 @dataclass
 class ViewState:
-    """From where one view looks, and what it shows."""
+    """Pose and contents of one view."""
 
     view: OrbitView = field(default_factory=OrbitView)
     overlays: Overlays = field(default_factory=Overlays)
@@ -96,7 +96,7 @@ class Views:
             look.view = OrbitView(rig)
 
     def set_scene_up(self, up: Sequence[float] | None) -> None:
-        """Say what is up in the scene; see OrbitView.set_scene_up."""
+        """Set the scene's upward direction; see OrbitView.set_scene_up."""
         for look in self._looks:
             look.view.set_scene_up(up)
 

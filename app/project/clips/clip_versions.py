@@ -50,22 +50,22 @@ class ClipVersion:
 
     @property
     def revision(self) -> str:
-        """Names what it shows; equal for equal content."""
+        """A name of its contents; equal for equal content."""
         return "" if self.header is None else f"version-{self.header.fingerprint}"
 
 
 def version_path(project: Project, clip_index: int, number: int) -> Path:
-    """Where a version lies."""
+    """The file of a version."""
     return versions_dir(project, clip_index) / f"{number:04d}.safetensors"
 
 
 def versions_dir(project: Project, clip_index: int) -> Path:
-    """Where the versions of a clip lie."""
+    """The folder of a clip's versions."""
     return project.folder / "versions" / project.clip_name(clip_index)
 
 
 def list_versions(project: Project, clip_index: int) -> list[ClipVersion]:
-    """Versions of a clip, the one set aside last first. Reads their headers, and nothing of what is not a version."""
+    """Versions of a clip, the one set aside last first. Reads their headers, and no other files."""
     found = []
     for number in _numbers(project, clip_index):
         path = version_path(project, clip_index, number)

@@ -120,7 +120,7 @@ def as_cut_now(project: Project, record: MendRecord) -> MendRecord:
 
 
 def why_not_back(project: Project, record: MendRecord) -> str:
-    """Why what was mended cannot be taken back; empty where it can."""
+    """Why a mend cannot be taken back; empty where it can."""
     for clip in as_cut_now(project, record).clips:
         if _fingerprint(project, clip.clip_index) != clip.after:
             return f"Clip {clip.clip_index} was trained or restored since it was mended."

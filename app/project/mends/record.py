@@ -1,4 +1,4 @@
-"""MendRecord: what was mended, how, with which figures before and after; mends/0001.json in the project."""
+"""MendRecord: the mended place, the means, and figures before and after; mends/0001.json in the project."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def now_text() -> str:
 
 
 def records_dir(project: Project) -> Path:
-    """Where records lie."""
+    """The folder of records."""
     return project.folder / "mends"
 
 

@@ -20,7 +20,7 @@ from engine.errors import CaptureError, EngineError
 from engine.text import duration_text, printable, rate_text
 
 LAYOUTS = {reader.FORMAT: reader.LAYOUT for reader in FORMATS}
-"""By format: what its layout is called, in words."""
+"""Names of layouts, by format."""
 LENSES = {
     "pinhole": "no distortion",
     "opencv": "OpenCV distortion",
@@ -156,7 +156,7 @@ class RefusedFolder:
 
 
 def report_of(capture: Capture) -> CaptureReport:
-    """Put into words what a capture is. Looks at numbers, not at pixels."""
+    """Describe a capture in words. Looks at numbers, not at pixels."""
     found: dict[str, Any] = describe(capture)
     entries = capture.layout.cameras
     up = -capture.rig.world_to_camera[:, 1, :3].mean(axis=0)

@@ -240,7 +240,7 @@ def _read_settings(folder: Path, choices: ProjectChoices) -> ProjectSettings:
 
 
 def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project:
-    """The project, for writing where that is possible and wanted; what there is to say of it goes into `notes`."""
+    """The project, for writing where that is possible and wanted; remarks on it go into `notes`."""
     if not choices.is_journal_used:
         notes.append(("warn", "The project is open read-only", "The journal is ignored.", ""))
         why = "It was opened without its damaged journal. Repair it to edit or train."
@@ -301,7 +301,7 @@ def projects_of(
 
 
 def _changed(folder: Path) -> str:
-    """When the document of a project was written last."""
+    """The time at which the document of a project was written last."""
     try:
         written_s = (folder / PROJECT_FILE).stat().st_mtime
         return datetime.fromtimestamp(written_s, UTC).isoformat(timespec="seconds")

@@ -1,4 +1,4 @@
-"""Creating, opening and repairing project folders: the lock, and what a killed program left half done."""
+"""Creating, opening and repairing project folders: the lock, and work that a killed program left half done."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DEFAULT_CLIP_LENGTH = 10
 
 
 def read_settings(folder: Path) -> ProjectSettings:
-    """The settings of a project that is not opened. Raises what DocumentStore.read raises."""
+    """The settings of a project that is not opened. Raises as DocumentStore.read does."""
     return DocumentStore(folder).read().present.settings
 
 

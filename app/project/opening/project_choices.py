@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class ProjectChoices:
-    """How a project is opened.
+    """The way a project is opened.
 
     Attributes:
         is_read_only: Only to look at it.

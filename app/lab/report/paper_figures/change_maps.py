@@ -1,4 +1,4 @@
-"""The section with what changes across a boundary in every project, at the same place and under one colour range."""
+"""The section with changes across a boundary in every project, at the same place and under one colour range."""
 
 from __future__ import annotations
 
