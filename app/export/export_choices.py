@@ -64,7 +64,7 @@ class ExportContext(msgspec.Struct, frozen=True):
         n_frames: Of the capture, as far as it is worked on.
         clips: First frame and the one after the last, of every clip.
         trained: Which of them are finished.
-        frame_index: Where the playhead stands.
+        frame_index: Frame under the playhead.
         in_frame, out_frame: Of the timeline, both included.
         cameras: Names.
         paths: Names of the project's camera paths.

@@ -35,7 +35,7 @@ class ExportResult:
         path: The file, or the folder that was filled.
         n_files, n_bytes: All of them.
         psnr_db: Of the files, read back and rendered, against live pictures; None where nothing is to be measured.
-        lines: Sentences about what the user should know.
+        lines: Sentences that the user should know.
     """
 
     path: Path
@@ -51,7 +51,7 @@ class ExportEstimate:
 
     Attributes:
         n_files, n_bytes: As far as they can be known beforehand; bytes are an estimate, 0 where there is none.
-        lines: Sentences about what the user should know.
+        lines: Sentences that the user should know.
     """
 
     n_files: int

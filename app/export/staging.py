@@ -30,7 +30,7 @@ def check_target(
         opened: The open project; nothing is written into it or its capture, where a file could take the place
             of one of theirs, or be taken for one.
         path: The destination: a file, which may be there already and is replaced, or a new or empty folder.
-        n_bytes: How large it becomes, as far as that is known.
+        n_bytes: Its expected size, as far as known.
         is_folder: Which of the two it is.
     Raises:
         ProjectError: Something else has this name, the place may not be written to, or the disk has too little room.

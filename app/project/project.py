@@ -48,11 +48,11 @@ class Project:
 
     Attributes:
         history: The document and the way back. The window sets it, and keeps it by itself a moment later.
-        store: Where the document is kept.
+        store: The store of the document.
         headers: Of its clips and checkpoints, read once for everybody who asks.
 
     Args:
-        why_read_only: Without a lock, why, and what helps.
+        why_read_only: Without a lock, the cause and the remedy.
     """
 
     def __init__(

@@ -42,11 +42,11 @@ class GaussianSequence:
     """Files of some frames of a scene.
 
     Args:
-        scene: Where frames come from.
+        scene: The source of frames.
         frames: Of the capture, at least one.
         part: The part of each frame to write.
         kind: The format.
-        placement: Where the scene lies in the files.
+        placement: The scene's place in the files.
         n_threads: To write with; no more than a few are of use.
     """
 

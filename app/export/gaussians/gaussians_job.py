@@ -44,7 +44,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     """Write the files; memory does not grow with the number of frames.
 
     Args:
-        report: Told how far it is; what it raises ends the work, and then nothing is left.
+        report: Receives the progress; an exception from it ends the work, and then nothing is left.
     Raises:
         ProjectError: A frame is not trained, the folder is taken, or a value does not fit the format.
         DiskError: The disk refused.

@@ -27,9 +27,9 @@ class ReadBack:
     """Measures files of one export.
 
     Args:
-        scene: Where its frames came from.
+        scene: The source of its frames.
         read: Of the format.
-        world: How the scene was placed in the file; undone here.
+        world: The scene's placement in the file; undone here.
     """
 
     def __init__(self, scene: SceneFrames, read: Callable[[BinaryIO], Splats], world: FileWorld) -> None:

@@ -34,7 +34,7 @@ def option(
     """The annotation of an option; see `engine.setting.setting`.
 
     Args:
-        answers: Words it may be, each with what the window calls it and what it means, which may be empty.
+        answers: Words it may be, each with the window's name of it and its meaning, which may be empty.
     """
     if answers is not None:
         declared["choices"] = {word: means for word, (_, means) in answers.items()}

@@ -24,9 +24,9 @@ class ExportTask:
     Attributes:
         job: The export's declaration.
         project: Folder.
-        capture, scale, frames, follow_links: How its capture is opened; the project may still name another place.
+        capture, scale, frames, follow_links: The way its capture is opened; the project may still name another place.
         n_threads: To compute with; None for all cores.
-        backend: Name of what is computed with.
+        backend: Name of the back end.
     """
 
     job: AnyJob

@@ -18,7 +18,7 @@ class Drawn:
 
     Attributes:
         color: Display-encoded, over black, so that it is multiplied with `alpha`. [H, W, 3] float32 in 0..1
-        alpha: How much of what lies behind is covered. [H, W] float32 in 0..1
+        alpha: Covered share of the background. [H, W] float32 in 0..1
         depth: Along the viewing axis, scene units; NaN where next to nothing is. [H, W] float32
     """
 

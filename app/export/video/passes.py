@@ -55,7 +55,7 @@ class Painter:
 
     Args:
         scene: Makes frames.
-        job: Says what they show.
+        job: States the contents of the pictures.
         moments: Of all pictures.
         view_of: From where each is taken.
         step: Frames from one picture to the next.

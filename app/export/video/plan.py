@@ -36,7 +36,7 @@ class VideoPlan:
         step: Frames of the capture from one picture to the next.
         fps: Pictures per second.
         view_of: From where each picture is taken.
-        picture_size: Width and height of what is written, pixels.
+        picture_size: Width and height of the written pictures, pixels.
         sound: File with the sound and where in it the first picture is, seconds; None for silence.
         depth_unit: Scene units per level of a 16-bit picture of depths; None where none is written.
         notes: Differences from what was asked for, in sentences.

@@ -35,7 +35,7 @@ class WrittenVideo:
 
     Attributes:
         out: The file, or the folder of a sequence.
-        n_pictures: How many pictures.
+        n_pictures: Number of pictures.
         size: Their width and height, pixels.
         fps: Pictures per second.
         n_bytes: Size of the file, or of all of them.
@@ -63,7 +63,7 @@ def render_video(
     """Draw and write.
 
     Args:
-        job: What.
+        job: The video to render.
         opened: The project.
         report: Told after every picture how far it is, with rate and time left.
         is_cancelled: Asked before every picture.

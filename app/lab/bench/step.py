@@ -165,7 +165,7 @@ def _leaves(tensors: Sequence[Tensor]) -> list[Tensor]:
 
 
 def _with_gradients(gaussians: Gaussians, drawn: Gaussians, measured: Gaussians) -> tuple[list[Tensor], list[Tensor]]:
-    """Tensors of the decode that need a gradient, and the sum of the picture's loss and the volume term."""
+    """Tensors of the decode that need a gradient, and the sums of their gradients by picture and volume term."""
     outputs, gradients = [], []
     for output, first, second in zip(gaussians.tensors(), drawn.tensors(), measured.tensors(), strict=True):
         found = [leaf.grad for leaf in (first, second) if leaf.grad is not None]

@@ -30,7 +30,7 @@ class GaussianArrays:
         source: The frame, and the state of the clip it was decoded from.
         n_still: So many rows come first and differ in nothing but their colours between arrays of one `still_key`.
         still_key: None where no rows are known to be so.
-        births: Where each comes from, see app.playback.modes.contents; None where unknown. [N] uint8
+        births: The origin of each, see app.playback.modes.contents; None where unknown. [N] uint8
         changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
             [N] float32
         rows: Which Gaussian of which anchor set each is, the same in all frames and clips; None where they stand for

@@ -80,7 +80,7 @@ class ViewMotion:
     """A move that is under way; its end is the view's own pose, which may change meanwhile.
 
     Attributes:
-        start: Where it began.
+        start: The pose at its beginning.
         camera: The capture camera that was looked through there, or None.
         elapsed_s: None until the first picture of it.
     """

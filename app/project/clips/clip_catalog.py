@@ -35,7 +35,7 @@ class ClipRecord:
         state: untrained; stopped, with a checkpoint that its training continues from; trained; stale, trained on
             something that no longer exists; damaged, a finished clip that cannot be read.
         step, n_steps: Of the state that is shown.
-        held_out_psnr: dB: an evaluation's where there is one, else what the training measured last; None when not
+        held_out_psnr: dB: an evaluation's where there is one, else the training's last one; None when not
             measured.
         held_out_whole: Whether that is over all frames in all held-out cameras; else it is over at most three pictures.
         file: The state to show; None when there is none.
@@ -92,7 +92,7 @@ class ClipCatalog:
 
     Args:
         project: Whose clips.
-        n_clips: How many the capture has.
+        n_clips: Number of clips of the capture.
         report: Told how many were read so far, from time to time.
     """
 

@@ -97,7 +97,7 @@ def set_aside(project: Project, clip_index: int, *, unless: str = "") -> int | N
     A damaged clip does not become a version; it is kept as well, see `put_damaged_aside`.
 
     Args:
-        unless: Fingerprint of what comes in its place: an equal clip is not kept twice.
+        unless: Fingerprint of the clip that replaces it: an equal clip is not kept twice.
     Returns:
         Its number; None where there is no readable clip, or an equal one.
     Raises:

@@ -26,7 +26,7 @@ class Discarded:
     """Training that goes when settings change.
 
     Attributes:
-        room: The files and what they take.
+        room: The files and their size.
         n_clips: Finished clips, damaged ones and those of other cuts of the capture included.
         n_versions: Earlier results of clips that were trained again.
         seconds: Duration of training the finished clips; None where nothing was recorded.

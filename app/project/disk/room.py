@@ -29,7 +29,7 @@ class Room:
     Attributes:
         paths: The files.
         n_bytes: Their size.
-        n_clips: How many of them hold a clip or the progress of one.
+        n_clips: Number of files that hold a clip or the progress of one.
     """
 
     paths: tuple[Path, ...] = ()
@@ -44,7 +44,7 @@ def room_of(project: Project, n_clips: int, what: str, clip_index: int | None = 
         project: May be read-only.
         n_clips: Of the capture.
         what: A name of WHAT.
-        clip_index: Only what belongs to this clip; None for all. "unused" belongs to none.
+        clip_index: Only files of this clip; None for all. "unused" belongs to none.
     Raises:
         ValueError: There is no such name.
         ProjectError: There is no such clip.

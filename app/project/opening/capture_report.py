@@ -42,8 +42,8 @@ class ReportedCamera:
         image_size: Width and height as stored.
         lens: In words.
         fov_deg: Horizontal and vertical view of its pictures once they are undistorted.
-        center: Where it stands, scene units. [3]
-        forward: Where it looks, unit vector. [3]
+        center: Its place, scene units. [3]
+        forward: Its viewing direction, unit vector. [3]
         is_default_holdout: Whether the capture sets it aside.
         has_masks: Whether masks came along.
     """
@@ -71,7 +71,7 @@ class CaptureReport:
         focus_point: The point that the cameras look at, scene units. [3]
         rig_extent: Largest distance between two cameras, scene units.
         points: Name of a point cloud that came along; empty without one.
-        warnings: Sentences about what is odd but usable.
+        warnings: Sentences about odd but usable things.
         misfit_px: By how many pixels frames have another shape than their calibration; 0 where they have not.
         fit: The user's answer about these frames.
         needs_fit: Whether that has to be said before they can be used.
@@ -136,7 +136,7 @@ class RefusedFolder:
         path: The folder.
         message: The fault.
         hint: The remedy; may be empty.
-        problems: Every problem of it where there are several: what is wrong and what to do about it.
+        problems: Every problem of it where there are several: the fault and the remedy.
         videos: Videos in it that may be cameras of one scene, where no calibration was found.
         needs_links: Nothing is wrong but that its files lie outside of it, which the user may allow.
     """

@@ -48,7 +48,7 @@ class OtherCapture(ProjectError):
 
     Attributes:
         project: The project's folder.
-        known: Where its capture was.
+        known: The former place of its capture.
     """
 
     project: Path | None = None
@@ -63,10 +63,10 @@ class Opened:
         project: None where it is the one already open, or the user has to be asked.
         catalog: Its clips on the disk; None without a project.
         choices: The projects to choose from; empty where there is nothing to choose.
-        notes: Kind, title, detail and hint of what the user has to know.
+        notes: Kind, title, detail and hint of each note to the user.
         follow_links: Of a choice: whether the user allows the capture's files to lie outside of its folder.
         is_asking: There is no project yet, and the user is to see the capture before one is made.
-        folder: Where the project would be made then; None elsewhere.
+        folder: The place of a new project then; None elsewhere.
         is_new: The project was made just now.
     """
 
@@ -126,7 +126,7 @@ def open_for_window(
         answers: The first settings of a new project; None takes the scale and what the capture suggests. Its `fit` is
             written into the capture's capture.json.
         known: The capture where it was opened already.
-        choices: How a project is opened.
+        choices: The way a project is opened.
         projects: The folder of projects without a place of their own; None for the usual one.
     Raises:
         DamagedProject: Its document is damaged; says what is left.
