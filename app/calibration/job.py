@@ -81,7 +81,7 @@ def run_calibration(
 
     Args:
         request: The request.
-        report: Told stage, share of the whole and detail.
+        report: Receives stage, share of the whole and detail.
         alive: Called several times a second; what it raises ends the work.
     Raises:
         CaptureError: Bad input. PreparationError: No cameras could be found. DiskError: It could not be written.

@@ -24,7 +24,7 @@ class ExportProgress:
 
 
 Report = Callable[[ExportProgress], None]
-"""Told how far an export is. What it raises ends the export, which then leaves nothing behind."""
+"""Receives the progress of an export. An exception from it ends the export, which then leaves nothing behind."""
 
 
 @dataclass(frozen=True, slots=True)

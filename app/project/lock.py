@@ -68,7 +68,7 @@ def process_start(pid: int) -> str:
 
 @cache
 def machine_id() -> str:
-    """Tells this machine from others of its name, after a restart too."""
+    """Distinguishes this machine from others of its name, after a restart too."""
     for name in ("/etc/machine-id", "/var/lib/dbus/machine-id"):
         with suppress(OSError, ValueError):
             text = Path(name).read_text("ascii").strip()
@@ -80,7 +80,7 @@ def machine_id() -> str:
 
 @cache
 def boot_id() -> str:
-    """Tells this run of the system's kernel, which containers share, from others. Empty where unknown."""
+    """Distinguishes this run of the system's kernel, which containers share, from others. Empty where unknown."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
     except (OSError, ValueError):

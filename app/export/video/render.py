@@ -65,7 +65,7 @@ def render_video(
     Args:
         job: The video to render.
         opened: The project.
-        report: Told after every picture how far it is, with rate and time left.
+        report: Receives the progress after every picture, with rate and time left.
         is_cancelled: Asked before every picture.
         n_threads: Threads to draw with; None for all.
     Raises:

@@ -72,7 +72,7 @@ def with_added_figures(
         document: See app.evaluation.evaluation.evaluate_project; changed in place.
         pictures: Renders of the project.
         on_progress: Gets pictures done and pictures in all.
-        say: Told which package is missing.
+        say: Receives a sentence on the missing package.
     Raises:
         ProjectError: A clip is damaged.
     """

@@ -69,7 +69,7 @@ def run_plan(plan: Plan, *, n_threads: int | None = None, say: Say = lambda what
     Args:
         plan: The measurements.
         n_threads: Threads to compute with; every core when None.
-        say: Told before each measurement.
+        say: Called before each measurement.
     """
     from app.background.kernels import use_threads, warm_cache
 

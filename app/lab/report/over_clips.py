@@ -1,7 +1,7 @@
 """The section on quality over the clips: what a clip loses against its reference clip, and by what.
 
 Colour is what the colour fit gets back, light what a fit of smooth local brightness gets back beyond that; the rest is
-shape and texture, and grows with the distance in time. Beside it the exposure of the cameras, which is measured and
+shape and texture, and grows with the distance in time. Next to it the exposure of the cameras, which is measured and
 removed before training.
 """
 

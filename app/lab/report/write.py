@@ -83,8 +83,8 @@ def write_report(
         precision: Of all projects: pictures as rendered, or rounded to 8 bit.
         wishes: Places that figures are to show; chosen by their rules when None.
         beginning: Sections before all others.
-        on_stage: Told what is done.
-        say: Told what the user should know, see app.evaluation.evaluation.evaluate_project.
+        on_stage: Receives the present stage.
+        say: Receives sentences for the user, see app.evaluation.evaluation.evaluate_project.
         measuring, make_pictures: Tests bring quick ones.
         rates_of: Measures how fast a project is rendered; left out by default.
     Returns:

@@ -93,7 +93,7 @@ class ClipCatalog:
     Args:
         project: Whose clips.
         n_clips: Number of clips of the capture.
-        report: Told how many were read so far, from time to time.
+        report: Receives the number of clips read so far, from time to time.
     """
 
     def __init__(self, project: Project, n_clips: int, report: Callable[[int], None] = lambda n_read: None) -> None:

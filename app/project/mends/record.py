@@ -19,7 +19,7 @@ from engine.storage.typed_json import EntryError, to_type
 
 SCHEMA = 1
 UNFINISHED = "unfinished.json"
-"""Beside the records, while mended clips are put in their place."""
+"""Next to the records, while mended clips are put in their place."""
 MAX_KEPT = 50
 """Records beyond that go, the oldest first; they are about clips long gone."""
 _HINT = "Remove it; nothing else depends on it."
