@@ -1,1 +1,1 @@
-"""What the program knows and does."""
+"""The program's knowledge and actions."""

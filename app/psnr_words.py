@@ -14,7 +14,7 @@ def psnr_label(psnr: float, *, is_whole: bool) -> str:
 
 
 def psnr_note(*, is_whole: bool) -> str:
-    """What the figure is over, as one sentence without its full stop."""
+    """The pictures that the figure covers, as one sentence without its full stop."""
     return WHOLE_NOTE if is_whole else PART_NOTE
 
 

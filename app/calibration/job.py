@@ -31,7 +31,7 @@ from engine.progress import Progress, ReportProgress
 from engine.text import duration_text
 
 MIN_SHARE = 0.05
-"""Before this share is done the time left is not told: it would be a guess."""
+"""Before this share is done the time left is not reported: it would be a guess."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def run_calibration(
 
     Args:
         request: The request.
-        report: Told stage, share of the whole and detail.
+        report: Receives stage, share of the whole and detail.
         alive: Called several times a second; what it raises ends the work.
     Raises:
         CaptureError: Bad input. PreparationError: No cameras could be found. DiskError: It could not be written.
@@ -95,7 +95,7 @@ def run_calibration(
 
 
 def written(calibration: Calibration, request: CalibrationRequest) -> CalibrationOutcome:
-    """What comes of a calibration: a capture, unless it has failed and is not to be kept all the same.
+    """The outcome of a calibration: a capture, unless it has failed and is not to be kept all the same.
 
     Raises:
         DiskError: It could not be written.
@@ -163,7 +163,7 @@ def write_calibrated(
 
     Args:
         calibration: Cameras whose places cannot be trusted are written as excluded.
-        videos: What was calibrated.
+        videos: The calibrated videos.
         out: Folder that becomes the capture.
         keeps_doubtful: Leave those in use.
         follow_links: Whether links in the folder of the videos may lead out of it.

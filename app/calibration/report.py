@@ -21,7 +21,7 @@ def report_lines(calibration: Calibration, *, keeps_doubtful: bool = False) -> l
     """Everything that a user has to know, one sentence or camera per line.
 
     Args:
-        calibration: What was found.
+        calibration: The calibration's result.
         keeps_doubtful: Whether doubtful cameras were left in use.
     """
     found = calibration.found

@@ -20,7 +20,7 @@ class CommandText:
         stdin: One line that it reads from standard input, such as JSON, which may be longer than systems let arguments
             be; empty for none.
         statement: The same in Python, of an open `project`.
-        names: What the statement takes from the module, beside `open_project`.
+        names: The statement's imports from the module other than `open_project`.
         folder: Of the project.
         reads_only: Whether the project need not be open for writing.
     """

@@ -1,4 +1,4 @@
-"""A step of a document as a command: what turned one document into the other."""
+"""A step of a document as a command, which turns one document into the other."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def edit_command(folder: Path, edit: Edit) -> CommandText:
 
 
 def _of_edits(folder: Path, before: ProjectDocument, after: ProjectDocument) -> CommandText | None:
-    """What can be said of a single edit; None where it takes more."""
+    """The command for a single edit; None where it takes more than one."""
     old, new = {edit.edit_id: edit for edit in before.edits}, {edit.edit_id: edit for edit in after.edits}
     added, removed = [i for i in new if i not in old], [i for i in old if i not in new]
     if len(added) == 1 and not removed:

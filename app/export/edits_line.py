@@ -1,4 +1,4 @@
-"""What the dialog and the command line say of edits that go along with an export."""
+"""The dialog's and the command line's sentence about edits that go along with an export."""
 
 from __future__ import annotations
 

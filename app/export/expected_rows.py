@@ -1,11 +1,11 @@
-"""How many Gaussians a trained clip has, as far as its header tells. For what is said before an export."""
+"""How many Gaussians a trained clip has, as far as its header states. For the estimate before an export."""
 
 from __future__ import annotations
 
 from engine.clip_files.clip_header import ClipHeader
 
 _ALIVE = 0.3
-"""Of the anchors of what moves, those that exist at a moment; where the header does not say how many."""
+"""Of the anchors of moving things, those that exist at a moment; where the header does not say how many."""
 
 
 def expected_rows(header: ClipHeader) -> tuple[int, int]:

@@ -43,7 +43,7 @@ class ExportChoices(msgspec.Struct, frozen=True):
         return self.with_answer(STEP, str(min(max(step, 1), MAX_STEP)))
 
     def answer(self, option: str, usual: str = "") -> str:
-        """What was chosen for an option of the present kind."""
+        """The value chosen for an option of the present kind."""
         return dict(self.answers).get(f"{self.kind}.{option}", usual)
 
     def with_answer(self, option: str, value: str) -> ExportChoices:
@@ -57,14 +57,14 @@ class ExportChoices(msgspec.Struct, frozen=True):
 
 
 class ExportContext(msgspec.Struct, frozen=True):
-    """What choices are made of: plain facts of the open project.
+    """The facts that choices depend on: plain values of the open project.
 
     Attributes:
         name: Of the project, as the user knows it.
         n_frames: Of the capture, as far as it is worked on.
         clips: First frame and the one after the last, of every clip.
         trained: Which of them are finished.
-        frame_index: Where the playhead stands.
+        frame_index: Frame under the playhead.
         in_frame, out_frame: Of the timeline, both included.
         cameras: Names.
         paths: Names of the project's camera paths.

@@ -1,4 +1,4 @@
-"""What an export would write, and what is wrong with it: found before any work, on a thread."""
+"""The size and the problems of an export: found before any work, on a thread."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 TAKEN = "Another running or waiting export writes to this place."
 _SAME = {".htm": ".html"}
 _OWN_SUFFIXES = (".mp4", ".webm", ".html")
-"""They say what a file is."""
+"""Suffixes that state the kind of a file."""
 _FILE_SUFFIXES = (*_OWN_SUFFIXES, ".csv", ".json")
 """Of everything that is one file."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExportPlan:
-    """What the dialog shows beforehand.
+    """The dialog's preview of an export.
 
     Attributes:
-        choices: What it is the plan of.
-        n_files, n_bytes: What will be written; 0 where it cannot be told.
+        choices: The choices that it is the plan of.
+        n_files, n_bytes: Of the files to write; 0 where not known.
         free_bytes: Of the disk; None where it is not known.
-        problems: What has to be mended first, in sentences; none where the export can begin.
-        lines: What else the user should know.
+        problems: Obstacles to remove first, in sentences; none where the export can begin.
+        lines: Other sentences that the user should know.
     """
 
     choices: ExportChoices
@@ -51,7 +51,7 @@ def plan_export(
     """Look at what an export would do. Reads headers and asks the disk; writes nothing.
 
     Args:
-        taken: What other exports will write, although it may not be there yet.
+        taken: Paths that other exports will write, although it may not be there yet.
     """
     answers = Answers(context, choices)
     has_frames = answers.job_type.takes("frames")
@@ -128,7 +128,7 @@ def suggested_out(folder: str, context: ExportContext, choices: ExportChoices, t
     """A place for an export: a name of its own in a folder that was used last. Asks the disk.
 
     Args:
-        taken: What other exports will write, although it may not be there yet.
+        taken: Paths that other exports will write, although it may not be there yet.
     """
     answers = Answers(context, choices)
     suffix = answers.suffix

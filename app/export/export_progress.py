@@ -1,4 +1,4 @@
-"""What an export tells while it runs, and what it leaves behind: plain values."""
+"""Progress, result and estimate of an export: plain values."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class ExportProgress:
-    """How far an export is.
+    """Progress of an export.
 
     Attributes:
         n_done, n_all: In units; nothing is known while n_all is 0.
-        unit: What is counted, in the plural: "frames".
-        message: What it does now, where that is more than writing units; may be empty.
+        unit: The unit of the counts, in the plural: "frames".
+        message: The present activity, where that is more than writing units; may be empty.
     """
 
     n_done: int
@@ -24,18 +24,18 @@ class ExportProgress:
 
 
 Report = Callable[[ExportProgress], None]
-"""Told how far an export is. What it raises ends the export, which then leaves nothing behind."""
+"""Receives the progress of an export. An exception from it ends the export, which then leaves nothing behind."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExportResult:
-    """What an export has written.
+    """The result of an export.
 
     Attributes:
         path: The file, or the folder that was filled.
         n_files, n_bytes: All of them.
-        psnr_db: What was read back and rendered, against the live pictures; None where nothing is to be measured.
-        lines: Sentences about what the user should know.
+        psnr_db: Of the files, read back and rendered, against live pictures; None where nothing is to be measured.
+        lines: Sentences that the user should know.
     """
 
     path: Path
@@ -47,11 +47,11 @@ class ExportResult:
 
 @dataclass(frozen=True, slots=True)
 class ExportEstimate:
-    """What an export will write.
+    """The expected size of an export.
 
     Attributes:
-        n_files, n_bytes: As far as they can be told beforehand; bytes are an estimate, 0 where there is none.
-        lines: Sentences about what the user should know.
+        n_files, n_bytes: As far as they can be known beforehand; bytes are an estimate, 0 where there is none.
+        lines: Sentences that the user should know.
     """
 
     n_files: int

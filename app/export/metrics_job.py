@@ -44,7 +44,7 @@ _WHICH: tuple[tuple[Choice, Precision], ...] = (
     ("quick", "float"),
     ("quick", "8bit"),
 )
-"""What may be kept of a picture; the first that is there counts."""
+"""Kinds of figures that may be kept of a picture; the first that is there counts."""
 
 
 def estimate(opened: TrainedProject, job: MetricsJob) -> ExportEstimate:
@@ -73,7 +73,7 @@ def run(opened: TrainedProject, job: MetricsJob, report: Report) -> ExportResult
 
 
 class _Chosen:
-    """The clips of a job and what is kept of them, one clip at a time."""
+    """The clips of a job and the figures kept of them, one clip at a time."""
 
     def __init__(self, opened: TrainedProject, job: MetricsJob) -> None:
         self.opened, trained = opened, opened.trained
@@ -96,7 +96,7 @@ class _Chosen:
         self.said: tuple[str, ...] = ()
 
     def lines(self) -> tuple[str, ...]:
-        """What the user should know beforehand."""
+        """Sentences that the user should know beforehand."""
         n = len(self.untrained)
         if not n:
             return ()
@@ -112,7 +112,7 @@ class _Chosen:
         return sorted({name for index in self.frames for name in self.settings(index)})
 
     def kept(self, clip_index: int) -> tuple[list[dict[str, Any]], list[PairRow]]:
-        """Rows of a clip, and what is known of its neighbouring frames."""
+        """Rows of a clip, and the known figures of its neighbouring frames."""
         names, holdout = self.opened.capture.rig.names, set(self.opened.project.settings.holdout)
         found: dict[tuple[str, int], tuple[str, str, EvalRow]] = {}
         pairs: dict[tuple[str, int], PairRow] = {}

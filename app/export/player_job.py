@@ -27,14 +27,14 @@ LARGEST_PAGE_BYTES = 150_000_000
 """Above this, browsers are slow to open a single file: the data goes into a folder unless one file is asked for."""
 PAGE_SUFFIXES = (".html", ".htm")
 _DESCRIBED_BYTES = 400
-"""What a page says of a clip, about."""
+"""Bytes of a page's description of a clip, about."""
 _SHARED_ROW_BYTES, _LIGHT_ROW_BYTES, _MOVING_ROW_BYTES = 9.5, 0.5, 8.8
 """Of a Gaussian that stands still, once; of the light on it, per clip; and per frame of those that move in the frame
 with most of them. As measured on trained captures, where many are too faint to be written."""
 
 
 def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
-    """What will be written. Reads no more than the headers of the clips.
+    """Estimate what will be written. Reads no more than the headers of the clips.
 
     Raises:
         ProjectError: The target cannot be written, or a frame is not trained.
@@ -59,7 +59,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     """Write the player, clip by clip.
 
     Raises:
-        ProjectError: What `estimate` raises.
+        ProjectError: As `estimate`.
         DiskError: The disk refused; nothing is left behind.
         Unwanted: From `report`; nothing is left behind.
     """
@@ -151,7 +151,7 @@ def _scene(opened: TrainedProject, job: PlayerJob) -> SceneFrames:
 
 def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
     """Clips with the frames of each that are wanted; one comes several times where different edits hold in it, so that
-    what stands still does so in each stretch. Raises ProjectError where one is not trained."""
+    still parts are still in each stretch. Raises ProjectError where one is not trained."""
     frames = scene.trained_frames if job.frames is None else job.frames
     scene.check_trained(frames)
     clips: list[tuple[Clip, list[int]]] = []
@@ -166,7 +166,7 @@ def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
 def _packed(
     packer: Packer, scene: SceneFrames, wanted: list[int], told: Callable[[int], None] = lambda n_done: None
 ) -> Block:
-    """A clip's block. told: Of each frame, before it is made, how many there are."""
+    """A clip's block. told: Called before each frame is made, with the number of frames made."""
 
     def moving(frame: int) -> Splats:
         told(frame)

@@ -1,4 +1,4 @@
-"""What a player knows of a scene beside its Gaussians: time, cameras, and where one looks from at first."""
+"""A player's facts about a scene other than its Gaussians: time, cameras, and where one looks from at first."""
 
 from __future__ import annotations
 

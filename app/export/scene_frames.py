@@ -36,7 +36,7 @@ class Share:
         weight: All weights of a moment add up to 1.
         trained: The clip, for its colours and near plane.
         clip_time: In it.
-        gaussians: What is drawn.
+        gaussians: The Gaussians to draw.
     """
 
     weight: float
@@ -52,7 +52,7 @@ class SceneFrames:
         opened: A project opened for reading.
         n_threads: Threads to decode with; None for all.
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
-        edits: What is applied; None for the edits of the project, empty for the scene as it was trained.
+        edits: Edits to apply; None for the edits of the project, empty for the scene as it was trained.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class SceneFrames:
         return self._loaded
 
     def _part(self, frame: float, part: Part) -> EditedClip:
-        """The part of the clip that shows a moment. Raises what `trained` raises."""
+        """The part of the clip that shows a moment. Raises as `trained` does."""
         from engine.editing.edited_clip import EditedClip
 
         trained = self.trained(frame)
@@ -165,22 +165,22 @@ class SceneFrames:
 
         Args:
             frame: In frames of the capture; its field is evaluated there.
-            part: "static": what stands still in the whole clip, "moving": the rest, "all": both.
+            part: "static": still parts of the whole clip, "moving": the rest, "all": both.
         Raises:
-            ProjectError: What `trained` raises; an edit is damaged.
+            ProjectError: As `trained`; an edit is damaged.
         """
         return self._part(frame, part).decode(self.clip_time(frame), self.effects(frame)).gaussians
 
     def shares(self, frame: float) -> Iterator[Share]:
-        """What is shown of a moment, to be drawn one by one and mixed by weight.
+        """The parts of a moment's picture, to be drawn one by one and mixed by weight.
 
-        Anchors of what moves stand still and exist at some frames only, and a clip ends with its last frame. Between
+        Anchors of moving things stand still and exist at some frames only, and a clip ends with its last frame. Between
         two frames the field is evaluated at the moment itself, but what exists at the frame before fades out while what
         exists at the frame after fades in; all at once it would be seen twice. Between two clips the last frame of the
         one fades into the first frame of the other, where both are trained.
 
         Raises:
-            ProjectError: What `trained` raises.
+            ProjectError: As `trained`.
         """
         before, effects = math.floor(frame), self.effects(frame)
         fraction = frame - before

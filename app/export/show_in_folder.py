@@ -17,7 +17,7 @@ def show_in_folder(path: Path) -> None:
     thread.
 
     Raises:
-        EngineError: It is not there any more, or there is no file manager; says where it is.
+        EngineError: It is no longer there, or there is no file manager; says where it is.
     """
     if not path.exists():
         raise ProjectError("The file no longer exists.", path=path)
@@ -25,7 +25,7 @@ def show_in_folder(path: Path) -> None:
     if command is None:
         raise ProjectError("No file manager found.", hint="Open the folder by hand.", path=path)
     try:
-        # what it says would be for a terminal, and it must not end with this program
+        # its output would be for a terminal, and it must not end with this program
         done = subprocess.run(
             command,
             stdin=subprocess.DEVNULL,
@@ -44,7 +44,7 @@ def show_in_folder(path: Path) -> None:
 
 
 def _command(path: Path) -> list[str] | None:
-    """What to run; None where there is nothing."""
+    """The command to run; None where there is none."""
     if sys.platform == "win32":
         return ["explorer", f"/select,{path}"]
     if sys.platform == "darwin":

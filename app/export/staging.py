@@ -27,10 +27,10 @@ def check_target(
     """See that an export can be written, before the work that leads to it. Makes nothing.
 
     Args:
-        opened: What is exported; nothing is written into its project or its capture, where a file could take the place
+        opened: The open project; nothing is written into it or its capture, where a file could take the place
             of one of theirs, or be taken for one.
-        path: What is to be written: a file, which may be there already and is replaced, or a new or empty folder.
-        n_bytes: How large it becomes, as far as that is known.
+        path: The destination: a file, which may be there already and is replaced, or a new or empty folder.
+        n_bytes: Its expected size, as far as known.
         is_folder: Which of the two it is.
     Raises:
         ProjectError: Something else has this name, the place may not be written to, or the disk has too little room.
@@ -82,7 +82,7 @@ def _is_empty_folder(path: Path) -> bool:
 def staged_file(path: Path, *, what: str = "The file") -> Iterator[Path]:
     """Write to the yielded path; it becomes `path` when the block ends well, and disappears when it does not.
 
-    What killed programs have left beside it of the same file goes first.
+    Remains of the same file that killed programs have left next to it are removed first.
 
     Args:
         what: Names the file in a message.

@@ -1,4 +1,4 @@
-"""What all charts have in common: palette, an off-screen figure, PNG bytes. Imports matplotlib only when one is made:
+"""The common parts of all charts: palette, an off-screen figure, PNG bytes. Imports matplotlib only when one is made:
 importing it takes longer than most commands."""
 
 from __future__ import annotations

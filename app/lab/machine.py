@@ -1,4 +1,4 @@
-"""What a figure was measured on: processor, cores, versions, date."""
+"""The machine that a figure was measured on: processor, cores, versions, date."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a trained project for its report: truth and render of a frame, maps of what changes between frames."""
+"""Pictures of a trained project for its report: truth and render of a frame, maps of changes between frames."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 class Pictures(Protocol):
-    """Where a report gets its pictures; tests bring small ones."""
+    """Source of a report's pictures; tests bring small ones."""
 
     def pair(
         self, clip_index: int, frame_index: int, camera: str, features: Features = "both"
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What a camera took [H, W, 3] uint8, and the render in its colours [H, W, 3] float32.
+        """A camera's picture [H, W, 3] uint8, and the render in its colours [H, W, 3] float32.
 
         Args:
             features: Which features of the anchors are used, see engine.metrics.clips.features_apart.

@@ -28,7 +28,7 @@ class Published:
         psnr: dB.
         ssim, lpips: None where not printed. LPIPS is the authors' own.
         source: Where it is printed.
-        caveat: What makes it hard to compare; may be empty.
+        caveat: Why it is hard to compare; may be empty.
         n_frames: Of the sequence that it is of; None where that is not said.
     """
 

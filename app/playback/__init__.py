@@ -1,1 +1,1 @@
-"""Everything that prepares what is shown: frames, pictures, clouds, views."""
+"""Everything that prepares contents for the screen: frames, pictures, clouds, views."""

@@ -21,12 +21,12 @@ SETTLED_S = 0.3
 MOST_UNASKED = 30
 """After so many turns of the loop in which nobody asked for a picture, none are drawn ahead."""
 SPARE = 2
-"""Frames that memory holds beside those that come: the one shown, and the newest."""
+"""Frames that memory holds in addition to those that come: the one shown, and the newest."""
 
 RequestOf = Callable[[int, ShownAs], FrameRequest | None]
-"""What is to be decoded for a frame and how it is shown; None where nothing is trained."""
+"""The request for a frame and how it is shown; None where nothing is trained."""
 StateOf = Callable[[int], Hashable]
-"""What tells states of a clip apart."""
+"""A value that distinguishes states of a clip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class AskedLook:
     """How a place on screen shows frames.
 
     Attributes:
-        look: What was asked for.
+        look: The look that was asked for.
         full: The same at full size.
     """
 
@@ -116,7 +116,7 @@ class Ahead:
         return n_ready, len(frames)
 
     def _take_looks(self) -> None:
-        """What is shown now; a place that has not said so for some turns of the loop is gone."""
+        """Take the looks shown now; a place that has not asked for some turns of the loop is gone."""
         self._unasked = {view_id: 0 if view_id in self._asked else n + 1 for view_id, n in self._unasked.items()}
         self._unasked |= dict.fromkeys(self._asked, 0)
         looks = self._looks | self._asked
@@ -172,7 +172,7 @@ class Ahead:
 
 
 def n_ahead(course: Course) -> int:
-    """How many frames are made ready while it plays."""
+    """Number of frames made ready during playback."""
     if course.is_loaded_first:
         return course.n_frames
     return min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)

@@ -50,7 +50,7 @@ class PictureRequest:
 
 
 class CapturedPictures:
-    """What the cameras took. Methods are for one thread, not those it owns."""
+    """The captured pictures. Methods are for one thread, not those it owns."""
 
     def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
         self._cache: ByteCache[PictureRequest, Picture] = ByteCache(cache_bytes)

@@ -57,7 +57,7 @@ class FrameRequest:
         is_live: Whether the file is a snapshot of a running training: it may be gone before it is read, and another
             one follows soon.
         generation: Of the open project.
-        shown_as: What is decoded; see app.playback.modes.view_modes.decoded_as.
+        shown_as: The mode and content to decode; see app.playback.modes.view_modes.decoded_as.
         effects: Of the edits that hold at the frame.
     """
 
@@ -88,9 +88,9 @@ class LoadedClip:
     """A model in memory and what is shown of it.
 
     Attributes:
-        colors: What the cameras make of the scene's colours; None where the files do not say.
+        colors: The cameras' rendition of the scene's colours; None where the files do not say.
         trained: The clip as cameras see it; None in the same case.
-        parts: What else can be decoded of it.
+        parts: Its parts that can be decoded apart.
     """
 
     model: ClipModel
@@ -104,7 +104,7 @@ class LoadedClip:
 
 @dataclass(frozen=True, slots=True)
 class ShownFrame:
-    """What is drawn of a frame: Gaussians, and the anchors that exist then."""
+    """The drawn contents of a frame: Gaussians, and the anchors that exist then."""
 
     gaussians: GaussianArrays
     anchors: AnchorArrays
@@ -197,7 +197,7 @@ class FrameDecoder:
 
     @property
     def n_that_fit(self) -> int:
-        """How many frames like the newest one can be kept."""
+        """Number of frames like the newest one that can be kept."""
         return max(self._cache.max_bytes // max(self._frame_bytes, 1), 1)
 
     def plan(self, requests: Sequence[FrameRequest], distance: Callable[[FrameKey], float]) -> None:
@@ -221,7 +221,7 @@ class FrameDecoder:
         return None if loaded is None else loaded.model
 
     def colors(self, request: FrameRequest) -> CameraColors | None:
-        """What the cameras make of the scene's colours in a state; None until it was loaded, or where unknown."""
+        """The cameras' rendition of the scene's colours in a state; None until it was loaded, or where unknown."""
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.colors
 
@@ -234,7 +234,7 @@ class FrameDecoder:
         return self._loading == request.model_key
 
     def is_loaded(self, request: FrameRequest) -> bool:
-        """Whether the file of this state is not needed any more."""
+        """Whether the file of this state is no longer needed."""
         return request.model_key in self._models
 
     def has_failed(self, request: FrameRequest) -> bool:
@@ -294,7 +294,7 @@ class FrameDecoder:
 
 
 def decode_frame(loaded: LoadedClip, request: FrameRequest) -> ShownFrame:
-    """What is drawn of a frame of a clip in memory, with the edits of the request."""
+    """Decode a frame of a clip in memory, with the edits of the request."""
     from engine.model.host_array import host_array
 
     clip_time = request.clip.clip_time(request.frame_index)

@@ -1,4 +1,4 @@
-"""PictureSource: what something on screen is of. It travels from the decoder to the words over the picture."""
+"""PictureSource: the source of something on screen. It travels from the decoder to the words over the picture."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class PictureSource:
         camera_index: The capture camera that took it, or that it is looked at through; None for a free view.
         look: From where and through which lens, whatever the size; see OrbitView.look_key.
         has_scene_colors: Whether a captured picture was brought into the scene's colours.
-        shown_as: What its colours mean, and which part of the clip it shows.
+        shown_as: The meaning of its colours, and which part of the clip it shows.
     """
 
     clip_index: int | None = None
@@ -37,4 +37,4 @@ class PictureSource:
 
 
 UNKNOWN = PictureSource()
-"""Of what belongs to no frame."""
+"""The source of contents that belong to no frame."""

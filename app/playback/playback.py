@@ -40,7 +40,7 @@ class Failure:
     """Something that could not be shown.
 
     Attributes:
-        title: What the user is told.
+        title: The message to the user.
         is_of_clip: Whether it came of the file of a clip.
         is_live: Whether that file is a snapshot of a running training: it may be gone before it is read, and another
             one follows.
@@ -53,8 +53,8 @@ class Failure:
 
 
 class Playback:
-    """What is to be seen of the open project at a playhead and from a view. For one thread, and nothing here waits:
-    what is not there yet is asked for, and comes at a later call.
+    """The pictures of the open project at a playhead and from a view. For one thread. Nothing here waits:
+    a missing picture is asked for, and comes at a later call.
 
     Args:
         state_of: Of the clips of the open project.
@@ -83,7 +83,7 @@ class Playback:
             worker.start()
 
     def show(self, opened: OpenedProject) -> None:
-        """Take up what is open. What was made of another project is forgotten."""
+        """Take up the open project. Contents of another project are forgotten."""
         if self._opened is not None and self._opened.generation != opened.generation:
             for store in (*self._stores, self.ahead, self._modes):
                 store.clear()
@@ -97,8 +97,8 @@ class Playback:
     # ---------------------------------------------------------------- frames of clips
 
     def frame(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> ShownFrame | None:
-        """What is drawn of the frame under the playhead, or the newest there is until that was decoded; None where
-        nothing is trained. It says itself what it is of."""
+        """The drawn contents of the frame under the playhead, or the newest there is until that was decoded; None where
+        nothing is trained. The frame states its source."""
         request = self._request(timeline, shown_as)
         shown = None if request is None else self.decoder.frame(request)
         return None if shown is None else replace(shown, gaussians=self._modes.of(shown, shown_as.mode))
@@ -115,7 +115,7 @@ class Playback:
         return None if model is None else model.decoder.gaussians_per_anchor
 
     def coverage(self, timeline: Timeline) -> CoveredSpace | None:
-        """What inherited anchors cover in the clip under the playhead; None until it is loaded and measured."""
+        """The space covered by inherited anchors in the clip under the playhead; None until it was measured."""
         request = self._request(timeline)
         anchors = None if request is None else self.decoder.anchors(request)
         return None if anchors is None else self._coverage.find(anchors)
@@ -130,7 +130,7 @@ class Playback:
         return self._trails.trails(TrailRequest(request.model_key, request.frame_index, effects, loaded.parts))
 
     def is_loaded(self, timeline: Timeline) -> bool:
-        """Whether the file of the clip under the playhead is not needed any more. Asks for what is missing."""
+        """Whether the file of the clip under the playhead is no longer needed. Asks for a missing one."""
         request = self._request(timeline)
         if request is None:
             return False
@@ -140,7 +140,7 @@ class Playback:
     def wanted(
         self, timeline: Timeline, view: OrbitView, shown_as: ShownAs = PLAIN, *, view_id: Hashable = 0
     ) -> WantedFrame | None:
-        """What ought to be on screen in a place; None without a project."""
+        """The frame that ought to be on screen in a place; None without a project."""
         clip, request = timeline.clip, self._request(timeline, shown_as)
         if clip is None:
             return None
@@ -179,7 +179,7 @@ class Playback:
         Args:
             width, height: Its size, px.
             full_size: If it is there already in this size, that is given instead.
-            shown_as: What its colours mean, and of which part of the clip.
+            shown_as: The meaning of its colours, and the part of the clip.
             view_id: Of the place where it is shown.
             state_of: Other states of clips than those of the project, for instance earlier versions.
         """
@@ -218,7 +218,7 @@ class Playback:
         return None
 
     def favour(self, view_id: Hashable) -> None:
-        """Draw what is asked for this place first."""
+        """Draw this place's request first."""
         self.renderer.worker.active_lane = view_id
 
     def work_ahead(self, timeline: Timeline, *, is_busy: bool = False) -> None:
@@ -237,7 +237,7 @@ class Playback:
         self._follow_loading(timeline, course, request_of)
 
     def _follow_loading(self, timeline: Timeline, course: Course, request_of: RequestOf) -> None:
-        """What is played around a seam is made ready once; another view later on does not hold it up again."""
+        """Load the frames that are played around a seam once; another view later on does not hold them up again."""
         self.loading = None
         if timeline.around != self._loaded:
             self._loaded = None
@@ -249,7 +249,7 @@ class Playback:
                 self._loaded = timeline.around
 
     def _plan_compared(self, timeline: Timeline, course: Course) -> None:
-        """Captured pictures that are set beside the render come ahead of the playhead, too."""
+        """Captured pictures that are compared with the render come ahead of the playhead, too."""
         compared, self._compared = tuple(self._compared), {}
         wanted = (course, compared, self.decoder.revision) if course.is_playing and compared else None
         if wanted == self._planned_compared or self._opened is None:
@@ -276,7 +276,7 @@ class Playback:
         return is_open and is_edited_so and state is not None and (str(state.file), state.revision) == (path, revision)
 
     def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
-        """What is to be decoded for the playhead; None where nothing is trained."""
+        """The request for the playhead; None where nothing is trained."""
         return self._request_at(timeline, timeline.frame_index, shown_as)
 
     def _request_at(
@@ -288,7 +288,7 @@ class Playback:
     def request(
         self, clip: Clip, frame_index: int, shown_as: ShownAs = PLAIN, state_of: StateOf | None = None
     ) -> FrameRequest | None:
-        """What is to be loaded and decoded for a frame of a clip; None where the clip has no state.
+        """The file and frame to load and decode for a frame of a clip; None where the clip has no state.
 
         Args:
             state_of: Other states than those of the project.
@@ -323,7 +323,7 @@ class Playback:
             self._inherited[clip_index] = opened.inherited_path(clip_index)
         return self._inherited[clip_index]
 
-    # ---------------------------------------------------------------- beside them
+    # ---------------------------------------------------------------- other contents
 
     def cloud(self, view: OrbitView) -> PointArrays | None:
         """A cloud for frames that are not trained; None until it is made, and through a capture camera while there is
@@ -353,8 +353,8 @@ class Playback:
         return self.captured.picture(opened.capture, opened.generation, camera_index, frame_index, max_width)
 
     def compared_picture(self, timeline: Timeline, camera_index: int, max_width: int) -> Picture | None:
-        """What a camera took at the playhead, to be set beside the render: in the scene's colours where the frame is
-        trained and loaded, otherwise as it was taken. It says which. None until it was decoded."""
+        """A camera's picture at the playhead, to compare with the render: in the scene's colours where the frame is
+        trained and loaded, otherwise as it was taken. The picture says which. None until it was decoded."""
         opened = self._opened
         if opened is None:
             return None
@@ -405,7 +405,7 @@ class Playback:
         return self._n_ahead_seen
 
     def take_failures(self) -> list[Failure]:
-        """What could not be made since the last call."""
+        """Failures since the last call."""
         found = []
         for worker, title in zip(self.workers, _TITLES, strict=True):
             failure = worker.take_error()

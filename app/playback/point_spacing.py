@@ -1,4 +1,4 @@
-"""How dense a cloud of points is."""
+"""The density of a cloud of points."""
 
 from __future__ import annotations
 

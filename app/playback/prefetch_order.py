@@ -18,7 +18,7 @@ class Course:
     Attributes:
         frame_index: Where it is.
         direction: 1 or -1.
-        first, last: What is played, ends included.
+        first, last: The frames that are played, ends included.
         is_looping: Whether it continues at the other end.
         is_playing: Whether it moves by itself.
         frames_per_s: How fast, while it does.
@@ -51,7 +51,7 @@ class Course:
 
     @property
     def n_frames(self) -> int:
-        """How many frames are played in all."""
+        """Number of frames that are played in all."""
         return self.last - self.first + 1
 
     def ahead(self, n: int) -> list[int]:

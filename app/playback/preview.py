@@ -1,4 +1,4 @@
-"""What can be seen of a capture before anything is trained: a hint at once, a first rough cloud after some seconds.
+"""A capture before anything is trained: a hint at once, a first rough cloud after some seconds.
 
 The hint places every camera's picture in space. The cloud is made by the same reconstruction as the real one, from
 small pictures of a single moment, in a short process of its own: compiling and computing must not hold up a window.
@@ -40,7 +40,7 @@ NEXT_STEPS = {
     "Static cloud": "colouring points",
     "White balance": "looking behind what is seen",
 }
-"""What follows after a line of the reconstruction, by how the line begins."""
+"""The stage after a line of the reconstruction, by how the line begins."""
 
 
 def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
@@ -71,7 +71,7 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
 
 
 class CloudJob(msgspec.Struct, frozen=True):
-    """What the first cloud is made of.
+    """The inputs of the first cloud.
 
     Attributes:
         capture: The capture.
@@ -120,7 +120,7 @@ def make_cloud(job: CloudJob, context: JobContext) -> Path:
 
 
 def write_cloud(job: CloudJob, parent: Parent[str]) -> None:
-    """Build and write the first cloud. Runs in the child, which reports what it does."""
+    """Build and write the first cloud. Runs in the child, which reports its progress."""
 
     def report(line: str) -> None:
         logger.debug(line)

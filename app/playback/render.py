@@ -36,7 +36,7 @@ class RenderView:
 
     Attributes:
         key: Of the view, whatever the size; see OrbitView.look_key.
-        shown_as: What its colours mean, and of which part of a clip.
+        shown_as: The meaning of its colours, and the part of the clip.
         value_range: Of the numbers that its colours stand for.
         near: Nothing nearer than this is drawn, whatever the scene says; see OrbitView.near.
         set_back: How much farther away the camera stands than it seems to; see OrbitView.set_back.
@@ -87,7 +87,7 @@ class RenderRequest:
 
     @property
     def source(self) -> PictureSource:
-        """What the picture is of."""
+        """The source of the picture."""
         look, source = self.look, self.shown.gaussians.source
         return replace(source, camera_index=look.camera_index, look=look.key, shown_as=look.shown_as)
 
@@ -151,7 +151,7 @@ class Renderer:
         return self._cache.revision
 
     def n_that_fit(self, look: RenderView) -> int:
-        """How many pictures of a size can be kept."""
+        """Number of pictures of a size that can be kept."""
         return max(self._cache.max_bytes // (3 * look.width * look.height), 1)
 
     def plan(self, requests: Sequence[RenderRequest], distance: Callable[[PictureKey], float]) -> None:

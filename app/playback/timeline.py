@@ -9,7 +9,7 @@ from app.playback.markers import Markers
 from engine.capture.clip import Clip, ClipSpans
 
 SPEEDS = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
-"""How fast a capture can be played, as multiples of its own speed."""
+"""Speeds at which a capture can be played, as multiples of its own speed."""
 SEAM_REACH = 12
 """Frames on either side of a clip's first frame that are played around it."""
 
@@ -226,7 +226,7 @@ class Timeline:
         return self.frame_index != before
 
     def _advance(self, n_frames: int) -> None:
-        """Move on inside of what is played: round and round, or to its end and no farther."""
+        """Move on inside the played frames: round and round, or to its end and no farther."""
         first, last = self.play_range
         target = self.frame_index + n_frames
         if self.is_looping or self.around is not None:

@@ -16,7 +16,7 @@ from engine.errors import ProjectError
 
 
 class SettingsFixed(ProjectError):
-    """What all clips share cannot change, because a clip is finished or being trained."""
+    """A setting that all clips share cannot change, because a clip is finished or being trained."""
 
 
 def check_change(

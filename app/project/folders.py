@@ -33,7 +33,7 @@ def check_folders(folder: Path, doing: str = "written to") -> None:
 
     Args:
         folder: Of the project, which may be a link itself.
-        doing: What is to be done with it, for the message.
+        doing: The action to be taken, for the message.
     Raises:
         ProjectError: One of its folders is a symbolic link, or no folder at all.
     """

@@ -1,4 +1,4 @@
-"""ProcessLock: one process at a time writes to a folder. The system holds the lock; a file beside it says whose it is.
+"""ProcessLock: one process at a time writes to a folder. The system holds the lock; a file next to it says whose it is.
 
 The system's lock (`filelock`, on ".lock") ends with its process, however that ends, so nothing a killed program leaves
 behind is in the way. The file "lock" names the owner: for messages, for versions before, which know nothing else, and
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from filelock import BaseFileLock
 
 MAX_OWNER_BYTES = 4096
-"""What says who owns a lock is shorter; a longer file is something else."""
+"""A record of who owns a lock is shorter; a longer file is something else."""
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
-"""What file systems answer that have no locks."""
+"""Error numbers of file systems without locks."""
 
 
 def is_process_alive(pid: int) -> bool:
@@ -68,7 +68,7 @@ def process_start(pid: int) -> str:
 
 @cache
 def machine_id() -> str:
-    """Tells this machine from others of its name, after a restart too."""
+    """Distinguishes this machine from others of its name, after a restart too."""
     for name in ("/etc/machine-id", "/var/lib/dbus/machine-id"):
         with suppress(OSError, ValueError):
             text = Path(name).read_text("ascii").strip()
@@ -80,7 +80,7 @@ def machine_id() -> str:
 
 @cache
 def boot_id() -> str:
-    """Tells this run of the system's kernel, which containers share, from others. Empty where unknown."""
+    """Distinguishes this run of the system's kernel, which containers share, from others. Empty where unknown."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
     except (OSError, ValueError):

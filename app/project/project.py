@@ -48,11 +48,11 @@ class Project:
 
     Attributes:
         history: The document and the way back. The window sets it, and keeps it by itself a moment later.
-        store: Where the document is kept.
+        store: The store of the document.
         headers: Of its clips and checkpoints, read once for everybody who asks.
 
     Args:
-        why_read_only: Without a lock, why, and what helps.
+        why_read_only: Without a lock, the cause and the remedy.
     """
 
     def __init__(
@@ -72,12 +72,12 @@ class Project:
 
     @property
     def document(self) -> ProjectDocument:
-        """What the project is made to be."""
+        """The project's present document."""
         return self.history.present
 
     @property
     def settings(self) -> ProjectSettings:
-        """What every clip has in common."""
+        """The settings that all clips share."""
         return self.history.present.settings
 
     @property
@@ -92,7 +92,7 @@ class Project:
 
     @property
     def prep_dir(self) -> Path:
-        """What clips share."""
+        """The folder of files that clips share."""
         return self.folder / PREP
 
     @property
@@ -120,7 +120,7 @@ class Project:
         return finished_files(self.folder, self.settings.clip_bounds, self.settings.clip_length)
 
     def files(self, clip_index: int) -> ClipPaths:
-        """Where the files of a clip lie."""
+        """The place of a clip's files."""
         return ClipPaths(self.folder, self.clip_name(clip_index))
 
     def clip_path(self, clip_index: int) -> Path:

@@ -30,7 +30,7 @@ def copy_project(project: Project, target: Path, report: Callable[[float, str], 
 
     Args:
         target: A folder that is not there yet, or an empty one.
-        report: Told the share that is done, and what is copied. What it raises ends the copying; nothing stays then.
+        report: Receives the share done and the copied item. An exception from it ends the copying; nothing stays then.
     Raises:
         ProjectError: The folder lies in the project, or holds something; or a folder of the project is a link.
         DiskError: The disk refused; nothing stays.
@@ -60,7 +60,7 @@ def copy_project(project: Project, target: Path, report: Callable[[float, str], 
 
 
 def copy_bytes(project: Path) -> int:
-    """What a copy takes at most, bytes."""
+    """The most that a copy takes, bytes."""
     return sum(size for _, size in _files(project))
 
 

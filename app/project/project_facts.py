@@ -1,4 +1,4 @@
-"""What a project's files say without its capture: settings, trained clips, how long they took and what they weigh."""
+"""Facts of a project from its files, without its capture: settings, trained clips, their durations and sizes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ClipFacts:
         storage: Bytes per component, see app.project.clips.clip_bytes.
         stages_s: Wall seconds per stage, see app.training.worker.stage_watch; empty when not recorded.
         preparation_s, training_s: Together all of it; None when not recorded.
-        coverage: Of a clip that inherits: what moves and how much of it has an anchor near it, see
+        coverage: Of a clip that inherits: moving things and how much of them has an anchor near it, see
             engine.clip_files.clip_header.Coverage; None when not recorded.
         memory_mb: Most that the process held which prepared and trained it, 10^6 bytes; None when not recorded.
     """
@@ -66,7 +66,7 @@ class ClipFacts:
 
 @dataclass(frozen=True, slots=True)
 class ProjectFacts:
-    """One project. `name` tells it from the others on the page; `clips` are the trained ones, at least one; `damaged`
+    """One project. `name` is unique on the page; `clips` are the trained ones, at least one; `damaged`
     are files of trained clips that cannot be read."""
 
     name: str
@@ -96,7 +96,7 @@ def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> P
 
     Args:
         name: Of the result.
-        leave_out_damaged: List files of clips that cannot be read beside the others, as long as there are others.
+        leave_out_damaged: List unreadable files of clips apart from the others, as long as there are others.
 
     Raises:
         ProjectError: It is not a project, nothing is trained yet, or a clip cannot be read.
@@ -177,7 +177,7 @@ def _below(folder: Path, depth: int) -> Iterator[Path]:
 
 
 def short_names(folders: Sequence[Path]) -> list[str]:
-    """Names that tell folders apart: the last part of each, and as many parts before it as that needs."""
+    """Names that distinguish folders: the last part of each, and as many parts before it as that needs."""
     parts = [folder.resolve().parts for folder in folders]
     n_parts = [1] * len(parts)
 

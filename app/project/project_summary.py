@@ -1,5 +1,5 @@
-"""What a project folder holds, in bytes, for `clipgstream inspect PROJECT`: per clip and component, and what a minute
-of video comes to. Reads headers only; the figures are those of the report page."""
+"""The size of a project folder, in bytes, for `clipgstream inspect PROJECT`: per clip and component, and that
+of a minute of video. Reads headers only; the figures are those of the report page."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def describe_project(folder: Path) -> dict[str, Any]:
 
     Returns:
         schema; kind "project"; path; capture; fps (None when the capture is not there); clips, each with clip_index,
-        role, start, n_frames, components (name to bytes), n_bytes and coverage (what moves and how much of it has an
-        anchor near it, see engine.clip_files.clip_header.Coverage; None where not known); damaged, files of
+        role, start, n_frames, components (name to bytes), n_bytes and coverage (moving things and the share with an
+        anchor near, see engine.clip_files.clip_header.Coverage; None where not known); damaged, files of
         clips that cannot be read, each with path and reason; components and n_bytes of all clips;
         reference_bytes and reference_share, of the clip that others inherit from; bytes_per_frame and mb_per_minute,
         of all others: what video costs once the reference is there. None where there are none, or where the frame

@@ -1,4 +1,4 @@
-"""Where projects go that are made without a place of their own, and what such a folder is called."""
+"""The place and the names of projects that are made without a place of their own."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def new_project_dir(capture: Capture, folder: Path) -> Path:
 
 
 def project_name(folder: Path, capture: Path | str) -> str:
-    """What a project is called: by its folder, or where the program has named that, by its capture and the number."""
+    """A project's name: that of its folder, or where the program has named that, that of its capture and the number."""
     name = Path(capture).name
     found = _FINGERPRINT_AND_NUMBER.fullmatch(folder.name.removeprefix(name)) if folder.name.startswith(name) else None
     if found is None:

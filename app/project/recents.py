@@ -35,12 +35,12 @@ class RecentProject:
 
     @property
     def folder(self) -> Path:
-        """What is opened: the project where it is known."""
+        """The folder to open: the project where it is known."""
         return Path(self.project or self.capture)
 
     @property
     def trained_text(self) -> str:
-        """How far it is trained, in words."""
+        """Progress of its training, in words."""
         if not self.project:
             return "capture"
         return f"{self.n_trained} of {self.n_clips} clips trained" if self.n_clips else "project"
@@ -76,7 +76,7 @@ def with_entry(entries: Sequence[RecentProject], entry: RecentProject) -> list[R
 
 
 def missing_folders(entries: Iterable[RecentProject]) -> frozenset[Path]:
-    """Folders of entries that are not there any more. Asks the disk."""
+    """Folders of entries that no longer exist. Asks the disk."""
     return frozenset(entry.folder for entry in entries if not _is_there(entry))
 
 

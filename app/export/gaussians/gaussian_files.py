@@ -9,7 +9,7 @@ from app.export.jobs.gaussians import WrittenPart
 from app.export.scene_frames import Part
 
 SIDECAR = "_export.json"
-"""End of the name of the file that says what the others are."""
+"""End of the name of the file that describes the others."""
 _N_DIGITS = 4
 _MAX_NAME_BYTES = 120
 """Of a project's name in the name of a file: the rest has to fit too."""
@@ -47,7 +47,7 @@ def moment_files(name: str, suffix: str, frames: Sequence[int], part: WrittenPar
 
 
 def static_file(name: str, suffix: str, frame: int | None, n_frames: int) -> GaussianFile:
-    """What stands still from a frame on; None where it is the same in all frames, and has no number."""
+    """The file of still parts from a frame on; of None, where they are the same in all frames, without a number."""
     end = "" if frame is None else f"_{_number(frame, n_frames)}"
     return GaussianFile(f"{name}_static{end}{suffix}", frame or 0, "static")
 

@@ -42,11 +42,11 @@ class GaussianSequence:
     """Files of some frames of a scene.
 
     Args:
-        scene: Where frames come from.
+        scene: The source of frames.
         frames: Of the capture, at least one.
-        part: What is written of each.
+        part: The part of each frame to write.
         kind: The format.
-        placement: Where the scene lies in the files.
+        placement: The scene's place in the files.
         n_threads: To write with; no more than a few are of use.
     """
 
@@ -71,7 +71,7 @@ class GaussianSequence:
 
     def write(self, folder: Path, report: Report) -> None:
         """Write every file into a folder. The first, one in the middle and the last are read back, and every file of
-        what stands still.
+        still parts.
 
         Raises:
             ProjectError: A clip is damaged, or a value does not fit the format.
@@ -99,7 +99,7 @@ class GaussianSequence:
         report(ExportProgress(len(self._frames), len(self._frames)))
 
     def _contents(self, report: Report) -> Iterator[tuple[GaussianFile, Gaussians]]:
-        """Each file and what it holds. What stands still comes again only where it is another than before."""
+        """Each file and its contents. Still parts come again only where they have changed."""
         suffix, n_frames = self._kind.suffix, self._n_frames
         moments = {file.frame: file for file in moment_files(self.name, suffix, self._frames, self._part, n_frames)}
         still: Gaussians | None = None
@@ -139,7 +139,7 @@ class GaussianSequence:
         return min((value for written in self.files for value in (written.psnr_db or {}).values()), default=None)
 
     def document(self) -> dict[str, Any]:
-        """What is written beside the files."""
+        """The document that is written next to the files."""
         return {
             "schema": SCHEMA,
             "program": "ClipGStream Studio",
@@ -169,7 +169,7 @@ class GaussianSequence:
         }
 
     def lines(self) -> tuple[str, ...]:
-        """What the user should know: where the scene lies, how near files come, and what was left out."""
+        """Sentences for the user: where the scene lies, how near files come, and what was left out."""
         lines = [f"Coordinates: {self._placement.text}."]
         lines += self._measured_lines()
         for note, n in Counter(note for written in self.files for note in written.notes).items():

@@ -1,5 +1,5 @@
 """Frames of a trained project as files of Gaussians: a folder with a file per frame, read back and measured, and a
-document beside them that says what they are."""
+document next to them that describes them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from engine.storage.json_files import json_text
 
 
 def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
-    """How many files and bytes, of the headers of the clips. Raises ProjectError where a frame is not trained."""
+    """Numbers of files and bytes, from the headers of the clips. Raises ProjectError where a frame is not trained."""
     scene = _scene(opened, job)
     frames = _frames(scene, job)
     stretches = Counter((scene.clip_at(frame).clip_index, scene.effects(frame)) for frame in frames)
@@ -44,7 +44,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     """Write the files; memory does not grow with the number of frames.
 
     Args:
-        report: Told how far it is; what it raises ends the work, and then nothing is left.
+        report: Receives the progress; an exception from it ends the work, and then nothing is left.
     Raises:
         ProjectError: A frame is not trained, the folder is taken, or a value does not fit the format.
         DiskError: The disk refused.
@@ -52,7 +52,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     started_s = time.monotonic()
     scene = _scene(opened, job)
     frames = _frames(scene, job)
-    n_threads = use_threads(None)  # of this process: a job beside a training has but one
+    n_threads = use_threads(None)  # of this process: next to a training, a job has but one
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job), n_threads=n_threads)
     check_target(job.out, opened=opened, is_folder=True)
     report(ExportProgress(0, len(frames), message="Checking the clips"))
@@ -86,7 +86,7 @@ def _kind(job: GaussiansJob) -> Format:
 
 
 def _world(opened: TrainedProject, job: GaussiansJob) -> FileWorld:
-    """Where the scene lies in the files."""
+    """The scene's place in the files."""
     said = opened.project.document.world.meters_per_unit
     scale = job.scale if job.scale is not None else 1.0 if said is None else said
     scene_up = opened.up if job.scene_up is None else np.array(job.scene_up)

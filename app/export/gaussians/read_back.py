@@ -1,4 +1,4 @@
-"""ReadBack: an exported file of Gaussians is read again and looked at beside the live scene, from capture cameras."""
+"""ReadBack: an exported file of Gaussians is read again and compared with the live scene, from capture cameras."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class ReadBack:
     """Measures files of one export.
 
     Args:
-        scene: Where its frames came from.
+        scene: The source of its frames.
         read: Of the format.
-        world: How the scene was placed in the file; undone here.
+        world: The scene's placement in the file; undone here.
     """
 
     def __init__(self, scene: SceneFrames, read: Callable[[BinaryIO], Splats], world: FileWorld) -> None:

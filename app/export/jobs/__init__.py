@@ -1,1 +1,1 @@
-"""What exports can be asked for: one declaration per job, from which command line, form and scripts follow."""
+"""The kinds of export: one declaration per job, from which command line, form and scripts follow."""

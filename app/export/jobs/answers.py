@@ -27,16 +27,16 @@ class Answers:
 
     @property
     def job_type(self) -> type[ExportJob]:
-        """What is exported."""
+        """The declaration of the chosen kind of export."""
         return KINDS[self.choices.kind]
 
     @property
     def questions(self) -> tuple[Question, ...]:
-        """What is asked."""
+        """The questions of the form, in order."""
         return tuple(self.job_type.asked(self._declared(), self).values())
 
     def _declared(self) -> dict[str, Question]:
-        """What the options lead to. Edits are asked about where there are any."""
+        """The questions that the options lead to, one about edits where there are any."""
         declared = self._settings()
         return {
             name: question_about(setting, self.context)
@@ -101,6 +101,6 @@ class Answers:
 
     @property
     def title(self) -> str:
-        """What is exported, in a few words: the kind and its format."""
+        """The export in a few words: the kind and its format."""
         words = [dict(question.values)[self["format"]] for question in self.questions if question.name == "format"]
         return ", ".join([self.job_type.title, *words])

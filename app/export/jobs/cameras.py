@@ -8,7 +8,7 @@ from app.export.jobs.job import ExportJob, option
 
 
 class CamerasJob(ExportJob, frozen=True):
-    """What is asked for: a new or empty folder."""
+    """An export of cameras to a new or empty folder."""
 
     kind: ClassVar[str] = "cameras"
     title: ClassVar[str] = "Cameras"

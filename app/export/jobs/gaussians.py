@@ -27,7 +27,7 @@ _SCENE_UPS = {"": "As in the project"} | {_vector_text(axis): name for name, axi
 
 
 class GaussiansJob(ExportJob, frozen=True):
-    """What is asked for: a new or empty folder of files."""
+    """An export of Gaussians to a new or empty folder of files."""
 
     kind: ClassVar[str] = "gaussians"
     title: ClassVar[str] = "Gaussians"

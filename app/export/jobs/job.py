@@ -34,7 +34,7 @@ def option(
     """The annotation of an option; see `engine.setting.setting`.
 
     Args:
-        answers: Words it may be, each with what the window calls it and what it means, which may be empty.
+        answers: Words it may be, each with the window's name of it and its meaning, which may be empty.
     """
     if answers is not None:
         declared["choices"] = {word: means for word, (_, means) in answers.items()}
@@ -52,14 +52,14 @@ EDITS = option(
 
 
 class JobModule(Protocol):
-    """What the module with the work of a job provides."""
+    """The functions of the module with the work of a job."""
 
     def estimate(self, opened: TrainedProject, job: Any) -> ExportEstimate:
-        """What will be written. Raises EngineError where it cannot be."""
+        """Estimate what will be written. Raises EngineError where it cannot be."""
         ...
 
     def run(self, opened: TrainedProject, job: Any, report: Report) -> ExportResult:
-        """Write it. Raises EngineError, and what `report` raises."""
+        """Write the export. Raises EngineError, and as `report` does."""
         ...
 
 
@@ -69,8 +69,8 @@ class ExportJob(Declared, frozen=True, tag=True):
     Attributes:
         out: The file or folder to write.
         kind: Name of the kind of export.
-        title: What the user calls it.
-        about: What it is for, in a sentence.
+        title: The user's word for it.
+        about: Its purpose, in a sentence.
         work: Module with its work.
         command: The command, and method of a script, that takes it.
         is_prefixed: Whether the kind stands in front of its formats where those of all kinds are listed.
@@ -111,7 +111,7 @@ class ExportJob(Declared, frozen=True, tag=True):
 
     @classmethod
     def formats(cls) -> dict[str, str]:
-        """What it is called where the formats of all kinds are listed, each with the format that this stands for."""
+        """Its names in the list of the formats of all kinds, each with the format that it stands for."""
         if not cls.takes("format"):
             return {cls.kind: ""}
         prefix = f"{cls.kind}-" if cls.is_prefixed else ""
@@ -119,7 +119,7 @@ class ExportJob(Declared, frozen=True, tag=True):
 
     @property
     def format_name(self) -> str:
-        """Which of `formats` it is."""
+        """The name in `formats` of the job's format."""
         return next(name for name, value in self.formats().items() if value == getattr(self, "format", ""))
 
     @classmethod
@@ -129,10 +129,10 @@ class ExportJob(Declared, frozen=True, tag=True):
 
     @classmethod
     def asked(cls, questions: dict[str, Question], answers: Answers) -> dict[str, Question]:
-        """What the form asks, of the questions that its options alone lead to."""
+        """The form's questions, chosen from those that its options alone lead to."""
         return questions
 
     @classmethod
     def entries(cls, answers: Answers) -> dict[str, Any]:
-        """What the answers to `asked` mean where that is not the value of one option."""
+        """Entries that follow from the answers to `asked` where an answer is not the value of one option."""
         return {}

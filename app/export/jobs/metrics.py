@@ -9,7 +9,7 @@ from app.export.picked_frames import PickedFrames
 
 
 class MetricsJob(ExportJob, frozen=True):
-    """What is asked for: a file. Clips that are not trained are left out."""
+    """An export of metrics to a file. Clips that are not trained are left out."""
 
     kind: ClassVar[str] = "metrics"
     title: ClassVar[str] = "Metrics"

@@ -11,7 +11,7 @@ from engine.setting import Flag
 
 
 class PlayerJob(ExportJob, frozen=True):
-    """What is asked for: an HTML page."""
+    """An export of a player to an HTML page."""
 
     kind: ClassVar[str] = "player"
     title: ClassVar[str] = "Player"
@@ -42,5 +42,5 @@ class PlayerJob(ExportJob, frozen=True):
 
     @property
     def folder(self) -> Path:
-        """Where clips go if not into the page."""
+        """The folder of clips that are not in the page."""
         return self.out.with_name(f"{self.out.stem}_data")

@@ -17,9 +17,9 @@ class Question:
         name: As in ExportChoices.answers.
         label: In front of the answers.
         values: Value and words of each answer, the usual one first; none where the user types.
-        tips: What the answers mean, by value; none where the words are enough.
+        tips: Explanations of the answers, by value; none where the words are enough.
         has_names: Whether words have names in them that the user or the capture gave.
-        hint: What an empty text means.
+        hint: The meaning of an empty text.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Question:
 
 
 def question_about(setting: Setting, context: ExportContext) -> Question:
-    """What is asked about an option."""
+    """The question about an option."""
     titles = dict(setting.titles or {choice: choice for choice in setting.choices})
     words = titles.pop("*", "")
     usual = setting.text(setting.default)

@@ -33,7 +33,7 @@ def named_job(format_name: str, out: Path | str, **options: Any) -> ExportJob:
     Args:
         format_name: One of `formats_of()`.
         out: File or folder.
-        options: Entries of the job beside these two; None takes the usual value.
+        options: Other entries of the job; None takes the usual value.
     Raises:
         ProjectError: There is no such format, or it has no such option.
     """

@@ -86,7 +86,7 @@ class Turntable(Declared, frozen=True):
 
 
 class VideoJob(ExportJob, frozen=True):
-    """What is asked for: a file, or the folder of a sequence."""
+    """An export of a video to a file, or to the folder of a sequence."""
 
     kind: ClassVar[str] = "video"
     title: ClassVar[str] = "Video"

@@ -22,11 +22,11 @@ class ExportTask:
     """Everything that a process needs.
 
     Attributes:
-        job: What is exported.
+        job: The export's declaration.
         project: Folder.
-        capture, scale, frames, follow_links: How its capture is opened; the project may still name another place.
+        capture, scale, frames, follow_links: The way its capture is opened; the project may still name another place.
         n_threads: To compute with; None for all cores.
-        backend: Name of what is computed with.
+        backend: Name of the back end.
     """
 
     job: AnyJob

@@ -1,4 +1,4 @@
-"""What the window hears of an export."""
+"""The window's messages about an export."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from app.export.export_progress import ExportProgress, ExportResult
 
 @dataclass(frozen=True, slots=True)
 class ExportGoesOn:
-    """How far it is."""
+    """Progress of the export."""
 
     progress: ExportProgress
 
@@ -23,12 +23,12 @@ class ExportDone:
 
 @dataclass(frozen=True, slots=True)
 class ExportStopped:
-    """It was cancelled; nothing is left of it."""
+    """The export was cancelled; nothing is left of it."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExportFailed:
-    """It could not be done; nothing is left of it."""
+    """The export failed; nothing is left of it."""
 
     message: str
     hint: str = ""

@@ -26,7 +26,7 @@ EXPORTING: ChildKind[ExportTask, ExportProgress, ExportResult] = ChildKind(
     job=ExportTask,
     event=ExportProgress,
     result=ExportResult,
-    grace_s=6.0,  # what it loads just now is loaded first
+    grace_s=6.0,  # a module that is being imported is imported first
 )
 
 
@@ -50,7 +50,7 @@ class ExportProcess:
     """A process of its own. See `Exporter`.
 
     Args:
-        task: What to export.
+        task: The export to run.
 
     Attributes:
         child: The process.

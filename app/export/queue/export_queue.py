@@ -59,7 +59,7 @@ class ExportQueue:
 
     @property
     def targets(self) -> tuple[Path, ...]:
-        """What exports that run or wait will write, whole paths."""
+        """Paths that running and waiting exports will write, absolute."""
         return tuple(status.path.absolute() for status in self._statuses if not status.is_over)
 
     def add(self, task: ExportTask, title: str) -> int:
@@ -105,7 +105,7 @@ class ExportQueue:
         self.revision += 1
 
     def retry(self, export_id: int) -> None:
-        """Begin one that failed or was cancelled anew, after those that wait. Raises what `add` raises."""
+        """Begin one that failed or was cancelled anew, after those that wait. Raises as `add` does."""
         status = self._find(export_id)
         if status is not None and status.state in ("failed", "cancelled"):
             self._check_free(status.path)
@@ -114,10 +114,10 @@ class ExportQueue:
             self.revision += 1
 
     def poll(self, *, n_threads: int | None = None) -> list[ExportStatus]:
-        """Take in what the running export tells, and start the next one. Never blocks.
+        """Take in what the running export reports, and start the next one. Never blocks.
 
         Args:
-            n_threads: What an export that begins now may compute with; None for all cores.
+            n_threads: Threads of an export that begins now; None for all cores.
         Returns:
             Those that have ended since the last call.
         """
@@ -136,7 +136,7 @@ class ExportQueue:
         return ended
 
     def close(self) -> None:
-        """End what runs; nothing that waits begins any more."""
+        """End the running export; no waiting one begins."""
         if self._exporter is not None:
             self._exporter.end()
             self._exporter = self._running_id = None

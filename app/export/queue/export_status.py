@@ -17,15 +17,15 @@ class ExportStatus:
 
     Attributes:
         export_id: Its number, given once.
-        title: What it is, as "Metrics, CSV".
-        path: What it writes.
+        title: Its kind and format, as "Metrics, CSV".
+        path: The file or folder that it writes.
         state: Waiting, running, stopping, or how it has ended.
-        progress: How far it is; None before it began.
+        progress: The latest progress; None before it began.
         per_s: Units per second; 0 while unknown.
         eta_s: Seconds that are left; None while unknown.
-        seconds: How long it took; 0 before it ended.
-        result: What was written; None unless it is done.
-        message, hint: Why it failed, and what helps.
+        seconds: Duration; 0 before it ended.
+        result: The outcome; None unless it is done.
+        message, hint: The cause of its failure, and the remedy.
         project: Folder of the project that it is of.
     """
 

@@ -35,7 +35,7 @@ def main(task: ExportTask, parent: Parent[ExportProgress]) -> ExportResult:
 
 
 def reporting(parent: Parent[ExportProgress]) -> Report:
-    """What a job is given to report with: it passes on what somebody reads, and raises Unwanted once nobody does."""
+    """A job's function to report with: it passes on what somebody reads, and raises Unwanted once nobody does."""
     reported_s = -REPORT_EVERY_S
 
     def report(progress: ExportProgress) -> None:

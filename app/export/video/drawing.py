@@ -14,11 +14,11 @@ from app.playback.modes.mode_pictures import MIN_OPACITY
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawn:
-    """What is seen.
+    """A drawn picture.
 
     Attributes:
         color: Display-encoded, over black, so that it is multiplied with `alpha`. [H, W, 3] float32 in 0..1
-        alpha: How much of what lies behind is covered. [H, W] float32 in 0..1
+        alpha: Covered share of the background. [H, W] float32 in 0..1
         depth: Along the viewing axis, scene units; NaN where next to nothing is. [H, W] float32
     """
 
@@ -34,7 +34,7 @@ def draw(scene: SceneFrames, moment: float, view: ViewPoint, *, supersampling: i
         moment: In frames of the capture; between frames see `SceneFrames.shares`.
         supersampling: Drawn so many times as large along both sides and reduced by means over squares.
     Raises:
-        ProjectError: What `SceneFrames.gaussians` raises.
+        ProjectError: As `SceneFrames.gaussians`.
     """
     shares = list(_drawn_shares(scene, moment, view, supersampling))
     color, alpha, weighted_depth = (np.stack(parts).sum(axis=0) for parts in zip(*shares, strict=True))

@@ -11,7 +11,7 @@ SNAP = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What one picture shows, in frames of the capture, between frames too.
+    """The moment of one picture, in frames of the capture, between frames too.
 
     Attributes:
         scene: Of what is seen.

@@ -1,4 +1,4 @@
-"""What pictures show: colours, or numbers in the colours of a map on a range that never changes."""
+"""The contents of pictures: colours, or numbers in the colours of a map on a range that never changes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PassPicture:
     Attributes:
         color: Display-encoded, multiplied with `alpha`. [H, W, 3] float32 in 0..1
         alpha: [H, W] float32 in 0..1
-        values: What its colours stand for, in the unit of the pass, NaN where nothing is; of pictures in colour their
+        values: Numbers of the colours, in the unit of the pass, NaN where nothing is; of pictures in colour their
             depth. None of those side by side. [H, W] float32
     """
 
@@ -55,7 +55,7 @@ class Painter:
 
     Args:
         scene: Makes frames.
-        job: Says what they show.
+        job: States the contents of the pictures.
         moments: Of all pictures.
         view_of: From where each is taken.
         step: Frames from one picture to the next.

@@ -1,4 +1,4 @@
-"""What a job comes to in a project: moments, views and names, with everything that can be said before the work."""
+"""The plan of a job in a project: moments, views and names, with everything that can be said before the work."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from engine.errors import ProjectError
 from engine.text import shown
 
 _DEPTH_REACH = 4.0
-"""What 16 bits of depth reach, in usual distances from a camera to what all of them look at."""
+"""The reach of 16 bits of depth, in usual distances from a camera to what all of them look at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VideoPlan:
-    """What is drawn and written.
+    """The pictures to draw and write.
 
     Attributes:
         moments: Of all pictures.
         step: Frames of the capture from one picture to the next.
         fps: Pictures per second.
         view_of: From where each picture is taken.
-        picture_size: Width and height of what is written, pixels.
+        picture_size: Width and height of the written pictures, pixels.
         sound: File with the sound and where in it the first picture is, seconds; None for silence.
         depth_unit: Scene units per level of a 16-bit picture of depths; None where none is written.
-        notes: What is done otherwise than asked for, in sentences.
+        notes: Differences from what was asked for, in sentences.
     """
 
     moments: list[Moment]
@@ -183,7 +183,7 @@ def _camera(capture: Capture, name: str) -> int:
 
 
 def _sound(job: VideoJob, capture: Capture, runs: list[range]) -> tuple[tuple[Path, float] | None, tuple[str, ...]]:
-    """Where the sound is, and a note where it is left out."""
+    """The place of the sound, and a note where it is left out."""
     if job.sound is None:
         return None, ()
     source = sound_source(capture, _camera(capture, job.sound), runs[0].start)

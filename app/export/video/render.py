@@ -31,16 +31,16 @@ STAGE = "Rendering"
 
 @dataclass(frozen=True, slots=True)
 class WrittenVideo:
-    """What was written.
+    """The written video or sequence of pictures.
 
     Attributes:
         out: The file, or the folder of a sequence.
-        n_pictures: How many pictures.
+        n_pictures: Number of pictures.
         size: Their width and height, pixels.
         fps: Pictures per second.
         n_bytes: Size of the file, or of all of them.
         depth_unit: Scene units per level of 16-bit depths; None where none were written.
-        notes: What was done otherwise than asked for, in sentences.
+        notes: Differences from what was asked for, in sentences.
     """
 
     out: Path
@@ -63,9 +63,9 @@ def render_video(
     """Draw and write.
 
     Args:
-        job: What.
+        job: The video to render.
         opened: The project.
-        report: Told after every picture how far it is, with rate and time left.
+        report: Receives the progress after every picture, with rate and time left.
         is_cancelled: Asked before every picture.
         n_threads: Threads to draw with; None for all.
     Raises:

@@ -16,7 +16,7 @@ from engine.text import rate_text
 
 
 def estimate(opened: TrainedProject, job: VideoJob) -> ExportEstimate:
-    """See `JobModule`. Raises what `plan_video` raises."""
+    """See `JobModule`. Raises as `plan_video` does."""
     plan = _plan(opened, job)
     kind, (width, height) = FORMATS[job.format], plan.picture_size
     n_pictures = len(plan.moments)
@@ -27,7 +27,7 @@ def estimate(opened: TrainedProject, job: VideoJob) -> ExportEstimate:
 
 
 def run(opened: TrainedProject, job: VideoJob, report: Report) -> ExportResult:
-    """See `JobModule`. Raises what `render_video` raises."""
+    """See `JobModule`. Raises as `render_video` does."""
     n_pictures = len(_plan(opened, job).moments)
     report(ExportProgress(0, n_pictures, "pictures"))
 

@@ -65,7 +65,7 @@ def turntable_view(
     rig: CameraRig, up: np.ndarray, turntable: Turntable, n_pictures: int, size: tuple[int, int]
 ) -> ViewOf:
     """A circle around what the cameras look at, beginning in front of the camera that the home view begins at, through
-    a lens like that camera's. up: What is up in the scene. [3]"""
+    a lens like that camera's. up: The scene's upward direction. [3]"""
     focus = rig.focus_point()
     camera = home_camera(rig, focus, up)
     path = path_presets.turntable(

@@ -15,7 +15,7 @@ from app.evaluation.source_clip_means import LATER_MOVING, LATER_PSNR, LATER_S
 from app.lab.ablation.variants import FULL, variant_called
 
 FIGURES = {LATER_PSNR: "PSNR", LATER_MOVING: "PSNR of moving pixels"}
-"""What is set against time, and its name."""
+"""Figures to set against time, and their names."""
 
 Points = Sequence[tuple[float, float]]
 
@@ -26,7 +26,7 @@ def curves_of(lines: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     Args:
         lines: Of the table.
     Returns:
-        Per variant: `variant`, `points` (each with source_steps, later_s and FIGURES, rising in steps) and, beside
+        Per variant: `variant`, `points` (each with source_steps, later_s and FIGURES, rising in steps) and, except for
         "full", `at_equal`: per figure the PSNR, `seconds`, `seconds_full`, `ratio`, and `is_least` where "full" is
         already better at its first point, so that the ratio is at least that. None where the curves do not meet, or
         where the other one is already better at its first point: how much earlier it was as good is unknown.

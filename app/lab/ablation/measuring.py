@@ -1,4 +1,4 @@
-"""Figures of one trained variant, kept beside it: the same settings are measured once."""
+"""Figures of one trained variant, kept next to it: the same settings are measured once."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class VariantFigures:
 
 @dataclass(frozen=True, slots=True)
 class VariantScope:
-    """What is measured of a variant.
+    """The clips, borders and figures to measure of a variant.
 
     Attributes:
         clips: Indices of its clips.
@@ -151,6 +151,6 @@ def _read(path: Path, key: dict[str, Any]) -> VariantFigures | None:
 
 
 def _measured(figures: dict[str, float | None], n_frames: int) -> VariantFigures:
-    """With what follows from the figures."""
+    """Figures of a variant with those derived from them."""
     size = figures.get("megabytes")
     return VariantFigures(figures | {"mb_per_frame": None if size is None else size / n_frames}, n_frames)

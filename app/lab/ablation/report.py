@@ -33,10 +33,10 @@ def write_ablation_report(
     say: Callable[[str], None],
     rates_of: RatesOf,
 ) -> Path:
-    """Set all variants in a folder that were trained with one seed beside "full"; the page begins with the table.
+    """Compare all variants in a folder that were trained with one seed with "full"; the page begins with the table.
 
     Args:
-        document: What `run_ablation` returned.
+        document: The result of `run_ablation`.
         seed: Of the projects that are shown; other seeds are in the table only.
         metrics, precision, on_stage, say, rates_of: See app.lab.report.write.write_report.
     Returns:

@@ -45,7 +45,7 @@ TABLE_FILE = "ablation.csv"
 
 @dataclass(frozen=True, slots=True)
 class Callbacks:
-    """Where progress goes.
+    """Receivers of progress.
 
     Attributes:
         on_variant: Name, seed, how many are done, and how many there are.
@@ -103,7 +103,7 @@ def run_ablation(
     borders = [clip.start for clip in clips[1:]]
     all_clips = VariantScope(range(n_clips), borders, metrics, precision)
     found = _finished(folder, capture, settings, clips, all_clips)
-    first_of: dict[tuple[str, int], Path] = {}  # what trains the reference clip of a family
+    first_of: dict[tuple[str, int], Path] = {}  # project that trains the reference clip of a family
     for task in todo:
         first_of.setdefault((task.variant.family, task.settings.seed), task.place(folder))
     for n_done, task in enumerate(todo):
@@ -138,7 +138,7 @@ def run_ablation(
 
 
 def rendering_of(rates: FrameRates) -> dict[str, Any]:
-    """What the frame rates of a table are of, the same for all its lines: width, height, camera, what drew, words."""
+    """The conditions of a table's frame rates, the same for all its lines: width, height, camera, back end, words."""
     drawn_by = [rate.drawn_by for rate in (rates.cpu, rates.gl) if rate is not None]
     missing = f" No OpenGL: {rates.why_no_gl}." if rates.why_no_gl else ""
     words = f"{DEFINITION_OF_RATES} Here {rates.size} px, by {' and '.join(drawn_by) or 'nothing'}.{missing}"
@@ -147,14 +147,14 @@ def rendering_of(rates: FrameRates) -> dict[str, Any]:
 
 
 def project_folder(folder: Path, name: str, seed: int) -> Path:
-    """Where a variant lies."""
+    """The folder of a variant."""
     return folder / f"{name}-seed{seed}"
 
 
 def _finished(
     folder: Path, capture: Capture, base: ProjectSettings, clips: Sequence[Clip], scope: VariantScope
 ) -> dict[tuple[str, int], VariantResult]:
-    """What lies measured in the folder and fits the settings, by variant and seed."""
+    """Measured results in the folder that fit the settings, by variant and seed."""
     found = {}
     for place in sorted(folder.glob("*-seed*")):
         name, _, text = place.name.rpartition("-seed")
@@ -191,7 +191,7 @@ class _Task:
         check_settings(self.settings, capture)
 
     def place(self, folder: Path) -> Path:
-        """Where its project lies."""
+        """The folder of its project."""
         return project_folder(folder, self.variant.name, self.settings.seed)
 
 

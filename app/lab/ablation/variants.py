@@ -22,7 +22,7 @@ class Variant:
 
     Attributes:
         name: Of the command line, the folder and the table.
-        words: What it is.
+        words: Its description.
         overrides: Training settings that it changes.
         is_baseline: Another way, not the method without a part.
         cut: How the chosen frames are cut: "clips" as the others are, "shorter" or "longer" into clips of about half or

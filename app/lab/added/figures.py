@@ -41,7 +41,7 @@ COLUMNS = {
         Column("lpips_unscaled", "1", False, False, "the same with inputs left in 0..1, as many tables have it"),
     )
 }
-"""What is added to the rows of pictures; `tof` is added to those of pairs."""
+"""Columns added to the rows of pictures; `tof` is added to those of pairs."""
 Found = dict[str, dict[str, dict[str, float | None]]]
 """Figures by camera and frame, the latter as text."""
 
@@ -72,7 +72,7 @@ def with_added_figures(
         document: See app.evaluation.evaluation.evaluate_project; changed in place.
         pictures: Renders of the project.
         on_progress: Gets pictures done and pictures in all.
-        say: Told which package is missing.
+        say: Receives a sentence on the missing package.
     Raises:
         ProjectError: A clip is damaged.
     """

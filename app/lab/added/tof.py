@@ -48,7 +48,7 @@ class Motion:
     """One frame of one camera, to be compared with its neighbours: grey levels of render and truth. [H, W] uint8
 
     Attributes:
-        is_valid: What the camera sees; None for all. [H, W] bool
+        is_valid: Pixels that the camera sees; None for all. [H, W] bool
     """
 
     render: np.ndarray
@@ -61,7 +61,7 @@ def motion_of(image: np.ndarray, pixels: np.ndarray, is_valid: np.ndarray | None
 
     Args:
         image: The render, in 0..1; rounded to 8 bit. [H, W, 3]
-        pixels: What the camera took. [H, W, 3] uint8
+        pixels: The camera's picture. [H, W, 3] uint8
         is_valid: See Motion.
     """
     if min(image.shape[:2]) < MIN_SIDE_PX or not np.isfinite(image).all():

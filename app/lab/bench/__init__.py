@@ -1,1 +1,1 @@
-"""Measurements of the kernels: speed beside error. Numbers and text only; the command line prints."""
+"""Measurements of the kernels: speed next to error. Numbers and text only; the command line prints."""

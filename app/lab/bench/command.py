@@ -16,7 +16,7 @@ from engine.storage.json_files import json_text
 
 CHART_FILE = "speed_error.png"
 DEFAULT_OUT = Path("bench_output")
-"""Where the picture goes unless --out says so, in the current folder."""
+"""The picture's file unless --out names one, in the current folder."""
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""The decode: hash grid, field network, heads and activations, fused against plain torch, error beside speed."""
+"""The decode: hash grid, field network, heads and activations, fused against plain torch, error next to speed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FRAME = 4
 
 @dataclass(frozen=True, slots=True)
 class DecodeScene:
-    """What to decode.
+    """The scene to decode.
 
     Attributes:
         recipe: Sizes; the picture plays no part.
@@ -91,7 +91,7 @@ class DecodeRun:
 def measure_decode(
     name: str, *, n_runs: int, has_memory: bool, scene: DecodeScene | None = None
 ) -> tuple[KernelRow, list[SpeedError]]:
-    """One scene: both back ends in turn, and both beside float64.
+    """One scene: both back ends in turn, and both compared with float64.
 
     Args:
         name: A name of SCENES, or any with `scene`.

@@ -32,7 +32,7 @@ N_CHECK_RUNS = 3
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """One forward and backward pass: leaves with gradients, what was drawn, milliseconds of each."""
+    """One forward and backward pass: leaves with gradients, the picture, milliseconds of each."""
 
     leaves: Gaussians
     rendering: Rendering
@@ -61,7 +61,7 @@ def evaluated_pairs(scene: GaussianScene) -> int:
     waiting: list[Any] = [image.grad_fn]
     while waiting:
         node = waiting.pop()
-        drawing = getattr(node, "drawing", None)  # what the fast back end keeps for its backward pass
+        drawing = getattr(node, "drawing", None)  # kept by the fast back end for its backward pass
         if drawing is not None:
             n_pairs = int(drawing.tile_starts[-1])
             return 16 * int(np.bitwise_count(drawing.pair_blocks[:n_pairs].view(np.uint64)).sum(dtype=np.int64))
@@ -136,7 +136,7 @@ def prepare_memory(recipe: Recipe) -> Callable[[], object]:
 
         return call
 
-    ready(RECIPES["accuracy"].scene())()  # what torch and the threads keep after their first real work
+    ready(RECIPES["accuracy"].scene())()  # memory that torch and the threads keep after their first real work
     return ready(recipe.scene())
 
 
@@ -146,7 +146,7 @@ def _stages(scene: GaussianScene, backend: Rasterizer) -> tuple[float, float]:
 
 
 def _check(name: str, size: str, scene: GaussianScene) -> dict[str, SpeedError]:
-    """Both back ends in float32 beside float64 brute force."""
+    """Both back ends in float32 compared with float64 brute force."""
     exact = run_pass(scene, torch.float64, EXACT)
     candidates = {path: partial(_stages, scene, backend) for path, backend in COMPARED.items()}
     timings = interleaved(candidates, N_CHECK_RUNS, n_warm=1)

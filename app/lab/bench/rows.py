@@ -1,4 +1,4 @@
-"""What a benchmark yields: one row per operation and scene, with speed and error side by side. Plain values."""
+"""The results of a benchmark: one row per operation and scene, with speed and error side by side. Plain values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class SpeedError:
     Attributes:
         operation: "raster", "decode" or "step".
         scene: Name of the scene.
-        size: What was computed, for people.
+        size: The size of the computation, for people.
         backend: "cpu", or "reference" for plain torch in float32.
         total_ms: Forward and backward pass, median; of a step, all of it.
         value_error: Largest error of a value against float64, absolute (pixels: colours in 0..1).
@@ -36,7 +36,7 @@ class KernelRow:
 
     Attributes:
         operation, scene: As in SpeedError.
-        size: What was computed, for people.
+        size: The size of the computation, for people.
         forward, backward: At full size.
         checked_at: Size at which errors and ratio were found: the full one, or the recipe made small.
         value_error, gradient_error: As in SpeedError.
@@ -73,7 +73,7 @@ def kernel_row(
     Args:
         marks: "cpu" and "reference".
         timings: Of our back end at full size, forward and backward.
-        size: What was computed, for people.
+        size: The size of the computation, for people.
         peak_mb: See KernelRow.
         pairs: (pixel, Gaussian) evaluations of one pass; None where there are no pixels.
     """

@@ -38,7 +38,7 @@ class StepWindow:
 
 @dataclass(frozen=True, slots=True)
 class StepOutcome:
-    """What one step computed, copies.
+    """The results of one step, copies.
 
     Attributes:
         image: Picture before the gain. [H, W, 3]
@@ -58,7 +58,7 @@ class StepRun:
 
     Args:
         recipe: Sizes of the clip; the same recipe makes the same clip.
-        backend: What to compute with.
+        backend: The back end to compute with.
         window: Part of the picture that is drawn and compared, by the same camera; None for all of it.
     """
 
@@ -114,7 +114,7 @@ class StepRun:
         return tuple((end - begin) * 1e3 for begin, end in pairwise(marks))
 
     def kept(self) -> StepOutcome:
-        """One step; what it computed."""
+        """One step; its results."""
         gaussians = self._decode()
         image = self._draw(gaussians)
         loss = self._loss(image, gaussians)
@@ -124,7 +124,7 @@ class StepRun:
         return StepOutcome(image.detach(), loss.item(), gradients, self.updated(gradients))
 
     def updated(self, gradients: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """One step of Adam with these gradients, by name; what it added to each parameter."""
+        """One step of Adam with these gradients, by name; the change of each parameter."""
         before = {name: self._parameters[name].detach().clone() for name in gradients}
         for name, parameter in self._parameters.items():
             gradient = gradients.get(name)
@@ -165,7 +165,7 @@ def _leaves(tensors: Sequence[Tensor]) -> list[Tensor]:
 
 
 def _with_gradients(gaussians: Gaussians, drawn: Gaussians, measured: Gaussians) -> tuple[list[Tensor], list[Tensor]]:
-    """Tensors of the decode that need a gradient, and the sum of what picture and volume term say."""
+    """Tensors of the decode that need a gradient, and the sums of their gradients by picture and volume term."""
     outputs, gradients = [], []
     for output, first, second in zip(gaussians.tensors(), drawn.tensors(), measured.tensors(), strict=True):
         found = [leaf.grad for leaf in (first, second) if leaf.grad is not None]

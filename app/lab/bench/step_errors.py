@@ -1,4 +1,4 @@
-"""How wrong a training step is: picture, loss, gradients and update, beside the same step in float64 and plain torch.
+"""Errors of a training step: picture, loss, gradients and update, against the same step in float64 and plain torch.
 
 Clip, frame and camera are those of the step that is timed, and all its anchors are decoded. Only the picture is cut
 down to its middle, because the rasterizer's slow truth draws every Gaussian against every pixel.
@@ -20,7 +20,7 @@ WINDOW_PX = 64, 48
 """Width and height of the part that is compared; smaller pictures are compared whole."""
 N_CHECK_RUNS = 2
 N_UPDATES = 3
-"""Steps of Adam that are compared: the first one alone would not show what it remembers."""
+"""Steps of Adam that are compared: the first one alone would not show its memory."""
 
 
 def measure_errors(recipe: ClipRecipe, *, scene: str, fast: Backend = FAST) -> tuple[StepErrors, dict[str, SpeedError]]:
@@ -29,7 +29,7 @@ def measure_errors(recipe: ClipRecipe, *, scene: str, fast: Backend = FAST) -> t
     Args:
         recipe: Of the step that is timed.
         scene: Name for the chart.
-        fast: What is compared with the slow truth.
+        fast: The back end to compare with the slow truth.
     Returns:
         Errors of the fast path, and the marks of the chart: "cpu" and, for plain torch in float32, "reference".
     """
@@ -78,7 +78,7 @@ def _by_name(actual: dict[str, Tensor], expected: dict[str, Tensor]) -> dict[str
 
 
 def _update_error(recipe: ClipRecipe, window: StepWindow, fast: Backend) -> float:
-    """Adam of the fast path beside float64 given the very same gradients.
+    """Adam of the fast path compared with float64 given the very same gradients.
 
     From gradients of its own float64 would differ without meaning: the first step of Adam is the sign of a gradient,
     and there are entries whose gradient is all rounding.

@@ -1,4 +1,4 @@
-"""What is measured together: the quick set of `clipgstream bench` and the full one, and the document they yield."""
+"""Sets of measurements: the quick set of `clipgstream bench` and the full one, and the document they yield."""
 
 from __future__ import annotations
 
@@ -60,16 +60,16 @@ class Report:
 
 
 Say = Callable[[str, float], None]
-"""What is measured now, and the share of the plan that is done."""
+"""The present measurement, and the share of the plan that is done."""
 
 
 def run_plan(plan: Plan, *, n_threads: int | None = None, say: Say = lambda what, done: None) -> Report:
     """Measure a plan; kernels are loaded or compiled first.
 
     Args:
-        plan: What to measure.
+        plan: The measurements.
         n_threads: Threads to compute with; every core when None.
-        say: Told before each measurement.
+        say: Called before each measurement.
     """
     from app.background.kernels import use_threads, warm_cache
 

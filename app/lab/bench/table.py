@@ -1,4 +1,4 @@
-"""A report as text: one table of kernels, speed beside error, and one of training steps by stage."""
+"""A report as text: one table of kernels, speed next to error, and one of training steps by stage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How things are timed here: candidates in turn after a warm-up, medians beside minima, memory in a fresh process."""
+"""How things are timed here: candidates in turn after a warm-up, medians next to minima, memory in a fresh process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sections that say what was measured: set-up, capture, split, settings."""
+"""Sections on the measured project: set-up, capture, split, settings."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def setup_section(facts: ProjectFacts, machine: Machine, now: datetime, evaluati
 
 
 def capture_section(facts: ProjectFacts, capture: Mapping[str, Any]) -> Section:
-    """What was filmed. capture: see engine.capture.capture_summary.describe."""
+    """The section on the capture. capture: see engine.capture.capture_summary.describe."""
     sizes = sorted({(camera["working_width"], camera["working_height"]) for camera in capture["cameras"]})
     stored = sorted({(camera["width"], camera["height"]) for camera in capture["cameras"]})
     rows = {

@@ -1,4 +1,4 @@
-"""The section that sets a project beside figures that others published of the same data by the same protocol."""
+"""The section that compares a project with figures that others published of the same data by the same protocol."""
 
 from __future__ import annotations
 

@@ -18,10 +18,10 @@ MAP_COLORS = "cividis"
 LOG_FROM_RATIO = 5.0
 """A time axis is logarithmic when the longest time is that many times the shortest."""
 _LABEL_OFFSETS = ((7, 5), (7, -12), (-7, 5), (-7, -12), (7, 17), (7, -24), (-7, 17), (-7, -24), (0, 29), (0, -36))
-"""Places of a label beside its mark, points of the typeface; the first that is free is taken."""
+"""Places of a label next to its mark, points of the typeface; the first that is free is taken."""
 _LABEL_LENGTH = 28
 MAX_NAMED_MARKS = 6
-"""Of more results the marks are numbered, and the names stand beside the panels."""
+"""Of more results the marks are numbered, and the names stand next to the panels."""
 MANY_VALUES = 100
 """Values over which lines are drawn thinner and without marks."""
 MANY_BORDERS, MAX_BORDERS = 15, 120
@@ -76,7 +76,7 @@ def draw_over_time(
     Args:
         frames: Frame indices of the values, or other numbers that count time.
         borders: First frames of clips; a line stands before each, unless they are too many to be distinguished.
-        unit: What is counted. Where frames are missing, lines end and begin anew.
+        unit: The unit of the axis. Where frames are missing, lines end and begin anew.
     """
     breaks = [
         i for i, (before, after) in enumerate(pairwise(frames), start=1) if unit == "frame" and after > before + 1
@@ -128,13 +128,13 @@ def _draw_curves(axes: Any, panel: CurvePanel, frames: Sequence[int], breaks: Se
 
 
 def has_lone_value(values: np.ndarray) -> bool:
-    """Whether a value has none beside it, so that no line would show it. values: [N], NaN for none."""
+    """Whether a value has none next to it, so that no line would show it. values: [N], NaN for none."""
     is_known = np.pad(~np.isnan(values), 1)
     return bool((is_known[1:-1] & ~is_known[:-2] & ~is_known[2:]).any())
 
 
 def draw_pictures(truth: np.ndarray, render: np.ndarray, error_range: tuple[float, float]) -> bytes:
-    """What the camera took, the render and the error beside each other.
+    """The captured picture, the render and the error side by side.
 
     Args:
         truth: [H, W, 3] uint8
@@ -156,7 +156,7 @@ def draw_pictures(truth: np.ndarray, render: np.ndarray, error_range: tuple[floa
 
 
 def draw_maps(panels: Sequence[MapPanel], value_range: tuple[float, float], label: str) -> bytes:
-    """Maps beside each other under one locked colour range."""
+    """Maps side by side under one locked colour range."""
     with plain_texts():
         figure = new_figure(WIDTH_INCHES, _row_height(panels[0].values.shape, len(panels)), dpi=150)
         columns = figure.subplots(1, len(panels), squeeze=False)[0]
@@ -184,7 +184,7 @@ def _row_height(shape: Sequence[int], n_panels: int) -> float:
 
 
 def add_color_bar(figure: Any, shown: Any, axes: Any, label: str) -> None:
-    """One bar for all axes. shown: What `imshow` returned for one of them."""
+    """One bar for all axes. shown: The result of `imshow` for one of them."""
     bar = figure.colorbar(shown, ax=list(axes), fraction=0.04, pad=0.01, extend="max")
     bar.set_label(label, fontsize=7)
     bar.ax.tick_params(labelsize=7)
@@ -225,7 +225,7 @@ def draw_speed_error(
 
     Args:
         names, times: One per result.
-        time_label: What the times are, with their unit.
+        time_label: The kind of the times, with their unit.
         own: Index of the result that the page is about; a diamond among circles.
         panels: At least one; those without any value stay empty.
     """
@@ -290,7 +290,7 @@ def shortened(name: str) -> str:
 
 
 def _place_labels(figure: Any, axes: Any, labels: Sequence[str], points: Sequence[tuple[float, float]]) -> None:
-    """Each label beside its mark where it covers no other label or mark, as far as such a place is found."""
+    """Each label next to its mark where it covers no other label or mark, as far as such a place is found."""
     figure.draw_without_rendering()  # the layout has to be known
     marks = axes.transData.transform(points)
     taken: list[Any] = []

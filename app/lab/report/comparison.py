@@ -1,4 +1,4 @@
-"""Sections that set projects beside each other: one line each, and speed against error."""
+"""Sections that compare projects: one line each, and speed against error."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Compared:
 
     @property
     def later(self) -> dict[str, float | None]:
-        """What its later clips take and give, see app.evaluation.source_clip_means."""
+        """Figures of its later clips, see app.evaluation.source_clip_means."""
         seconds = {clip.clip_index: clip.wall_s for clip in self.facts.clips if clip.role == "source"}
         return later_figures(self.evaluation["means"]["clips"], self.group, seconds)
 
@@ -147,7 +147,7 @@ def _figure_columns(figures: Sequence[tuple[str, str, str, int]]) -> list[TableC
 
 
 def comparability(first: Compared, other: Compared) -> str:
-    """What makes the figures of two projects hard to compare, as a sentence; empty when nothing does."""
+    """The reasons why the figures of two projects are hard to compare, as a sentence; empty when nothing does."""
     a, b = first.facts.settings, other.facts.settings
     reasons = []
     if a.fingerprint != b.fingerprint:

@@ -1,4 +1,4 @@
-"""Sections on what a project costs: bytes of its clip files, seconds of its stages."""
+"""Sections on the costs of a project: bytes of its clip files, seconds of its stages."""
 
 from __future__ import annotations
 

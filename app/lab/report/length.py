@@ -24,7 +24,7 @@ _COMPARED = (
     ("wall_s", "time", "s", 1),
     ("memory_mb", "memory", "MB", 0),
 )
-"""What is said about early and late clips: column, name, unit and digits."""
+"""Figures of early and late clips: column, name, unit and digits."""
 
 
 def length_section(evaluation: dict[str, Any], clips: Sequence[ClipFacts]) -> Section:

@@ -1,4 +1,4 @@
-"""Sections on what was measured: figures per clip, error over time, worst frames."""
+"""Sections on measurements: figures per clip, error over time, worst frames."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def clip_borders(frames: dict[str, Any]) -> list[int]:
 
 def worst_pictures(evaluation: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     """Which pictures to show: (figure it is worst in, row). Cameras of the main group, at most one per clip and camera
-    and figure, since frames beside a bad one look the same."""
+    and figure, since frames next to a bad one look the same."""
     is_held_out = main_group(evaluation) == "held_out"
     rows = [row for row in evaluation["rows"] if row["is_held_out"] == is_held_out]
     chosen: dict[tuple[str, int], tuple[str, dict[str, Any]]] = {}

@@ -1,7 +1,7 @@
 """The section on quality over the clips: what a clip loses against its reference clip, and by what.
 
 Colour is what the colour fit gets back, light what a fit of smooth local brightness gets back beyond that; the rest is
-shape and texture, and grows with the distance in time. Beside it the exposure of the cameras, which is measured and
+shape and texture, and grows with the distance in time. Next to it the exposure of the cameras, which is measured and
 removed before training.
 """
 
@@ -28,7 +28,7 @@ _LINES = {"psnr": "raw colours", "psnr_fit": "after the colour fit", "psnr_light
 
 @dataclass(frozen=True, slots=True)
 class ClipExposure:
-    """What a clip file says beside its model.
+    """The exposure that a clip file states next to its model.
 
     Attributes:
         reference_index: The clip it inherits from; its own index where it inherits nothing, or that is not there.

@@ -23,7 +23,7 @@ _COLUMNS = (
 
 
 def rendering_section(compared: Sequence[Compared]) -> Section | None:
-    """Frames per second with what they depend on: size, Gaussians and what drew. None where nothing was measured."""
+    """Frames per second with their conditions: size, Gaussians and back end. None where nothing was measured."""
     rows = []
     for one in compared:
         if one.rates is None:

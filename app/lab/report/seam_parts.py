@@ -1,4 +1,4 @@
-"""The section on seams: what changes at clip boundaries that does not change in the truth."""
+"""The section on seams: changes at clip boundaries that are not in the truth."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _boundaries(seams: dict[str, Any]) -> Table:
 
 
 def _two_clips(rows: Sequence[dict[str, Any]]) -> list[Part]:
-    """What two clips say of one instant, at borders where the clip before can say anything but its last frame."""
+    """Two clips at one instant, at borders where the clip before can show anything but its last frame."""
     borders = [row for row in rows if row["is_boundary"]]
     frames = sorted({row["frame_index"] for row in borders if not row["is_held"]})
     n_held = len({row["frame_index"] for row in borders if row["is_held"]})

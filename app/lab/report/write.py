@@ -1,4 +1,4 @@
-"""What `clipgstream report` does: measure what is not measured yet, draw, and write the page with its files."""
+"""The work of `clipgstream report`: measure missing figures, draw, and write the page with its files."""
 
 from __future__ import annotations
 
@@ -76,15 +76,15 @@ def write_report(
 
     Args:
         folder: The project.
-        compare: Other projects, or folders of projects, to be set beside it.
+        compare: Other projects, or folders of projects, to compare with it.
         out: Folder of the report; PROJECT/reports when None.
         metrics: Columns of all projects; None measures all of the project and the quick ones of the others, or shows
             all where they were measured before.
         precision: Of all projects: pictures as rendered, or rounded to 8 bit.
         wishes: Places that figures are to show; chosen by their rules when None.
         beginning: Sections before all others.
-        on_stage: Told what is done.
-        say: Told what the user should know, see app.evaluation.evaluation.evaluate_project.
+        on_stage: Receives the present stage.
+        say: Receives sentences for the user, see app.evaluation.evaluation.evaluate_project.
         measuring, make_pictures: Tests bring quick ones.
         rates_of: Measures how fast a project is rendered; left out by default.
     Returns:
@@ -197,7 +197,7 @@ def _sections(
 
 
 def report_document(compared: Sequence[Compared], sections: Sequence[Section]) -> dict[str, Any]:
-    """What report.json holds: schema, projects (name, folder, settings, clips, means, columns, seams and flicker of
+    """Contents of report.json: schema, projects (name, folder, settings, clips, means, columns, seams and flicker of
     their evaluations, and frame_rates), tables by name as on the page and in the CSV files, and files (of figures and
     tables)."""
     tables = {table.name: table for section in sections for table in section.tables()}

@@ -47,7 +47,7 @@ def gaussians_of(
     colors: np.ndarray | None = None,
     seed: int = 1,
 ) -> Gaussians:
-    """Float32-representable float64 Gaussians; what is not given is drawn at random."""
+    """Float32-representable float64 Gaussians; arrays that are not given are random."""
     rng = np.random.default_rng(seed)
     n_rows = len(means)
     columns = (

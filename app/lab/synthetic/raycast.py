@@ -29,7 +29,7 @@ GAMMA = 2.2
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What a camera sees at pixel centres.
+    """A camera's view at pixel centres.
 
     Attributes:
         depths: Camera z of the surface at the pixel centre, scene units. [H, W] float32
@@ -54,7 +54,7 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class Surfaces:
-    """What a camera sees, pixel by pixel.
+    """The surfaces that a camera sees, pixel by pixel.
 
     Attributes:
         colors: Display-encoded, before a sensor clips them: above 1 where brighter than white. [H, W, 3] float64
@@ -75,7 +75,7 @@ class _Samples:
 
 
 class SceneCamera:
-    """Renders one camera of a scene. Owns what stands still, cast once. Not safe to share between threads."""
+    """Renders one camera of a scene. Owns still parts, cast once. Not safe to share between threads."""
 
     def __init__(self, scene: SyntheticScene, camera_index: int, *, supersampling: int = 3) -> None:
         self.scene = scene

@@ -14,13 +14,13 @@ RING_RADIUS = 2.7
 RING_HEIGHTS = (1.05, 1.85)
 """Neighbouring cameras alternate between these."""
 FOCUS = np.array([0.0, 0.0, 0.62])
-"""What the cameras look at, give or take some centimetres."""
+"""The point that the cameras look at, give or take some centimetres."""
 FORWARD_WIDTH = 3.2
 """From the leftmost to the rightmost camera of a forward-facing rig."""
 FORWARD_DISTANCE = 2.7
 """Of a forward-facing rig from the middle of the room."""
 FORWARD_FOCUS = np.array([0.0, 0.9, 0.8])
-"""What forward-facing cameras look at: behind the middle, so that their axes are not far from parallel."""
+"""The point that forward-facing cameras look at: behind the middle, so that their axes are not far from parallel."""
 DOME_RADIUS = 2.4
 """Distance of the lowest cameras of the half dome from the middle of the room."""
 DOME_HEIGHTS = (0.55, 2.55)
@@ -74,7 +74,7 @@ def rig_at(centers: np.ndarray, size: tuple[int, int], *, target: np.ndarray = F
     Args:
         centers: [C, 3] scene units, none straight above or below the target.
         size: Image width and height.
-        target: What they look at, give or take some centimetres. [3]
+        target: The point that they look at, give or take some centimetres. [3]
     """
     width, height = size
     generator = np.random.default_rng(20)

@@ -149,7 +149,7 @@ def make_room(texture: Texture = textures.room) -> tuple[Part, ...]:
 
 
 def make_outdoors() -> tuple[Part, ...]:
-    """A meadow under a sky that is ten times as far away as what stands on it."""
+    """A meadow under a sky that is ten times as far away as the things on it."""
     ground = meshes.box((2 * SKY_RADIUS, 2 * SKY_RADIUS, 0.2)).moved(placed(0, 0, -0.1))
     dome = meshes.sphere(SKY_RADIUS)
     inside = Mesh(dome.vertices, dome.triangles[:, ::-1], -dome.corner_normals[:, ::-1])
@@ -164,7 +164,7 @@ SURROUNDINGS: dict[str, Callable[[], tuple[Part, ...]]] = {
     "bare room": lambda: make_room(textures.bare_room),
     "outdoors": make_outdoors,
 }
-"""What may be around the things of the scene, by name."""
+"""Surroundings of the scene's things, by name."""
 
 
 def placed(x: float, y: float, z: float, *, turn_deg: float = 0.0) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What the window draws, as plain float32 numpy arrays with a key that says what they are."""
+"""The window's drawings, as plain float32 numpy arrays with a key that identifies them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class GaussianArrays:
         source: The frame, and the state of the clip it was decoded from.
         n_still: So many rows come first and differ in nothing but their colours between arrays of one `still_key`.
         still_key: None where no rows are known to be so.
-        births: Where each comes from, see app.playback.modes.contents; None where unknown. [N] uint8
+        births: The origin of each, see app.playback.modes.contents; None where unknown. [N] uint8
         changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
             [N] float32
         rows: Which Gaussian of which anchor set each is, the same in all frames and clips; None where they stand for
@@ -70,7 +70,7 @@ class AnchorArrays:
         inherited_positions: From the reference clip; empty in the reference clip itself. [A0, 3]
         own_positions: Trained by this clip: all of the reference clip, the residual ones of a source clip. [A, 3]
         key: Changes when the content does.
-        inherited_roles, own_roles: What each anchor is, in engine.clip_files.roles.ROLES; None where unknown.
+        inherited_roles, own_roles: The role of each anchor, in engine.clip_files.roles.ROLES; None where unknown.
             [A0], [A] uint8
         inherited_reasons, own_reasons: Why the gate decided so, codes of engine.gate.reasons. [A0], [A] uint8
         source: The frame they are of; unknown for all anchors of the clip.
@@ -95,7 +95,7 @@ class PointArrays:
     """A coloured cloud: points [P, 3] scene units and colors [P, 3] in 0..1, float32. Unpacks as points, colors, key.
 
     Attributes:
-        kind: What it is of: "static" (what stands still in a trained reference clip), "moment" (a first rough cloud
+        kind: Its contents: "static" (still parts of a trained reference clip), "moment" (a first rough cloud
             of one frame) or "pictures" (captured pictures placed in space, because there is no cloud yet).
         spacing: Usual distance between neighbours, scene units; 0 when unknown.
     """
@@ -121,10 +121,10 @@ class Picture:
 
     Attributes:
         image: [H, W, 3] uint8 RGB.
-        key: What it shows; equal keys mean equal pictures.
+        key: The identity of its contents; equal keys mean equal pictures.
         is_stale: It is not what was asked for now, but the newest there is.
         duration_s: How long it took to make; 0 when unknown.
-        source: What it shows.
+        source: Its source.
         values: The numbers that its colours stand for, NaN where nothing is; None where they stand for none. [H, W]
             float32
     """

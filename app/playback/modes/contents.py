@@ -1,4 +1,4 @@
-"""What a loaded clip can be asked beyond its frames: a part of it alone, where each Gaussian comes from, and how far it
+"""Contents of a loaded clip beyond its frames: a part of it alone, where each Gaussian comes from, and how far it
 has changed since the reference clip. For the thread that decodes; everything is made once, when it is first needed.
 """
 
@@ -61,8 +61,8 @@ class EditedParts:
     Args:
         model: The clip.
         clip: Its frames.
-        state: What it was loaded from.
-        reference: What it inherits from; None for a clip that inherits nothing.
+        state: The state that it was loaded from.
+        reference: The state that it inherits from; None for a clip that inherits nothing.
     """
 
     def __init__(self, model: ClipModel, clip: Clip, state: ClipState, reference: ClipState | None) -> None:

@@ -70,7 +70,7 @@ class CoverageFinder:
         return None
 
     def clear(self) -> None:
-        """Forget what was measured."""
+        """Forget the measurements."""
         self.worker.forget()
 
     def close(self) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from engine.raster.pinhole_view import PinholeView
 
 MIN_OPACITY = 0.1
-"""Where less than this is covered, nothing is seen whose depth could be told."""
+"""Where less than this is covered, no depth is known."""
 EDGE_SHARE = 0.03
 """Neighbouring depths that differ by more than this share belong to different surfaces."""
 
@@ -37,13 +37,13 @@ def mode_picture(
 
     Args:
         mode: Its name.
-        gaussians: What is drawn, float32 in main memory; rows that cannot be drawn are left out.
+        gaussians: The Gaussians to draw, float32 in main memory; rows that cannot be drawn are left out.
         value_range: From app.playback.modes.view_modes.range_of.
-        backend: What draws depth and opacity.
+        backend: The back end that draws depth and opacity.
         set_back: How much farther away the camera stands than it seems to, which depths leave out. Scene units
     Returns:
         image: [H, W, 3] uint8
-        values: What its colours stand for, NaN where nothing is; None where they stand for no number. [H, W] float32
+        values: The numbers of its colours, NaN where nothing is; None where they stand for none. [H, W] float32
     Raises:
         ValueError: It is not such a mode.
     """
@@ -102,7 +102,7 @@ def _depth_and_opacity(
 
 
 def _over_background(colors: np.ndarray, opacity: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Colours as thick as what they tell of, over the background alone where nothing is known. [H, W, 3] uint8"""
+    """Colours as opaque as the depicted scene, over the background alone where nothing is known. [H, W, 3] uint8"""
     share = np.where(np.isnan(known), 0.0, np.clip(opacity, 0.0, 1.0)).astype(np.float32)[..., None]
     background = np.array(BACKGROUND, np.float32) * np.float32(255.0)
     return (colors * share + background * (np.float32(1.0) - share) + np.float32(0.5)).astype(np.uint8)

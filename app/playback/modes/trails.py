@@ -72,7 +72,7 @@ class TrailMaker:
         return newest[1] if newest is not None and newest[0].model_key == request.model_key else None
 
     def clear(self) -> None:
-        """Forget what was made."""
+        """Forget the trails."""
         self.worker.forget()
 
     def close(self) -> None:

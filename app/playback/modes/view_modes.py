@@ -153,16 +153,16 @@ PLAIN = ShownAs()
 
 
 def decoded_as(shown_as: ShownAs) -> ShownAs:
-    """What has to be decoded for it: most modes are made of the same Gaussians as the scene in its own colours."""
+    """Its mode and content to decode: most modes are made of the same Gaussians as the scene in its own colours."""
     return shown_as if shown_as.mode == "changed" else ShownAs(content=shown_as.content)
 
 
 _DEPTH_REACH = 2.0
-"""Depths are shown up to this many times the usual distance from a camera to what all of them look at."""
+"""Depths are shown up to this many times the usual distance from a camera to the focus of all of them."""
 
 
 def range_of(mode: str, rig: CameraRig | None) -> tuple[float, float]:
-    """Lowest and highest value that colours of a mode tell apart: the same in all frames and from everywhere.
+    """Lowest and highest value that colours of a mode distinguish: the same in all frames and from everywhere.
 
     Args:
         rig: Depths follow from its size; None takes a rig of size 1.
@@ -179,7 +179,7 @@ def range_of(mode: str, rig: CameraRig | None) -> tuple[float, float]:
 
 
 def rig_distance(rig: CameraRig | None) -> float:
-    """Mean distance from a camera to what all of them look at, to two digits, scene units; 1 where that is unknown."""
+    """Mean distance from a camera to the focus of all of them, to two digits, scene units; 1 where that is unknown."""
     if rig is None or len(rig) == 0:
         return 1.0
     offsets = rig.centers - rig.focus_point()

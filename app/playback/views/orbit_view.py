@@ -35,21 +35,21 @@ FLAT_REACH = 0.9
 """An orthographic view is cut off so many scene radii before the pivot, where the cameras stand: a wall behind them
 would hide everything. Farther away where one has moved away farther."""
 FRAME_SHARE = 1.15
-"""What is framed leaves a little room at the border."""
+"""A framed subject leaves a little room at the edge."""
 
 
 class OrbitView:
     """A camera on a sphere around a pivot.
 
     Attributes:
-        pivot: What the free view looks at, scene units. [3]
+        pivot: The point that the free view looks at, scene units. [3]
         distance: From where it seems to stand to the pivot, scene units.
         yaw, pitch, roll: Radians; a positive pitch looks down, a positive roll leans to the right.
         fov_y: Vertical field of view of the free view, radians.
         is_orthographic: Whether parallel lines stay parallel in the free view.
         up_axis: One of UP_AXES.
         up: Unit vector. [3]
-        scene_up: What is up in the scene, where the user has said so, instead of what the cameras agree on. [3]
+        scene_up: The scene's upward direction, where the user has said so, instead of what the cameras agree on. [3]
         look_through: Index of a capture camera, or None.
         is_eased: Whether jumps are shown as short moves.
         radius: Of the scene, scene units.
@@ -89,11 +89,11 @@ class OrbitView:
 
     @property
     def eye(self) -> np.ndarray:
-        """Where the free view seems to stand, scene units. [3]"""
+        """Place where the free view seems to stand, scene units. [3]"""
         return self.pivot - self.distance * self.forward
 
     def pose(self) -> Pose:
-        """Where the view is going, which may not be shown yet."""
+        """The pose that the view is moving to, which may not be shown yet."""
         if self.look_through is not None and self.rig is not None:
             return camera_pose(self.rig, self.look_through, otherwise=self.distance)
         eye_distance = max(FLAT_SHARE * self.radius, self.distance) if self.is_orthographic else self.distance
@@ -107,11 +107,11 @@ class OrbitView:
 
     @property
     def is_moving(self) -> bool:
-        """Is what is shown still on its way?"""
+        """Whether the shown pose is still on its way."""
         return self._motion is not None
 
     def world_to_camera(self) -> np.ndarray:
-        """Rigid map of what is shown. [4, 4] float64"""
+        """Rigid map of the shown pose. [4, 4] float64"""
         if self._motion is None and self.look_through is not None and self.rig is not None:
             return self.rig.world_to_camera[self.look_through].copy()
         return self.shown_pose.world_to_camera()
@@ -175,7 +175,7 @@ class OrbitView:
             self.pivot = center + self.rotation.T @ before
 
     def look_around(self, dx_px: float, dy_px: float) -> None:
-        """Turn on the spot: what is to the right comes into view where the pointer moves to the right."""
+        """Turn on the spot: things to the right come into view where the pointer moves to the right."""
         if not _are_finite(dx_px, dy_px):
             return
         self.stop()
@@ -190,7 +190,7 @@ class OrbitView:
             self.roll = math.remainder(self.roll + radians, 2 * math.pi)
 
     def pan(self, dx_px: float, dy_px: float) -> None:
-        """Move sideways; what lies at the pivot's depth follows the pointer."""
+        """Move sideways; things at the pivot's depth follow the pointer."""
         if not _are_finite(dx_px, dy_px):
             return
         self.stop()
@@ -325,7 +325,7 @@ class OrbitView:
             self.roll = 0.0
 
     def set_orthographic(self, is_on: bool) -> None:
-        """Drop or take up perspective; what lies at the pivot keeps its size."""
+        """Drop or take up perspective; things at the pivot keep their size."""
         with self.jump():
             self._leave()
             self.is_orthographic = is_on
@@ -363,7 +363,7 @@ class OrbitView:
 
     @contextmanager
     def jump(self) -> Iterator[None]:
-        """What is changed in here is shown as a move, from what is shown now. Jumps inside of a jump are part of it."""
+        """Changes in here are shown as a move, from the pose shown now. Jumps inside of a jump are part of it."""
         start = ViewMotion(self.shown_pose, None if self._motion else self.look_through)
         yield
         self._motion = start if self.is_eased else None

@@ -1,4 +1,4 @@
-"""What a ray meets: the point of a scene of Gaussians that one sees along it. numpy only."""
+"""The point that a ray meets: the one of a scene of Gaussians that one sees along it. numpy only."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from engine.camera.rotations import matrices_of
 from engine.conventions import ALPHA_MAX, ALPHA_MIN
 
 SEEN_TRANSMITTANCE = 0.5
-"""What stops half of the light is what one sees."""
+"""The point that one sees is where half of the light is stopped."""
 REACH = 3.4
 """Standard deviations beyond which even an opaque Gaussian is fainter than ALPHA_MIN."""
 

@@ -1,4 +1,4 @@
-"""What a view takes from a rig: the lens and the pose of a camera, and the camera that the home view begins at."""
+"""A view's facts from a rig: the lens and the pose of a camera, and the camera that the home view begins at."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def camera_pose(rig: CameraRig, camera: int, *, otherwise: float) -> Pose:
 
 
 def free_pose(rig: CameraRig | None, world_to_camera: np.ndarray, fov_y: float, *, otherwise: float) -> Pose:
-    """Any camera as a pose about what lies ahead of it as far away as what the rig looks at. See `camera_pose`."""
+    """Any camera as a pose about what lies ahead of it as far away as the rig's focus. See `camera_pose`."""
     eye, rotation = camera_center(world_to_camera), world_to_camera[:3, :3]
     focus = eye if rig is None or not len(rig) else rig.focus_point()
     ahead = float((focus - eye) @ rotation[2])
@@ -49,7 +49,7 @@ def home_camera(rig: CameraRig, focus: np.ndarray, up: np.ndarray) -> int:
     A dome's mean direction points straight up; only its level part counts, so that the home view is not from above.
 
     Args:
-        focus: What the cameras look at, scene units. [3]
+        focus: The point that the cameras look at, scene units. [3]
         up: Unit vector. [3]
     """
     offsets = rig.centers - focus

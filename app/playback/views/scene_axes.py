@@ -20,13 +20,13 @@ UP_AXES: dict[str, tuple[float, float, float] | None] = {
     "+z": (0.0, 0.0, 1.0),
     "-z": (0.0, 0.0, -1.0),
 }
-"""What can be up: an axis of the world, or what the cameras agree on."""
+"""Choices of the upward direction: an axis of the world, or the one that the cameras agree on."""
 AXIS_VIEWS = ("front", "back", "right", "left", "top", "bottom")
 """Views along an axis, named by where one stands."""
 
 
 def rig_radius(rig: CameraRig) -> float:
-    """Mean distance of the cameras from what they look at, scene units."""
+    """Mean distance of the cameras from their focus, scene units."""
     return float(np.linalg.norm(rig.centers - rig.focus_point(), axis=1).mean())
 
 

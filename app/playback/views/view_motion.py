@@ -10,7 +10,7 @@ import numpy as np
 from engine.camera.rotations import matrices_of, quats_of, quats_of_turns, turns_of_quats
 
 EASE_S = 0.2
-"""How long a move takes."""
+"""Duration of a move."""
 LONGEST_STEP_S = 0.1
 """A frame that took longer moves no farther than this: what one does not see helps nobody."""
 
@@ -40,7 +40,7 @@ class Pose:
 
     @property
     def standpoint(self) -> np.ndarray:
-        """Where it seems to stand. [3]"""
+        """Place where the camera seems to stand. [3]"""
         return self.pivot - self.distance * self.forward
 
     def world_to_camera(self) -> np.ndarray:
@@ -80,7 +80,7 @@ class ViewMotion:
     """A move that is under way; its end is the view's own pose, which may change meanwhile.
 
     Attributes:
-        start: Where it began.
+        start: The pose at its beginning.
         camera: The capture camera that was looked through there, or None.
         elapsed_s: None until the first picture of it.
     """
@@ -91,7 +91,7 @@ class ViewMotion:
 
     @property
     def share(self) -> float:
-        """How much of the way is done, 0..1: slow at both ends."""
+        """Share of the way that is done, 0..1: slow at both ends."""
         t = min(max((self.elapsed_s or 0.0) / EASE_S, 0.0), 1.0)
         return t * t * (3.0 - 2.0 * t)
 

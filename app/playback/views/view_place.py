@@ -35,7 +35,7 @@ class ViewPlace:
 
     @classmethod
     def of(cls, view: OrbitView) -> Self:
-        """Where a view is, or is going."""
+        """The place of a view, or the one it is moving to."""
         rig, camera = view.rig, view.look_through
         return cls(
             pivot=(float(view.pivot[0]), float(view.pivot[1]), float(view.pivot[2])),

@@ -21,7 +21,7 @@ COUNTS = (1, 2, 4)
 
 @dataclass
 class ViewState:
-    """From where one view looks, and what it shows."""
+    """Pose and contents of one view."""
 
     view: OrbitView = field(default_factory=OrbitView)
     overlays: Overlays = field(default_factory=Overlays)
@@ -52,7 +52,7 @@ class Views:
 
     @property
     def current(self) -> ViewState:
-        """What belongs to `current_index`."""
+        """The state of view `current_index`."""
         return self._looks[self.current_index]
 
     @property
@@ -77,7 +77,7 @@ class Views:
         """
         if n not in COUNTS:
             raise ValueError(f"there can be {', '.join(str(count) for count in COUNTS)} views, not {n}")
-        if n < self.n_shown and self._active >= n:  # what one looks at stays
+        if n < self.n_shown and self._active >= n:  # the active view stays
             self._looks[0], self._looks[self._active] = self._looks[self._active], self._looks[0]
             self._active = 0
         while len(self._looks) < n:
@@ -96,7 +96,7 @@ class Views:
             look.view = OrbitView(rig)
 
     def set_scene_up(self, up: Sequence[float] | None) -> None:
-        """Say what is up in the scene; see OrbitView.set_scene_up."""
+        """Set the scene's upward direction; see OrbitView.set_scene_up."""
         for look in self._looks:
             look.view.set_scene_up(up)
 

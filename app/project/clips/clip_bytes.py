@@ -17,7 +17,7 @@ _OWN_COMPONENTS = {
     "color_logits": "colours",
     "presence": "presence",
 }
-"""What anchors hold to the name of the component."""
+"""Arrays of anchors to the name of the component."""
 _PREFIXES = {TABLES: "field tables", FIELD: "field network", DECODER: "decoder", GAINS: "gains"}
 """How the names of other arrays begin; the first that fits counts."""
 OTHER = "other arrays"

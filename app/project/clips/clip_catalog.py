@@ -33,9 +33,9 @@ class ClipRecord:
 
     Attributes:
         state: untrained; stopped, with a checkpoint that its training continues from; trained; stale, trained on
-            something that is not there any more; damaged, a finished clip that cannot be read.
+            something that no longer exists; damaged, a finished clip that cannot be read.
         step, n_steps: Of the state that is shown.
-        held_out_psnr: dB: an evaluation's where there is one, else what the training measured last; None when not
+        held_out_psnr: dB: an evaluation's where there is one, else the training's last one; None when not
             measured.
         held_out_whole: Whether that is over all frames in all held-out cameras; else it is over at most three pictures.
         file: The state to show; None when there is none.
@@ -45,7 +45,7 @@ class ClipRecord:
         reason: Why it is stale or damaged, what became of its checkpoint, or that it was trained with other pictures;
             empty otherwise.
         blocked_by: A damaged clip without which this one cannot be trained.
-        seconds: What it took when it was trained; None where not recorded.
+        seconds: Duration of its training; None where not recorded.
         exposure_change: How far the cameras' exposure is from the reference clip's, a share; None where not known.
         n_anchors: Inherited ones, and those of the clip itself; zeros where the file does not say.
         origin: By which edits name the anchors of a trained clip, see ClipHeader.origin; empty of others.
@@ -92,8 +92,8 @@ class ClipCatalog:
 
     Args:
         project: Whose clips.
-        n_clips: How many the capture has.
-        report: Told how many were read so far, from time to time.
+        n_clips: Number of clips of the capture.
+        report: Receives the number of clips read so far, from time to time.
     """
 
     def __init__(self, project: Project, n_clips: int, report: Callable[[int], None] = lambda n_read: None) -> None:

@@ -1,6 +1,6 @@
 """Several clip files exchanged at once: all of them, or none, whenever the program is killed.
 
-PROJECT/exchange/ takes the new files under the names of the clips. Once all of them lie there, exchange.json beside
+PROJECT/exchange/ takes the new files under the names of the clips. Once all of them lie there, exchange.json next to
 them says so, and from then on the exchange is carried out: now, or when the project is opened for writing next.
 Without that file nothing has happened yet, and the folder is removed.
 """

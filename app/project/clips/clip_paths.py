@@ -43,7 +43,7 @@ class ClipPaths:
 
     @property
     def unfinished_metrics(self) -> Path:
-        """Curves of a training that is not finished. Beside the others, so that those of an earlier one stand."""
+        """Curves of a training that is not finished. Apart from the others, so that those of an earlier one stand."""
         return self.folder / "metrics" / f"{self.key}.unfinished.jsonl"
 
     @property

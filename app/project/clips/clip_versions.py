@@ -1,4 +1,4 @@
-"""Versions of finished clips: what a clip was before it was trained again, kept beside it and brought back on request.
+"""Versions of finished clips: earlier results, kept next to the clip and brought back on request.
 
 PROJECT/versions/0003/0002.safetensors is the second version of clip 3 that was set aside, 0002.jsonl its curves. Both
 are the files that lay in clips/ and metrics/, with their own checksums. A version that comes back is moved; the clip
@@ -50,22 +50,22 @@ class ClipVersion:
 
     @property
     def revision(self) -> str:
-        """Names what it shows; equal for equal content."""
+        """A name of its contents; equal for equal content."""
         return "" if self.header is None else f"version-{self.header.fingerprint}"
 
 
 def version_path(project: Project, clip_index: int, number: int) -> Path:
-    """Where a version lies."""
+    """The file of a version."""
     return versions_dir(project, clip_index) / f"{number:04d}.safetensors"
 
 
 def versions_dir(project: Project, clip_index: int) -> Path:
-    """Where the versions of a clip lie."""
+    """The folder of a clip's versions."""
     return project.folder / "versions" / project.clip_name(clip_index)
 
 
 def list_versions(project: Project, clip_index: int) -> list[ClipVersion]:
-    """Versions of a clip, the one set aside last first. Reads their headers, and nothing of what is not a version."""
+    """Versions of a clip, the one set aside last first. Reads their headers, and no other files."""
     found = []
     for number in _numbers(project, clip_index):
         path = version_path(project, clip_index, number)
@@ -97,7 +97,7 @@ def set_aside(project: Project, clip_index: int, *, unless: str = "") -> int | N
     A damaged clip does not become a version; it is kept as well, see `put_damaged_aside`.
 
     Args:
-        unless: Fingerprint of what comes in its place: an equal clip is not kept twice.
+        unless: Fingerprint of the clip that replaces it: an equal clip is not kept twice.
     Returns:
         Its number; None where there is no readable clip, or an equal one.
     Raises:
@@ -153,7 +153,7 @@ def best_version(project: Project, clip_index: int) -> ClipVersion | None:
 
 
 def recovery_hint(project: Project, clip_index: int) -> str:
-    """What can be done about a damaged clip, as a sentence for an error."""
+    """The remedy for a damaged clip, as a sentence for an error."""
     version = best_version(project, clip_index)
     if version is None:
         return f"Restore it from a backup, or train clip {clip_index} again."

@@ -15,11 +15,11 @@ from engine.errors import ProjectError
 
 @dataclass(frozen=True, slots=True)
 class FoundHeader:
-    """What a clip file says of itself. Shared between readers: nobody changes it.
+    """The header of a clip file, or its damage. Shared between readers: nobody changes it.
 
     Attributes:
         header: None when the file is damaged.
-        damage: What is wrong with the file; empty for a good one.
+        damage: The fault of the file; empty for a good one.
         n_bytes: Size of the file.
         exposure_change: Of a finished clip, see engine.clip_files.kept_drift.mean_change; None elsewhere.
     """
@@ -63,5 +63,5 @@ def _read(path: Path, n_bytes: int) -> FoundHeader:
 def _exposure_change(path: Path) -> float | None:
     try:
         return mean_change(read_drift(path))
-    except ProjectError:  # damage of arrays is told where they are needed
+    except ProjectError:  # damage of arrays is reported where they are needed
         return None

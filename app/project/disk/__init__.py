@@ -1,1 +1,1 @@
-"""What a project takes on the disk, and making room there."""
+"""A project's disk use, and making room on the disk."""

@@ -1,5 +1,5 @@
-"""What other settings make worthless: all that is trained, or the progress of trainings that were stopped. What it is,
-what it took, and how it goes.
+"""Results that other settings make worthless: all that is trained, or the progress of stopped trainings. Their names,
+the time they took, and their removal.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from engine.text import duration_text, size_text
 from engine.training.preparation.stages import all_stage_files
 
 MAX_LISTED = 3
-"""Clips whose progress is told with its step."""
+"""Clips whose progress is stated with its step."""
 
 
 _NO_ROOM = Room()
@@ -26,10 +26,10 @@ class Discarded:
     """Training that goes when settings change.
 
     Attributes:
-        room: The files and what they take.
+        room: The files and their size.
         n_clips: Finished clips, damaged ones and those of other cuts of the capture included.
-        n_versions: What clips were before they were trained again.
-        seconds: What training the finished clips took; None where nothing was recorded.
+        n_versions: Earlier results of clips that were trained again.
+        seconds: Duration of training the finished clips; None where nothing was recorded.
         progress: Of each training that was stopped: the name of its clip, the step and all steps; 0 and 0 where its
             checkpoint cannot be read.
     """

@@ -19,17 +19,17 @@ WHAT = {
     "checkpoints": "progress of stopped trainings",
     "unused": "clips of other cuts, and damaged files that were put aside",
 }
-"""What can be freed, in words."""
+"""Kinds of files that can be freed, in words."""
 
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """What can go.
+    """Files that can be deleted.
 
     Attributes:
         paths: The files.
-        n_bytes: What they take.
-        n_clips: How many of them hold a clip or the progress of one.
+        n_bytes: Their size.
+        n_clips: Number of files that hold a clip or the progress of one.
     """
 
     paths: tuple[Path, ...] = ()
@@ -38,13 +38,13 @@ class Room:
 
 
 def room_of(project: Project, n_clips: int, what: str, clip_index: int | None = None) -> Room:
-    """What would go.
+    """The files that would be deleted.
 
     Args:
         project: May be read-only.
         n_clips: Of the capture.
         what: A name of WHAT.
-        clip_index: Only what belongs to this clip; None for all. "unused" belongs to none.
+        clip_index: Only files of this clip; None for all. "unused" belongs to none.
     Raises:
         ValueError: There is no such name.
         ProjectError: There is no such clip.

@@ -1,4 +1,4 @@
-"""What a project takes on the disk: of each clip, its versions and checkpoint, and what all clips share."""
+"""A project's disk use: of each clip, its versions and checkpoint, and what all clips share."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ClipUse:
 
     Attributes:
         clip: The finished clip with its curves.
-        versions: What it was before, with curves.
-        n_versions: How many of these there are.
+        versions: Its earlier results, with curves.
+        n_versions: Number of versions.
         checkpoint: Its unfinished training, with curves and the pieces of its preparation.
     """
 
@@ -44,7 +44,7 @@ class DiskUse:
         unused: Clips, versions and checkpoints under names that no clip has now: those of other cuts of the capture,
             and damaged files that were put aside.
         n_unused: Files among them that hold a clip.
-        preparation: What clips share, such as backgrounds.
+        preparation: Files that clips share, such as backgrounds.
         other: Settings, logs, figures and whatever else lies in the folder.
     """
 
@@ -76,7 +76,7 @@ def disk_use(project: Project, n_clips: int) -> DiskUse:
 
     Args:
         project: May be read-only.
-        n_clips: How many clips the capture has.
+        n_clips: Number of clips of the capture.
     """
     names = {project.clip_name(index): index for index in range(n_clips)}
     unused = set(unused_files(project, n_clips))
@@ -121,7 +121,7 @@ def unused_files(project: Project, n_clips: int) -> list[Path]:
 
     Args:
         project: May be read-only.
-        n_clips: How many clips the capture has.
+        n_clips: Number of clips of the capture.
     """
     names = {project.clip_name(index) for index in range(n_clips)}
     found = [path for path, _ in files_of(project.folder / DAMAGED, set()) if path.suffix == ".safetensors"]
@@ -137,7 +137,7 @@ def files_of(folder: Path, seen: set[tuple[int, int]]) -> Iterator[tuple[Path, i
     """Regular files under a folder with their sizes, bytes; links are not followed.
 
     Args:
-        folder: Where to look.
+        folder: The folder to search.
         seen: Device and number of files that were counted already; those found are added.
     """
     entries: list[os.DirEntry[str]] = []

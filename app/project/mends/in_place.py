@@ -86,10 +86,10 @@ def put_in_place(project: Project, record: MendRecord, drafts: Mapping[int, Path
 
 
 def take_back(project: Project, record: MendRecord) -> None:
-    """Bring back what clips were before they were mended; what they are now become versions.
+    """Bring back clips as they were before they were mended; the present ones become versions.
 
     Raises:
-        ProjectError: One of them is not what mending has made of it any more, or its version is gone; nothing changes.
+        ProjectError: One of them is no longer the result of that mending, or its version is gone; nothing changes.
         DiskError: The disk refused.
     """
     project.check_writable()
@@ -120,7 +120,7 @@ def as_cut_now(project: Project, record: MendRecord) -> MendRecord:
 
 
 def why_not_back(project: Project, record: MendRecord) -> str:
-    """Why what was mended cannot be taken back; empty where it can."""
+    """Why a mend cannot be taken back; empty where it can."""
     for clip in as_cut_now(project, record).clips:
         if _fingerprint(project, clip.clip_index) != clip.after:
             return f"Clip {clip.clip_index} was trained or restored since it was mended."

@@ -1,4 +1,4 @@
-"""MendRecord: what was mended, how, with which figures before and after; mends/0001.json in the project."""
+"""MendRecord: the mended place, the means, and figures before and after; mends/0001.json in the project."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from engine.storage.typed_json import EntryError, to_type
 
 SCHEMA = 1
 UNFINISHED = "unfinished.json"
-"""Beside the records, while mended clips are put in their place."""
+"""Next to the records, while mended clips are put in their place."""
 MAX_KEPT = 50
 """Records beyond that go, the oldest first; they are about clips long gone."""
 _HINT = "Remove it; nothing else depends on it."
@@ -35,17 +35,17 @@ class MendedClip(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MendRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What came of mending once. A value.
+    """The outcome of mending once. A value.
 
     Attributes:
-        words: What was mended, as "the seam at frame 20".
+        words: The mended place, as "the seam at frame 20".
         first, stop: Frames that the stretch covers.
         clips: Those that changed; none where nothing helped.
         before, after: Figures.
         attempts: All that was tried, in order.
-        diagnosis: What jumps, in a sentence.
-        advice: What else would help; empty where enough was reached.
-        seconds: What it took.
+        diagnosis: The component that jumps, in a sentence.
+        advice: Other remedies; empty where enough was reached.
+        seconds: Its duration.
         made: When, as ISO 8601 with minutes.
     """
 
@@ -73,7 +73,7 @@ def now_text() -> str:
 
 
 def records_dir(project: Project) -> Path:
-    """Where records lie."""
+    """The folder of records."""
     return project.folder / "mends"
 
 

@@ -1,1 +1,1 @@
-"""What opening a folder means: what it is, what is asked, and the project made or found."""
+"""Opening a folder: its kind, the questions to the user, and the project made or found."""

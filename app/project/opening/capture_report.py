@@ -1,4 +1,4 @@
-"""What was recognised in a folder, in words, before anything is made of it; or why it does not open and what to do."""
+"""The contents of a folder in words, before anything is made of it; or why it does not open and what to do."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from engine.errors import CaptureError, EngineError
 from engine.text import duration_text, printable, rate_text
 
 LAYOUTS = {reader.FORMAT: reader.LAYOUT for reader in FORMATS}
-"""By format: what its layout is called, in words."""
+"""Names of layouts, by format."""
 LENSES = {
     "pinhole": "no distortion",
     "opencv": "OpenCV distortion",
@@ -42,8 +42,8 @@ class ReportedCamera:
         image_size: Width and height as stored.
         lens: In words.
         fov_deg: Horizontal and vertical view of its pictures once they are undistorted.
-        center: Where it stands, scene units. [3]
-        forward: Where it looks, unit vector. [3]
+        center: Its place, scene units. [3]
+        forward: Its viewing direction, unit vector. [3]
         is_default_holdout: Whether the capture sets it aside.
         has_masks: Whether masks came along.
     """
@@ -60,20 +60,20 @@ class ReportedCamera:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CaptureReport:
-    """What a capture is.
+    """The description of a capture.
 
     Attributes:
         path: Its folder.
-        layout: What its layout is called, in words.
+        layout: The name of its layout, in words.
         cameras: In the order of the rig.
         n_frames, fps: Of every camera.
-        up: Mean of what is up in the pictures, unit vector. [3]
-        focus_point: What the cameras look at, scene units. [3]
+        up: Mean upward direction of the pictures, unit vector. [3]
+        focus_point: The point that the cameras look at, scene units. [3]
         rig_extent: Largest distance between two cameras, scene units.
         points: Name of a point cloud that came along; empty without one.
-        warnings: Sentences about what is odd but usable.
+        warnings: Sentences about odd but usable things.
         misfit_px: By how many pixels frames have another shape than their calibration; 0 where they have not.
-        fit: What was said of these.
+        fit: The user's answer about these frames.
         needs_fit: Whether that has to be said before they can be used.
     """
 
@@ -93,7 +93,7 @@ class CaptureReport:
 
     @property
     def rows(self) -> tuple[tuple[str, str], ...]:
-        """What is reported, each with a word for what it is."""
+        """The report's rows: a label and a text each."""
         cameras = self.cameras
         sizes = _counted([f"{camera.image_size[0]} x {camera.image_size[1]}" for camera in cameras])
         lenses = _counted([camera.lens for camera in cameras])
@@ -134,9 +134,9 @@ class RefusedFolder:
 
     Attributes:
         path: The folder.
-        message: What is wrong.
-        hint: What to do; may be empty.
-        problems: Every problem of it where there are several: what is wrong and what to do about it.
+        message: The fault.
+        hint: The remedy; may be empty.
+        problems: Every problem of it where there are several: the fault and the remedy.
         videos: Videos in it that may be cameras of one scene, where no calibration was found.
         needs_links: Nothing is wrong but that its files lie outside of it, which the user may allow.
     """
@@ -156,7 +156,7 @@ class RefusedFolder:
 
 
 def report_of(capture: Capture) -> CaptureReport:
-    """Put into words what a capture is. Looks at numbers, not at pixels."""
+    """Describe a capture in words. Looks at numbers, not at pixels."""
     found: dict[str, Any] = describe(capture)
     entries = capture.layout.cameras
     up = -capture.rig.world_to_camera[:, 1, :3].mean(axis=0)

@@ -1,4 +1,4 @@
-"""What a killed program left half done is finished or taken back when the project is opened for writing."""
+"""Work that a killed program left half done is finished or taken back when the project is opened for writing."""
 
 from __future__ import annotations
 

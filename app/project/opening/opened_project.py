@@ -13,7 +13,7 @@ from engine.capture.clip import Clip
 
 @dataclass(frozen=True, slots=True)
 class OpenedProject:
-    """What is open. Other settings make another value of the same generation, another project one of the next.
+    """The open project. Other settings make another value of the same generation, another project one of the next.
 
     Attributes:
         clips: Of the capture, as the project's settings divide it.

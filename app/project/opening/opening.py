@@ -1,4 +1,4 @@
-"""What opening means: a capture and the project that belongs to it. Runs on a job's thread; changes no state."""
+"""Opening: a capture and the project that belongs to it. Runs on a job's thread; changes no state."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class OtherCapture(ProjectError):
 
     Attributes:
         project: The project's folder.
-        known: Where its capture was.
+        known: The former place of its capture.
     """
 
     project: Path | None = None
@@ -61,12 +61,12 @@ class Opened:
 
     Attributes:
         project: None where it is the one already open, or the user has to be asked.
-        catalog: What lies on disk of its clips; None without a project.
+        catalog: Its clips on the disk; None without a project.
         choices: The projects to choose from; empty where there is nothing to choose.
-        notes: Kind, title, detail and hint of what the user has to know.
+        notes: Kind, title, detail and hint of each note to the user.
         follow_links: Of a choice: whether the user allows the capture's files to lie outside of its folder.
         is_asking: There is no project yet, and the user is to see the capture before one is made.
-        folder: Where the project would be made then; None elsewhere.
+        folder: The place of a new project then; None elsewhere.
         is_new: The project was made just now.
     """
 
@@ -123,10 +123,10 @@ def open_for_window(
         follow_links: Whether the user allows the capture's files to lie outside of its folder; noted in the project.
         is_asking: Only look at the capture where a project would have to be made; so it is, too, where somebody has to
             say what became of its frames.
-        answers: What a new project begins with; None takes the scale and what the capture suggests. Its `fit` is
+        answers: The first settings of a new project; None takes the scale and what the capture suggests. Its `fit` is
             written into the capture's capture.json.
         known: The capture where it was opened already.
-        choices: How a project is opened.
+        choices: The way a project is opened.
         projects: The folder of projects without a place of their own; None for the usual one.
     Raises:
         DamagedProject: Its document is damaged; says what is left.
@@ -240,7 +240,7 @@ def _read_settings(folder: Path, choices: ProjectChoices) -> ProjectSettings:
 
 
 def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project:
-    """The project, for writing where that is possible and wanted; what there is to say of it goes into `notes`."""
+    """The project, for writing where that is possible and wanted; remarks on it go into `notes`."""
     if not choices.is_journal_used:
         notes.append(("warn", "The project is open read-only", "The journal is ignored.", ""))
         why = "It was opened without its damaged journal. Repair it to edit or train."
@@ -263,7 +263,7 @@ def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project
 
 
 def _recovered(project: Project) -> list[Note]:
-    """What a user has to know whose project was not closed the last time."""
+    """Notes for a user whose project was not closed the last time."""
     n = project.store.n_replayed
     steps = f"{n} step{'s were' if n != 1 else ' was'} recovered from the journal, up to: {project.history.undo_name}."
     told = f"It was not closed last time. {steps if project.history.undo_name else steps.partition(',')[0] + '.'}"
@@ -271,7 +271,7 @@ def _recovered(project: Project) -> list[Note]:
 
 
 def _missing(project: Project) -> list[Note]:
-    """What reading the project's document found missing."""
+    """Notes on parts that were missing when the project's document was read."""
     return [("warn", "Part of the project is missing", note, "") for note in project.store.notes]
 
 
@@ -301,7 +301,7 @@ def projects_of(
 
 
 def _changed(folder: Path) -> str:
-    """When the document of a project was written last."""
+    """The time at which the document of a project was written last."""
     try:
         written_s = (folder / PROJECT_FILE).stat().st_mtime
         return datetime.fromtimestamp(written_s, UTC).isoformat(timespec="seconds")

@@ -19,7 +19,7 @@ WINDOW_WIDTH_PX = 960
 
 
 class LastAnswers(msgspec.Struct, frozen=True):
-    """What was answered last, as far as it says something about the next capture.
+    """The user's last answers, as far as they say something about the next capture.
 
     Attributes:
         width_px: Working width; None where it was that of the capture.
@@ -34,14 +34,14 @@ class LastAnswers(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class OpeningAnswers:
-    """What a project of a capture begins with.
+    """The first settings of a capture's project.
 
     Attributes:
         frames: First frame that is worked on, and the one after the last; None for all.
         scale: Working size divided by stored size, in (0, 1].
         clip_length: Frames per clip.
         holdout: Names of cameras kept out of training, to measure with.
-        fit: What became of frames of another shape than their calibration; None where that is not asked or not said.
+        fit: The treatment of frames of another shape than their calibration; None where not asked or not said.
     """
 
     frames: tuple[int, int] | None
@@ -74,7 +74,7 @@ def good_holdout(capture: Capture) -> tuple[str, ...]:
 
 
 def answers_to_keep(answers: OpeningAnswers, capture: Capture) -> LastAnswers:
-    """What the next capture can be offered."""
+    """The answers that the next capture can be offered."""
     width_px = None if answers.scale == 1.0 else int(working_size(capture, answers.scale)[0])
     return LastAnswers(width_px, answers.clip_length, bool(answers.holdout))
 

@@ -1,4 +1,4 @@
-"""Creating, opening and repairing project folders: the lock, and what a killed program left half done."""
+"""Creating, opening and repairing project folders: the lock, and work that a killed program left half done."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DEFAULT_CLIP_LENGTH = 10
 
 
 def read_settings(folder: Path) -> ProjectSettings:
-    """The settings of a project that is not opened. Raises what DocumentStore.read raises."""
+    """The settings of a project that is not opened. Raises as DocumentStore.read does."""
     return DocumentStore(folder).read().present.settings
 
 
@@ -148,7 +148,7 @@ def open_project(
         return Project(folder, plain_history(folder), None, why_read_only=why_read_only)
     store = DocumentStore(folder)
     lock = None
-    if is_writable and is_project(folder):  # what is not a project says so below
+    if is_writable and is_project(folder):  # any other folder raises its error below
         check_folders(folder)
         lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()

@@ -8,13 +8,13 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class ProjectChoices:
-    """How a project is opened.
+    """The way a project is opened.
 
     Attributes:
         is_read_only: Only to look at it.
         is_journal_used: False for the document as it was when project.json was written last; read-only.
-        is_repaired: First continue with the steps before what is damaged, and keep that aside.
-        capture: Where its capture lies by now; None where it lies where the project says.
+        is_repaired: First continue with the steps before the damaged part, and keep that part aside.
+        capture: The present place of its capture; None where it lies where the project says.
     """
 
     is_read_only: bool = False

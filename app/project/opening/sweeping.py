@@ -1,4 +1,4 @@
-"""What a killed program has left in a project is removed when the project is opened for writing."""
+"""Remains of a killed program in a project are removed when the project is opened for writing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from engine.storage.files import PARTIAL_PREFIX, discard, is_left_over
 logger = logging.getLogger(__name__)
 
 LIVE_NAME = re.compile(r"(clip-[\d-]{4,19}-r\d{4,9}|[\d-]{4,19}-final|mended-\d{4,9})\.safetensors")
-"""What the program makes in "live": snapshots, a finished clip that is read back, drafts of mended clips."""
+"""Files that the program makes in "live": snapshots, a finished clip that is read back, drafts of mended clips."""
 
 
 def sweep(folder: Path) -> None:

@@ -34,12 +34,12 @@ class FilmWriter:
     """Writes one file. A context manager; the file is complete once the block has ended well.
 
     Args:
-        path: Where to write.
+        path: The file to write.
         format_name: "mp4" or "webm".
         fps: Pictures per second.
         background: Behind the scene, levels 0 to 255.
         is_transparent: Keep the opacity.
-        sound: What is heard, opened; None for silence.
+        sound: The sound, opened; None for silence.
     Raises:
         FFmpegError: The disk or the encoder refused.
     """

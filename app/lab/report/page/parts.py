@@ -1,4 +1,4 @@
-"""What a report is made of: sections of sentences, tables and figures, in order."""
+"""The parts of a report: sections of sentences, tables and figures, in order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Figure:
         name: File name without suffix.
         png: The file.
         caption: Shown below it.
-        alt: What is to be seen, for those who do not see it.
+        alt: A description for those who do not see it.
     """
 
     name: str

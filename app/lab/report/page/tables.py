@@ -26,7 +26,7 @@ class TableColumn:
         n_digits: Digits after the point; None shows a number with five digits in all, and anything else as it is.
         is_higher_better: Direction, for an arrow and the best value in bold; None for neither.
         unit: Shown behind the title; empty for none.
-        labels: What the page shows in place of values that are texts; files keep those.
+        labels: The page's words for values that are texts; files keep those.
         is_shown: Whether it stands on the page, or in files only.
     """
 

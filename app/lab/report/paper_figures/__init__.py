@@ -1,1 +1,1 @@
-"""Figures of the paper: projects beside each other at the same place, and over the length of clips and sequences."""
+"""Figures of the paper: projects side by side at the same place, and over the length of clips and sequences."""

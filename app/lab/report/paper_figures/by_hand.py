@@ -1,4 +1,4 @@
-"""What is chosen by hand: a boundary, a camera, windows to cut out; checked before anything is measured or drawn."""
+"""Choices made by hand: a boundary, a camera, windows to cut out; checked before anything is measured or drawn."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class InsetWindow:
 
 @dataclass(frozen=True, slots=True)
 class FigureOptions:
-    """What the command line says; None and nothing where the figures choose by their rules.
+    """Options of the command line; None and nothing where the figures choose by their rules.
 
     Attributes:
         boundary: First frame of a clip.
@@ -59,7 +59,7 @@ class Places:
 
 
 def checked_places(wishes: FigureOptions, capture: Capture, projects: Sequence[ProjectFacts]) -> Places:
-    """What is wished for, as places of a capture.
+    """The chosen places, as places of a capture.
 
     Args:
         capture: Of the first project.

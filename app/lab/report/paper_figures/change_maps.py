@@ -1,4 +1,4 @@
-"""The section with what changes across a boundary in every project, at the same place and under one colour range."""
+"""The section with changes across a boundary in every project, at the same place and under one colour range."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _INSIDE = "inside clip"
 
 
 def change_maps_section(projects: Sequence[Pictured], places: Places, left_out: Sequence[str]) -> Section:
-    """R and E of every project across one boundary, beside what the capture itself changes by.
+    """R and E of every project across one boundary, next to the capture's own change.
 
     Args:
         projects: The page's own first.

@@ -38,7 +38,7 @@ class Sheet:
 
 
 def draw_crops(truth: np.ndarray, window: InsetWindow, tiles: Sequence[Tile]) -> Sheet:
-    """A small overview of the whole picture with a red box, and the windows in rows beside it.
+    """A small overview of the whole picture with a red box, and the windows in rows next to it.
 
     Args:
         truth: The whole picture. [H, W, 3] uint8

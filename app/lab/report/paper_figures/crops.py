@@ -27,7 +27,7 @@ RULE = (
 
 
 def crops_section(projects: Sequence[Pictured], places: Places, left_out: Sequence[str]) -> Section:
-    """Windows chosen by hand, or by RULE where none are and there are two projects to tell apart.
+    """Windows chosen by hand, or by RULE where none are and there are two projects to distinguish.
 
     Args:
         projects: The page's own first.

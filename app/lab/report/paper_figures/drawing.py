@@ -12,7 +12,7 @@ from app.lab.figures import new_figure, plain_texts, png_of
 from app.lab.report.charts import WIDTH_INCHES, add_color_bar, map_options, shortened
 
 MAX_COLUMNS = 5
-"""Maps beside each other; more begin another row."""
+"""Maps side by side; more begin another row."""
 _DPI = 150
 
 

@@ -1,4 +1,4 @@
-"""The section with what static and dynamic features carry: each alone, beside the full render and the capture."""
+"""The section on static and dynamic features: each alone, next to the full render and the capture."""
 
 from __future__ import annotations
 
