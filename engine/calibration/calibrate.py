@@ -24,7 +24,7 @@ FOLDER_PREFIX = "clipgstream-calibration-"
 
 
 class CalibrationJob(msgspec.Struct, frozen=True):
-    """What the child is asked; see `calibrate`. scratch: A folder for its files."""
+    """The child's job; see `calibrate`. scratch: A folder for its files."""
 
     folder: Path
     options: CalibrationOptions

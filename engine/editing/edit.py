@@ -131,9 +131,9 @@ class Edit(Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         edit_id: Names it for good; no two edits of a document have the same.
         name: For people.
-        target: What it acts on, ...
+        target: The Gaussians it acts on, ...
         is_inverted: ... or everything but that, as for cropping and isolating.
-        action: What it does.
+        action: The action to apply.
         scope: In which frames.
         is_on: Whether it counts now.
     """

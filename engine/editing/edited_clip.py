@@ -42,7 +42,7 @@ class EditedGaussians:
     """A moment of a clip.
 
     Attributes:
-        gaussians: What is left, sets in the order of the model.
+        gaussians: The Gaussians left, sets in the order of the model.
         rows: Where each comes from.
         n_still: So many come first and differ in nothing but their colours between moments with equal effects.
     """
@@ -56,7 +56,7 @@ class EditedClip:
     """A clip, or a part of one, with edits. For one thread; the model is not changed.
 
     Args:
-        model: What is decoded; nothing in it learns.
+        model: The model to decode; nothing in it learns.
         clip: Its frames.
         named: The sets of the whole clip, see engine.editing.clip_rows.named_sets.
     """
@@ -80,7 +80,7 @@ class EditedClip:
     def decode(
         self, clip_time: float, effects: Effects = NO_EFFECTS, *, alive_at: float | None = None
     ) -> EditedGaussians:
-        """What is seen at a time of the clip.
+        """The Gaussians seen at a time of the clip.
 
         Args:
             clip_time: See ClipModel.decode.
@@ -103,7 +103,7 @@ class EditedClip:
 
     @property
     def n_bytes_kept(self) -> int:
-        """Memory of what is kept between moments, beside the model."""
+        """Memory kept between moments, apart from the model."""
         return sum(part.n_bytes for part in self._still.values()) + self._frames.n_bytes
 
     # ---------------------------------------------------------------- what stands still
@@ -133,7 +133,7 @@ class EditedClip:
     # ---------------------------------------------------------------- what moves
 
     def _moving(self, effects: tuple[Effect, ...], clip_time: float, alive_at: float) -> IndexedGaussians:
-        """What does not stand still, after some effects."""
+        """The Gaussians that do not stand still, after some effects."""
         now = self._unedited(clip_time, alive_at)
         for number, effect in enumerate(effects):
             before, chosen = effects[:number], self._chosen(effect)

@@ -1,4 +1,4 @@
-"""Picks that stand for nothing any more: their clip was trained anew since, so that its anchors are others."""
+"""Picks that no longer stand for anything: their clip was trained anew since, so that its anchors are others."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ class StillPart:
         return sum(tensor.nbytes for tensor in tensors) + self.index.nbytes
 
     def at(self, clip_time: float) -> Gaussians:
-        """What is left of it, at a time of the clip."""
+        """The Gaussians left of the still part, at a time of the clip."""
         if self._has_light:
             return replace(self._shapes, colors=self._colors(clip_time, len(self._steps)), is_frozen=None)
         if self._unchanging is None:

@@ -1,4 +1,4 @@
-"""What can be done to a clip: each takes a finished clip and gives it as it would be stored afterwards.
+"""Remedies for a clip: each takes a finished clip and gives it as it would be stored afterwards.
 
 Training itself is engine.training's, as it is for a new clip; only what it begins with and compares with differs.
 """

@@ -22,7 +22,7 @@ def without_anchors(state: ClipState, own: Chosen, inherited: Chosen, gone_from_
 
     Args:
         own: Rows of the clip's own sets that go.
-        inherited: Rows of the reference clip's sets that this clip does not show any more.
+        inherited: Rows of the reference clip's sets that this clip no longer shows.
         gone_from_reference: Rows of these sets that the reference clip itself loses; none of them is shown here.
     Returns:
         With a fingerprint of its own; its reference is still that of before.

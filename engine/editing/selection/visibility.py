@@ -17,7 +17,7 @@ from engine.editing.selection.seen_from import SeenFrom
 PICTURE_PX = 60_000
 """Pixels of the picture in which it is looked, at most."""
 SEEN_TRANSMITTANCE = 0.5
-"""What stops half of the light is what one sees."""
+"""A surface is seen where it stops half of the light."""
 DEPTH_SIGMAS = 2.0
 """A Gaussian is as thick as this in the direction of view, standard deviations to either side."""
 DEPTH_SHARE = 2e-3

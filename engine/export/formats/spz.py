@@ -65,7 +65,7 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` wrote, axes as stored. Raises ProjectError where it is something else."""
+    """Read a file of `write`, axes as stored. Raises ProjectError where it is something else."""
     try:
         with gzip.GzipFile(fileobj=file, mode="rb") as unzipped:
             head = unzipped.read(_HEAD.size)

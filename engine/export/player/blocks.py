@@ -41,7 +41,7 @@ class Packer:
 
         Args:
             n_frames: Of the clip, as far as they are wanted.
-            still, moving: What stands still and what moves, by the number of the frame in the clip.
+            still, moving: The still part and the moving parts, the latter by the number of the frame in the clip.
         """
         part = still_part(n_frames, lambda frame: seen(still(frame)))
         if part is None:  # then all of it is stored for every frame

@@ -66,7 +66,7 @@ def page_writer(stream: TextIO, header: dict[str, Any], *, folder: Path | None =
 
     Args:
         stream: Of the page, UTF-8.
-        header: What the page knows of the scene; see docs/player_format.md. It may be completed until the end.
+        header: The page's facts about the scene; see docs/player_format.md. It may be completed until the end.
         folder: Where blocks go as files of their own; None to put them into the page.
     """
     before, after = _asset("player.html").split("{{blocks}}\n")
@@ -111,7 +111,7 @@ def web_shader(name: str) -> str:
 
 
 def _policy(script: str, style: str, *, has_folder: bool) -> str:
-    """What the page may load: itself, and the blocks beside it where there are some. No network in any case."""
+    """The sources the page may load: itself, and the blocks next to it where there are some. No network in any case."""
     scripts = f"'sha256-{_digest(script)}' blob:" + (" 'self' file:" if has_folder else "")
     rules = {
         "default-src": "'none'",

@@ -30,7 +30,7 @@ def measured_step_s(sizes: StepSizes, phase: str, backend: Backend) -> float:
     Args:
         sizes: Of the clip.
         phase: "static", "joint" or "source".
-        backend: What they are computed with.
+        backend: The backend they are computed with.
     """
     run = _Steps(sizes, phase, backend)
     times_s = []

@@ -1,4 +1,4 @@
-"""What a clip's training starts from: its pictures, and made of them model, gains and backgrounds.
+"""The start of a clip's training: its pictures, and model, gains and backgrounds made of them.
 
 Reference clip: `static_parts` before its first phase, `with_motion` between the phases, when the static anchors have
 been trained. Source clip: `source_parts` does all of it at once.
@@ -74,7 +74,7 @@ class ClipParts:
         model: Everything that is visible in the clip.
         gains: Of the training cameras. [C, 3] float32
         drift: Exposure of each training camera in each frame against the reference clip's. [C, M, 3] float32
-        backgrounds: What the training cameras see when nothing moves.
+        backgrounds: The training cameras' pictures when nothing moves.
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
         reasons: Of the gate, by role; empty without a decision.
@@ -113,10 +113,10 @@ class ClipPreparation:
         clip: Frames to prepare.
         config: All numbers.
         method: All decisions.
-        backend: What the model is made for and drawn with.
+        backend: The backend the model is made for and drawn with.
         camera_indices: Training cameras, in capture numbering.
         cameras: The same, as they are by now.
-        base: What the clip inherits from; None for a reference clip.
+        base: The clip to inherit from; None for a reference clip.
         previous: The clip before, finished, for a method that continues from it.
         regions: Where the user overrules the gate.
         seed: Of new decoder heads.
@@ -232,7 +232,7 @@ class ClipPreparation:
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
     def measured_colors(self, reference: ClipState, pictures: TrainingPictures) -> ClipColors:
-        """What `source_parts` measures of a clip's colours, and nothing of what it builds. Removes the pictures' drift.
+        """The colours that `source_parts` measures of a clip, without the parts it builds. Removes the pictures' drift.
 
         Raises:
             ProjectError: The reference was trained with other cameras.
@@ -287,7 +287,7 @@ class ClipPreparation:
     # ---------------------------------------------------------------- what is kept of an attempt
 
     def _key(self) -> dict[str, Any]:
-        """What a preparation depends on, apart from what `_keep_after` adds."""
+        """The inputs a preparation depends on, apart from those `_keep_after` adds."""
 
         def named(state: ClipState | None) -> str | None:
             return None if state is None else state.header.fingerprint
@@ -346,7 +346,7 @@ class ClipPreparation:
         """The cloud of all frames of the clip, kept or new.
 
         Args:
-            drift: What was taken out of the pictures.
+            drift: The drift taken out of the pictures.
             spacing, gains: Of the reference clip; None for a reference clip.
         """
         rig, config, keep = self._cameras.rig, self._config, self._stages.keep
@@ -369,7 +369,7 @@ class ClipPreparation:
         return cloud
 
     def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:
-        """What the reference clip left behind, made anew from its pictures where it is gone."""
+        """The files the reference clip left behind, made anew from its pictures where gone."""
         clip = _clip_of(reference.header)
         pictures = TrainingPictures(self._capture, clip, self._camera_indices)
         _, exposures = self._without_drift(pictures)
@@ -413,7 +413,7 @@ class ClipPreparation:
     # ---------------------------------------------------------------- what moves
 
     def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
-        """What moves in each picture. [M, C, H, W] bool"""
+        """The moving pixels of each picture. [M, C, H, W] bool"""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         brightness = brightness_in(parts.model, self._cameras.views) if parts.model.has_light else None
         return motion_masks(pictures, parts.backgrounds, brightness, self._report, keep)
@@ -421,7 +421,7 @@ class ClipPreparation:
     def _moving_cloud(
         self, parts: ClipParts, pictures: TrainingPictures, masks: np.ndarray
     ) -> tuple[MovingCloud, float | None]:
-        """What moves, and the spacing of moving anchors."""
+        """The moving points, and the spacing of moving anchors."""
         static_points = host_array(parts.model.anchor_set("static").positions)
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         gains = host_array(parts.gains)

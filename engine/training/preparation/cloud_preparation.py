@@ -47,7 +47,7 @@ BACKGROUNDS_FILE = "backgrounds.safetensors"
 
 @dataclass(frozen=True, slots=True)
 class Backgrounds:
-    """What each training camera sees when nothing moves.
+    """The background of each training camera: its picture when nothing moves.
 
     Attributes:
         images: [C, H, W, 3] uint8
@@ -91,7 +91,7 @@ def estimate_backgrounds(
     """Backgrounds from frames spread over the whole capture, or over the clip with backgrounds=clip.
 
     Args:
-        clip: What is prepared.
+        clip: The clip to prepare.
         exposures: Of each camera, the one that its background comes in; None leaves frames as they are.
     """
     start, stop = _background_range(capture, clip, config)
@@ -244,7 +244,7 @@ def motion_masks(
     report: ReportProgress,
     keep: Keep = do_now,
 ) -> np.ndarray:
-    """What differs from the background, per frame and camera. [M, C, H, W] bool
+    """The pixels that differ from the background, per frame and camera. [M, C, H, W] bool
 
     Args:
         brightness: (camera row, frame in clip) -> factor by which light changes the background [H, W, 1]; None where it
@@ -278,7 +278,7 @@ def motion_masks(
 def moving_pixels(
     picture: np.ndarray, background: np.ndarray, capture: Capture, camera_index: int, frame_index: int
 ) -> np.ndarray:
-    """What moves in one picture: what differs from the background, and what a mask of the capture says. [H, W] bool
+    """The moving pixels of one picture: those that differ from the background or lie in a capture's mask. [H, W] bool
 
     Both together: masks are mostly of people and things, without the shadows that go with them.
 
@@ -299,7 +299,7 @@ def stable_in_clip(backgrounds: Backgrounds, pictures: TrainingPictures, masks: 
     """Backgrounds in the light of a clip: where a camera sees something stand still in most frames, their mean.
 
     Args:
-        masks: What moves, of the same pictures. [M, C, H, W] bool
+        masks: The moving pixels of the same pictures. [M, C, H, W] bool
     Returns:
         Trusted are the pixels that were seen so; the others are as they were.
     """
@@ -432,10 +432,10 @@ def _background_range(capture: Capture, clip: Clip, config: TrainConfig) -> tupl
 
 
 def key_of_corrected(capture: Capture, clip: Clip, camera_indices: Sequence[int], config: TrainConfig) -> dict:
-    """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them.
+    """The key of corrected backgrounds, as `write_backgrounds` keeps it next to them.
 
     Args:
-        clip: What they were estimated for.
+        clip: The clip they were estimated for.
     """
     rig = capture.rig.subset(list(camera_indices))
     excluded = exclusion_key(capture.exclusions, (0, capture.n_frames))

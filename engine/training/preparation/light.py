@@ -37,7 +37,7 @@ def measure_light(
         model: Of a clip; one whose static anchors learn, or change over time, or that has none, stays as it is.
         pictures: Of the clip, in the exposure of the backgrounds.
         rig: Training cameras.
-        backgrounds: What they see in the reference clip when nothing moves.
+        backgrounds: Their pictures in the reference clip when nothing moves.
         exposures: That of each background; None where no camera's exposure is looked at.
         report: Gets one line.
     """

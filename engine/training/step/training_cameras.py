@@ -1,4 +1,4 @@
-"""TrainingCameras: the cameras a clip is trained with, and how their poses and focal lengths learn beside the model.
+"""TrainingCameras: the cameras a clip is trained with, and how their poses and focal lengths learn with the model.
 
 Moving a camera is the same as moving the scene in front of it, so the gradient of a pose follows from the gradients of
 the Gaussians: no kernel knows of it. Where the focal length is concerned, the footprint of a Gaussian is taken to grow
@@ -68,7 +68,7 @@ class TrainingCameras:
 
     @property
     def kept(self) -> np.ndarray | None:
-        """What a checkpoint holds, to the last bit; None where nothing learns. [C, 7]"""
+        """The corrections for a checkpoint, to the last bit; None where nothing learns. [C, 7]"""
         return host_array(self.pixels).copy() if self.is_learning else None
 
     def restore(self, kept: np.ndarray | None) -> None:
@@ -166,7 +166,7 @@ def _gradient(tensor: Tensor) -> np.ndarray:
 
 
 def _units(rig: CameraRig) -> np.ndarray:
-    """What one pixel is of each number of each camera's correction. [C, 7]"""
+    """The size of one pixel in each number of each camera's correction. [C, 7]"""
     pixel = 1.0 / focal_px(rig.Ks)
     units = np.repeat(pixel[:, None], N_VALUES, axis=1)
     units[:, TRANSLATION] *= np.linalg.norm(rig.centers - rig.focus_point(), axis=1)[:, None]
