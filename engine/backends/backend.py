@@ -120,5 +120,5 @@ class Backend(ModelBackend, Protocol):
         ...
 
     def phase(self, plan: PhasePlan) -> Phase | None:
-        """Its own way to do all steps of a phase; None where they are done one by one by the operations above."""
+        """The backend's own way to do all steps of a phase; None where the operations above do them one by one."""
         ...

@@ -21,7 +21,7 @@ from engine.raster.gaussians import Gaussians
 
 
 class PhasePictures(Protocol):
-    """The items to draw and compare, by their numbers. Arrays stay as they are while a phase runs."""
+    """The pictures to draw and compare, by the numbers of items. Arrays stay as they are while a phase runs."""
 
     def place(self, item: int) -> tuple[int, float]:
         """Camera row and clip time."""
@@ -43,7 +43,7 @@ class PhaseCameras(Protocol):
     first_views: list[View]
 
     def view(self, row: int) -> View:
-        """Of one camera, as it is by now."""
+        """View of one camera, as it is by now."""
         ...
 
     def watch(self, gaussians: Gaussians) -> None:

@@ -138,7 +138,7 @@ class StageProgress:
     """The share done, over all stages.
 
     Args:
-        report: Told every step, one at a time.
+        report: Called at every step, one at a time.
     """
 
     def __init__(self, report: ReportProgress) -> None:

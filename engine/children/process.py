@@ -85,7 +85,7 @@ class ChildProcess(Generic[Job, Event, Result]):
 
     @property
     def pid(self) -> int | None:
-        """Its number; None where it could not be started."""
+        """The child's number; None where it could not be started."""
         return None if self._process is None else self._process.pid
 
     @property
@@ -111,7 +111,7 @@ class ChildProcess(Generic[Job, Event, Result]):
         self._has_news.clear()
 
     def result(self) -> Result:
-        """Its answer, once it is over.
+        """The child's answer, once it is over.
 
         Raises:
             EngineError: The child's own error.
@@ -246,7 +246,7 @@ def run_child(
 
     Args:
         kind, job, folder: See `ChildProcess`.
-        report: Called with what it reports, once with what it repeats. What it raises ends the child.
+        report: Called with the child's reports, once for repeated ones. An error raised by it ends the child.
         alive: Called several times a second; what it raises ends the child, after its time to tidy up.
         stall_s: In place of the kind's.
     Raises:

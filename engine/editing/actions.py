@@ -93,7 +93,7 @@ class EditAction(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Hide(EditAction, frozen=True, tag="hide"):
-    """They are drawn nowhere, but stay in the clips when edits are applied permanently."""
+    """The Gaussians are drawn nowhere, but stay in the clips when edits are applied permanently."""
 
     label = "Hide"
     meaning = "Does not draw it"
@@ -101,7 +101,7 @@ class Hide(EditAction, frozen=True, tag="hide"):
 
 
 class Delete(EditAction, frozen=True, tag="delete"):
-    """They are gone; from the clips too, once edits are applied permanently."""
+    """The Gaussians are gone; from the clips too, once edits are applied permanently."""
 
     label = "Delete"
     meaning = "Removes it"
@@ -119,7 +119,7 @@ def _turn(numbers: tuple[float, ...]) -> Quat:
 
 
 class Transform(EditAction, frozen=True, tag="transform"):
-    """They are scaled and turned about a pivot, then moved: x -> pivot + scale R (x - pivot) + translation.
+    """The Gaussians are scaled and turned about a pivot, then moved: x -> pivot + scale R (x - pivot) + translation.
 
     Raises:
         ValueError: A number is not finite, the scale not positive, or the quaternion is not a rotation.
@@ -201,7 +201,7 @@ class Recolor(EditAction, frozen=True, tag="recolor"):
 
 
 class Expose(EditAction, frozen=True, tag="expose"):
-    """Their light is multiplied by 2 to the power of `stops`, in linear light."""
+    """The Gaussians' light is multiplied by 2 to the power of `stops`, in linear light."""
 
     label = "Exposure"
     tip = "Change the exposure of the selection"
@@ -224,7 +224,7 @@ class Expose(EditAction, frozen=True, tag="expose"):
 
 
 class Hold(EditAction, frozen=True, tag="hold"):
-    """They stand still, as they are at one frame; in clips without that frame, as at their frame next to it."""
+    """The Gaussians stand still as at one frame; in clips without that frame, as at their frame next to it."""
 
     label = "Set static"
     tip = "Set static: freeze the selection as in this frame"
@@ -246,7 +246,7 @@ class Hold(EditAction, frozen=True, tag="hold"):
 
 
 class Smooth(EditAction, frozen=True, tag="smooth"):
-    """They change more slowly: each is a weighted mean of itself over the frames of its clip around the moment."""
+    """The Gaussians change more slowly: each is a weighted mean of itself over frames of its clip around the moment."""
 
     label = "Smooth"
     tip = "Smooth the selection over time"

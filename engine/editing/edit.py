@@ -1,4 +1,4 @@
-"""Edit: one change to a trained scene: what it acts on, what it does, and in which frames. Plain values that travel as
+"""Edit: one change to a trained scene: its target, its action, and its frames. Plain values that travel as
 JSON; nothing here touches Gaussians.
 
 Edits form a stack. Each acts on what those before it have left, in the frames of its scope, and on nothing outside of
@@ -148,7 +148,7 @@ class Edit(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def edits_at(edits: tuple[Edit, ...], frame: float) -> tuple[Edit, ...]:
-    """Those that count at a moment, in the order of the stack."""
+    """The edits that count at a moment, in the order of the stack."""
     return tuple(edit for edit in edits if edit.is_on and edit.scope.holds_at(frame))
 
 

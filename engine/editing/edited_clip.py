@@ -30,7 +30,7 @@ from engine.model.host_array import host_array
 from engine.raster.gaussians import Gaussians
 
 MAX_STILL = 4
-"""Stacks for which what stands still is kept: those at the playhead, and those of a drag a moment ago."""
+"""Stacks for which the still part is kept: those at the playhead, and those of a drag a moment ago."""
 REACH_SIGMAS = 3.0
 """Frames farther away than so many standard deviations do not count."""
 FRAME_BYTES = 48 << 20

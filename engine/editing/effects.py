@@ -28,7 +28,7 @@ class Effect(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """Those of a moment, in the order of the stack. A value; compared and hashed by what it does.
+    """The effects of a moment, in the order of the stack. A value; compared and hashed by what it does.
 
     Attributes:
         all: Each acts on what those before it have left.

@@ -1,4 +1,4 @@
-"""StillPart: what stands still in a whole clip, as a stack of edits leaves it; only its light is worked out anew."""
+"""StillPart: the still part of a whole clip, as a stack of edits leaves it; only its light is worked out anew."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class SeamDiagnosis(msgspec.Struct, frozen=True):
     Attributes:
         all: Of the picture as cameras show it.
         still: The part of it that lies where static anchors alone show, in the scene's colours: their light.
-        colors: The share that cameras' colours add to the change of the picture in the scene's colours.
+        colors: The amount that cameras' colours add to the change of the picture in the scene's colours.
     """
 
     all: float

@@ -85,5 +85,5 @@ METHODS = {
     "fade": "dynamic features are faded from one clip into the other",
     "joint": "the frames around it are briefly trained towards each other",
 }
-"""Ways to mend and what they do, cheapest first."""
+"""Ways to mend and their effects, cheapest first."""
 CHOICES = ("auto", *METHODS, "retrain")

@@ -23,7 +23,7 @@ MAX_CAMERAS = 12
 
 @dataclass(frozen=True, slots=True)
 class Threads:
-    """How many cameras are measured at a time, and what is called once on each of their threads."""
+    """How many cameras are measured at a time, and the function called once on each of their threads."""
 
     n: int = 1
     prepare: Callable[[], object] = lambda: None

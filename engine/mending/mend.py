@@ -29,7 +29,7 @@ from engine.progress import Progress, ReportProgress
 
 MEASURING, LIGHT, FADING, TRAINING = "Measuring", "Measuring light", "Fading", "Training"
 _CLEAR_RATIO = 1.1
-"""Of two clips whose mean squared errors on what stands still differ by more, only the worse one changes."""
+"""Of two clips whose mean squared errors on still parts differ by more, only the worse one changes."""
 _SHARES = {"light": (0.1, 0.25), "fade": (0.3, 0.5), "joint": (0.55, 0.9)}
 """From where to where on the way each attempt reaches, as it is reported."""
 
@@ -43,7 +43,7 @@ class Mended:
         before, after: Figures; the same where nothing helped.
         attempts: All that was tried, in order.
         clips: The clips that changed, as they are stored.
-        diagnosis: The causes of the jump.
+        diagnosis: The parts that jump.
     """
 
     stretch: Stretch
@@ -76,7 +76,7 @@ class StretchMending:
         make_training: Makes the training of a clip with some settings, not prepared.
         backend: The backend clips are decoded and drawn with.
         threads: How measuring is spread.
-        report: Told how far it is; what it raises ends the work.
+        report: Called with the progress; what it raises ends the work.
 
     Raises:
         ProjectError: A clip of the stretch is missing, or none of them may change, or cameras are not the capture's.
@@ -165,7 +165,7 @@ class StretchMending:
     # ---------------------------------------------------------------- ways to mend
 
     def _plan(self, method: str) -> list[tuple[str, bool]]:
-        """The attempts, in order: a way, and whether with the other clip, where one was tried and it did not suffice."""
+        """Attempts, in order: a way, and whether with the other clip, where one was tried and it did not suffice."""
         names = ["light", "fade", "joint"] if method == "auto" else [method]
         plan = [(name, False) for name in names]
         return [*plan, ("joint", True)] if "joint" in names and len(self._open) > 1 else plan
@@ -209,7 +209,7 @@ class StretchMending:
         return Looks(self._capture, self._shown, self._cameras)
 
     def _moving(self, looks: Looks) -> list[int]:
-        """Clips that fade: of two, one of which shows much worse what stands still, that one."""
+        """Clips that fade: of two, one of which shows still parts much worse, that one."""
         if len(self._open) < 2:
             return self._open
         errors = looks.errors_across(self._clips[self._open[1]].start)
@@ -217,7 +217,7 @@ class StretchMending:
         return self._worse_first(looks)[:1] if is_clear else self._open
 
     def _worse_first(self, looks: Looks) -> list[int]:
-        """Clips that may change; of two, the one first that shows worse what stands still."""
+        """Clips that may change; of two, the one first that shows still parts worse."""
         if len(self._open) < 2:
             return self._open
         before, after = looks.errors_across(self._clips[self._open[1]].start)

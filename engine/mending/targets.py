@@ -75,7 +75,7 @@ class Looks:
         return is_still
 
     def errors_across(self, frame: int) -> tuple[float, float]:
-        """How far what stands still is from the truth on both sides of a frame: before it, and in it. Mean squares."""
+        """How far still parts are from the truth on both sides of a frame: before it, and in it. Mean squares."""
         errors = []
         for row in range(len(self._cameras)):
             is_still = self.still_between(row, frame - 1, frame)

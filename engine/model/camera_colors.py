@@ -1,4 +1,4 @@
-"""What each camera makes of the scene's colours: its gain, and its exposure in each frame of a clip.
+"""Each camera's rendition of the scene's colours: its gain, and its exposure in each frame of a clip.
 
 Of a camera that was trained on both are known. One that was held out is shown at the gain of the median camera, and
 with the exposure that its place and direction suggest: cameras that look at the same things from the same side change

@@ -63,7 +63,7 @@ class Observations:
         return len(self.cameras)
 
     def chosen(self, is_kept: np.ndarray) -> Observations:
-        """Those of a mask, points numbered as before."""
+        """The sightings of a mask, points numbered as before."""
         return Observations(self.cameras[is_kept], self.points[is_kept], self.pixels[is_kept])
 
 
@@ -91,7 +91,7 @@ def adjust(
         points: The start. [M, 3]
         seen: Every point is seen at least twice.
         middles, widths: Of the pictures, px. [C, 2], [C]
-        expect: The expectations of lenses.
+        expect: Expectations about the lenses.
         focals: Focal lengths that are expected, px; None expects those of the start. [C]
     Returns:
         Cameras and points [M, 3].

@@ -29,7 +29,7 @@ _COLOR_SCALE = 0.15
 _QUAT_TOP = 511
 _LEAST_BYTES = 20
 _MAX_BYTES = 1 << 32
-"""Of an unzipped file that is read."""
+"""Limit of an unzipped file that is read."""
 _MANY = 0.01
 """Share of the sides of Gaussians that are too thin from which on it is worth a word."""
 LN_SCALES = (-10.0, 255.0 / 16.0 - 10.0)

@@ -35,9 +35,9 @@ SCRIPTS = (
 """In the order in which they are joined."""
 WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_main.js")
 SHADERS = ("splat.vert", "splat.frag", "resolve.vert")
-"""Those of the window, in assets/shaders."""
+"""The shaders of the window, in assets/shaders."""
 CONSTANTS = ("ALPHA_MIN", "ALPHA_MAX", "EPS2D_PX2", "FRUSTUM_MARGIN")
-"""Of engine.conventions, which shaders see as #define."""
+"""Names of engine.conventions, which shaders see as #define."""
 FORMAT, VERSION = "clipgstream-player", 1
 
 _PRECISION = "".join(f"precision highp {kind};\n" for kind in ("float", "int", "sampler2D"))

@@ -69,7 +69,7 @@ def fitting_rounding(parts: Sequence[Splats]) -> Rounding:
 
 
 def color_max(colors: Sequence[np.ndarray]) -> float:
-    """The brightness that 255 has to stand for so that all colours fit; a light on the scene can make them brighter than 1."""
+    """The brightness of 255 that lets all colours fit; a light on the scene can make them brighter than 1."""
     return max([1.0, *(float(part.max()) for part in colors if part.size)])
 
 

@@ -1,4 +1,4 @@
-"""TrainingPlan: what is known of a clip's training before it begins, and a forecast of what it takes.
+"""TrainingPlan: the facts known of a clip's training before it begins, and a forecast of its time and memory.
 
 Numbers of steps and pictures are exact. Of anchors, which follow from the pictures, a plan knows limits. The forecast
 is the median of the project's own clips of the same kind; without one, timed steps times their number, rough

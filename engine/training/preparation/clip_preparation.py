@@ -78,7 +78,7 @@ class ClipParts:
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
         reasons: Of the gate, by role; empty without a decision.
-        coverage: How much of what moves in a source clip has an anchor near it; None for a reference clip.
+        coverage: Share of a source clip's moving points with an anchor near them; None for a reference clip.
     """
 
     model: ClipModel
@@ -195,7 +195,7 @@ class ClipPreparation:
         return replace(parts, reasons=self._make_dynamic(parts, cloud.spacing))
 
     def with_motion(self, parts: ClipParts, pictures: TrainingPictures) -> ClipParts:
-        """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
+        """A reference clip whose static anchors were trained, with corrected backgrounds and moving parts."""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures, keep)
         parts = replace(parts, backgrounds=backgrounds)
@@ -264,7 +264,7 @@ class ClipPreparation:
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points):,} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
-        if "static" in self._method.covering(model):  # what can change learns its light by itself
+        if "static" in self._method.covering(model):  # parts that can change learn their light by themselves
             return parts
         measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
         return parts

@@ -1,4 +1,4 @@
-"""From pixels to clouds: what has to be known before a clip can be trained.
+"""From pixels to clouds: the inputs needed before a clip can be trained.
 
 Reference clip: backgrounds of the training cameras and a dense static cloud first; once the static part has been
 trained, its renders correct the backgrounds, and what differs from them is what moves. Source clip: the reference's
@@ -59,7 +59,7 @@ class Backgrounds:
 
     @classmethod
     def none(cls) -> Backgrounds:
-        """Of no camera: for a clip that continues without them."""
+        """Backgrounds of no camera: for a clip that continues without them."""
         return cls(np.zeros((0, 0, 0, 3), np.uint8), np.zeros((0, 0, 0), bool))
 
     def equals(self, other: Backgrounds) -> bool:
@@ -102,7 +102,7 @@ def estimate_backgrounds(
         pictures = pictures if exposure is None else exposure.applied_to(pictures)
         background = estimate_background(pictures, capture.valid(camera))
         masks = [mask for frame in frames if (mask := capture.moving_mask(camera, frame)) is not None]
-        if masks:  # who stands still for most of the time looks like background, but a mask tells
+        if masks:  # who stands still for most of the time looks like background, but a mask shows it
             background.is_stable[2 * np.sum(masks, axis=0) > len(masks)] = False
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
@@ -133,7 +133,7 @@ def static_cloud(
     keep: Keep = do_now,
     layout: Layout | None = None,
 ) -> StaticCloud:
-    """Dense points of what stands still, with white balance gains.
+    """Dense points of still parts, with white balance gains.
 
     Args:
         is_valid: Pixels that the cameras see; None for all. [C, H, W] bool
@@ -401,7 +401,7 @@ def moving_cloud(
     voxel_size: float | None,
     keep: Keep = do_now,
 ) -> MovingCloud:
-    """Surface points of what moves, fused over the frames of the clip, with the frames each exists in.
+    """Surface points of moving parts, fused over the frames of the clip, with the frames each exists in.
 
     Args:
         voxel_size: The reference clip's for a source clip, so that the same place gives the same anchors; None

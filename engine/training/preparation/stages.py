@@ -35,7 +35,7 @@ class Stages:
         prep_dir: Folder for the files; need not exist.
         clip_index: Of the clip.
         key: The inputs that every piece depends on; JSON-able.
-        report: Gets one line about what is taken over or removed.
+        report: Gets one line about files taken over or removed.
         clock: Seconds; tests bring their own.
     """
 

@@ -24,7 +24,7 @@ from engine.raster.gaussians import Gaussians
 from engine.training.step.valid_pixels import ValidPixels
 
 MAX_BYTES = 1 << 30
-"""Memory for what is kept of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
+"""Memory for the kept views of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class ActiveTiles:
         model: A clip in which one set is constant; see `applies`.
         backend: The backend it is trained with.
         valid: Which pixels of its cameras count.
-        max_bytes: Memory for what is kept.
+        max_bytes: Memory for the kept views.
     """
 
     def __init__(

@@ -4,8 +4,8 @@ Moving a camera is the same as moving the scene in front of it, so the gradient 
 the Gaussians: no kernel knows of it. Where the focal length is concerned, the footprint of a Gaussian is taken to grow
 evenly; what its slant adds away from the picture's centre is left out.
 
-What learns is counted in pixels: by how much the picture moves at its middle and at a typical depth. So one rate suits
-all seven numbers of all cameras, and their gradients are no larger than others.
+The learned numbers are counted in pixels: by how much the picture moves at its middle and at a typical depth. So one
+rate suits all seven numbers of all cameras, and their gradients are no larger than others.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class TrainingCameras:
         self._start = start
         self._views: dict[int, View] = {}
         self.first_views = self.views
-        """Of all cameras, as they were at first: what they may see of the scene is looked up once."""
+        """Views of all cameras, as they were at first: what they may see of the scene is looked up once."""
         self._watched: Gaussians | None = None
 
     @property
@@ -87,11 +87,11 @@ class TrainingCameras:
 
     @property
     def views(self) -> list[View]:
-        """Of all cameras, as they are by now."""
+        """Views of all cameras, as they are by now."""
         return [self.view(row) for row in range(len(self._original))]
 
     def view(self, row: int) -> View:
-        """Of one camera, as it is by now."""
+        """View of one camera, as it is by now."""
         if row not in self._views:
             pose, K = self._original.world_to_camera[row], self._original.Ks[row]
             if self.corrections is not None:
