@@ -42,7 +42,7 @@ class Refusal(msgspec.Struct, frozen=True):
 
     @staticmethod
     def of(error: EngineError) -> Refusal:
-        """The message of an error."""
+        """The error as a message."""
         problems = tuple(Refusal.of(problem) for problem in getattr(error, "problems", ()))
         path = None if error.path is None else str(error.path)
         return Refusal(type(error).__name__, error.message, error.hint, path, problems)

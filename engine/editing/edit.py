@@ -51,7 +51,7 @@ class Scope(Struct, frozen=True, forbid_unknown_fields=True):
 
 EVERYWHERE = Scope()
 
-# ---------------------------------------------------------------- what it acts on
+# ---------------------------------------------------------------- targets
 
 
 class Everything(Struct, frozen=True, forbid_unknown_fields=True, tag="everything"):

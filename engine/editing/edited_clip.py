@@ -106,7 +106,7 @@ class EditedClip:
         """Memory kept between moments, apart from the model."""
         return sum(part.n_bytes for part in self._still.values()) + self._frames.n_bytes
 
-    # ---------------------------------------------------------------- what stands still
+    # ---------------------------------------------------------------- the still part
 
     def _still_part(self, effects: Effects) -> StillPart:
         if effects in self._still:
@@ -130,7 +130,7 @@ class EditedClip:
         parts = [self.model.lit_gaussians(role, clip_time) for role in self._still_roles]
         return parts[0] if len(parts) == 1 else Gaussians.concatenate(parts)
 
-    # ---------------------------------------------------------------- what moves
+    # ---------------------------------------------------------------- the moving part
 
     def _moving(self, effects: tuple[Effect, ...], clip_time: float, alive_at: float) -> IndexedGaussians:
         """The Gaussians that do not stand still, after some effects."""

@@ -37,7 +37,7 @@ class CameraColors:
     clip_length: int
 
     def gain(self, camera_name: str) -> np.ndarray:
-        """Of one camera in the reference clip; ones for a held-out camera. [3] float32"""
+        """The gain of one camera in the reference clip; ones for a held-out camera. [3] float32"""
         if camera_name in self.camera_names:
             return self.gains[self.camera_names.index(camera_name)]
         return np.ones(3, np.float32)

@@ -71,7 +71,7 @@ def read_layout(folder: Path, *, follow_links: bool) -> Layout:
 
 
 def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
-    """The folder's contents, the layouts that can be read, and the remedy."""
+    """The error with the folder's contents, the layouts that can be read, and the remedy."""
     with os.scandir(folder) as entries:
         inside = sorted(entry.name for entry in islice(entries, MAX_LOOKED_AT) if _is_capture(entry))
     close = [probe for probe in probes if probe.seen]

@@ -78,7 +78,7 @@ class ClipParts:
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
         reasons: Of the gate, by role; empty without a decision.
-        coverage: Share of a source clip's moving points with an anchor near them; None for a reference clip.
+        coverage: How many moving points of a source clip have an anchor near them; None for a reference clip.
     """
 
     model: ClipModel
@@ -284,7 +284,7 @@ class ClipPreparation:
         if kept is None or not kept.equals(backgrounds):
             write_backgrounds(self._prep_dir, backgrounds, key)
 
-    # ---------------------------------------------------------------- what is kept of an attempt
+    # ---------------------------------------------------------------- the kept parts of an attempt
 
     def _key(self) -> dict[str, Any]:
         """The inputs a preparation depends on, apart from those `_keep_after` adds."""
@@ -410,7 +410,7 @@ class ClipPreparation:
             )
         return cloud
 
-    # ---------------------------------------------------------------- what moves
+    # ---------------------------------------------------------------- moving parts
 
     def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
         """The moving pixels of each picture. [M, C, H, W] bool"""
