@@ -1,6 +1,6 @@
 """Where shipped data files lie. Finds paths; reads nothing.
 
-The folder `assets/` sits beside the packages `app`, `engine` and `ui`: in the repository, which an editable install
+The folder `assets/` sits next to the packages `app`, `engine` and `ui`: in the repository, which an editable install
 points at, and in site-packages after a plain install, because the packaging settings ship it as data.
 """
 

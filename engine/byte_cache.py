@@ -45,7 +45,7 @@ class ByteCache(Generic[Key, Value]):
             return key in self._values
 
     def keys(self) -> list[Key]:
-        """Of all values, those used longest ago first."""
+        """The keys of all values, those used longest ago first."""
         with self._lock:
             return list(self._values)
 
@@ -68,7 +68,7 @@ class ByteCache(Generic[Key, Value]):
                 self._n_bytes -= self._values.pop(self._farthest(key))[1]
 
     def _farthest(self, newest: Key) -> Key:
-        """What goes next: of all but the newest."""
+        """The next key to remove: of all but the newest."""
         others = (key for key in self._values if key != newest)
         return next(others) if self.distance is None else max(others, key=self.distance)  # the first of equals
 

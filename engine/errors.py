@@ -27,7 +27,7 @@ class EngineError(Exception):
 
     Args:
         message: Cause first, with numbers, then what was done about it. One sentence or two, no path.
-        hint: What the user can do. May be empty.
+        hint: The remedy for the user. May be empty.
         path: File or folder concerned, shown last.
     """
 
@@ -46,7 +46,7 @@ class EngineError(Exception):
         return printable(str(self.path)).replace("\n", "\\n")
 
     def parts(self) -> tuple[str, str]:
-        """What happened and what to do, for those who show them apart. Joined by a space they are str(self)."""
+        """The message and the remedy, for those who show them apart. Joined by a space they are str(self)."""
         if self.hint and self.path is not None:
             return self.message, f"{self.hint} - {self._place}"
         return str(EngineError(self.message, path=self.path)), self.hint
@@ -85,7 +85,7 @@ class OutsideError(CaptureError):
 
     @property
     def needs_links(self) -> bool:
-        """That is all that is wrong."""
+        """Whether the missing permission is the only problem."""
         return True
 
 

@@ -1,4 +1,4 @@
-"""What a training tells the outside while it runs: plain values, no tensors."""
+"""The reports of a training while it runs: plain values, no tensors."""
 
 from __future__ import annotations
 

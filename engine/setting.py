@@ -31,8 +31,8 @@ class Flag(NamedTuple):
         name: With its dashes.
         meaning: Where it is not that of the setting.
         constant: The value that it stands for; None where a value follows it.
-        prefix: What the value begins with and the command line leaves out.
-        like: What help shows for the value, where it is written otherwise than the setting's.
+        prefix: The value's beginning that the command line leaves out.
+        like: The placeholder in help for the value, where it is written otherwise than the setting's.
         read: Makes the value of the numbers that are written so. Raises ValueError.
     """
 
@@ -84,17 +84,17 @@ def setting(
 
     Args:
         group: Heading it is listed under.
-        meaning: What it does, for a person, in a sentence or two.
+        meaning: Its effect, for a person, in a sentence or two.
         low, high: Smallest and largest value of a number, or of each of several.
         choices: Words it may be, each with what it means.
         unit: Of the number.
-        label: What the window calls it; empty where the window does not show it.
-        none: What None means.
-        titles: What the window offers, by the text of the value (empty for None), and calls it. Without them it offers
+        label: Its name in the window; empty where the window does not show it.
+        none: The meaning of None.
+        titles: Names of the window's choices, by the text of the value (empty for None). Without them it offers
             the choices, or lets the user type.
         flags: How the command line writes it, of which one can be given; `--name` where there are none.
         writing: Of a value of several numbers.
-        like: What the command line's help shows for the value; a word for each of several numbers.
+        like: The placeholder for the value in the command line's help; a word for each of several numbers.
         step: By how much a drag of one pixel changes a number in the window.
         offered: Smallest and largest value that a field of the window takes, where not all that are allowed are of use.
         one_of: Of settings with the same word here, exactly one is given.
@@ -144,7 +144,7 @@ class Setting:
 
     @property
     def allowed(self) -> str:
-        """What it may be, as part of a sentence."""
+        """The allowed values, as part of a sentence."""
         if self.choices:
             *others, last = map(repr, self.choices)
             return f"{', '.join(others)} or {last}" if others else last
@@ -155,7 +155,7 @@ class Setting:
 
     @property
     def span(self) -> str:
-        """What it may be, as briefly as possible: "1 to 256 values"."""
+        """The allowed values, as briefly as possible: "1 to 256 values"."""
         if self.bounds is None:
             return ", ".join(self.choices or ("false", "true"))
         low, high = map(value_text, self.bounds)
@@ -199,7 +199,7 @@ class Setting:
         return "" if value is None else self.writing.text(value) if self.writing else value_text(value)
 
     def flag_of(self, value: Any) -> Flag:
-        """What the command line writes for a value that is not None."""
+        """The command line's text for a value that is not None."""
         return next(
             flag
             for flag in self.flags

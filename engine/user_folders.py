@@ -15,7 +15,7 @@ NAME = "ClipGStream"
 
 
 def data_dir() -> Path:
-    """What must be kept: projects made without a place of their own, and logs."""
+    """The folder for files to keep: projects made without a place of their own, and logs."""
     return _folder("user_data_dir")
 
 
@@ -25,7 +25,7 @@ def config_dir() -> Path:
 
 
 def cache_dir() -> Path:
-    """What can be made again."""
+    """The folder for files that can be made again."""
     return _folder("user_cache_dir")
 
 

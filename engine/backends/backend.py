@@ -68,7 +68,7 @@ class Adam(Protocol):
 
 
 class Backend(ModelBackend, Protocol):
-    """What a clip is trained with. Stateless, so that threads may share one.
+    """The computations that train a clip. Stateless, so that threads may share one.
 
     Arguments are those of the public calls, already checked: `engine.raster.rasterize`, `engine.model.decoding`,
     `engine.model.joining` and `engine.training.step.losses`. Tensors are on `device` throughout.
@@ -120,5 +120,5 @@ class Backend(ModelBackend, Protocol):
         ...
 
     def phase(self, plan: PhasePlan) -> Phase | None:
-        """Its own way to do all steps of a phase; None where they are done one by one by the operations above."""
+        """The backend's own way to do all steps of a phase; None where the operations above do them one by one."""
         ...

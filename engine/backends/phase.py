@@ -21,7 +21,7 @@ from engine.raster.gaussians import Gaussians
 
 
 class PhasePictures(Protocol):
-    """What is drawn and compared, by the numbers of items. Arrays stay as they are while a phase runs."""
+    """The pictures to draw and compare, by the numbers of items. Arrays stay as they are while a phase runs."""
 
     def place(self, item: int) -> tuple[int, float]:
         """Camera row and clip time."""
@@ -43,7 +43,7 @@ class PhaseCameras(Protocol):
     first_views: list[View]
 
     def view(self, row: int) -> View:
-        """Of one camera, as it is by now."""
+        """View of one camera, as it is by now."""
         ...
 
     def watch(self, gaussians: Gaussians) -> None:
@@ -66,7 +66,7 @@ class Schedule:
     Attributes:
         n_steps: Of the phase, over which rates fall.
         rates: At the start, by the parameter's name.
-        final_ratios: What is left of them at the end; they fall log-linearly.
+        final_ratios: The share of them left at the end; they fall log-linearly.
         max_gradient_norm: Gradients with a larger norm are scaled down to it; 0 for none.
     """
 
@@ -78,15 +78,15 @@ class Schedule:
 
 @dataclass(frozen=True, slots=True)
 class PhasePlan:
-    """What a phase is given.
+    """The inputs of a phase.
 
     Attributes:
         model: The clip; what of it learns is among the parameters.
         gains: Colour gains of the cameras. [C, 3]
         cameras: They learn as well where `cameras.is_learning`.
-        pictures: What is compared with.
+        pictures: The pictures to compare with.
         is_valid: Pixels that cameras see, in every frame; None where they see all. [C, H, W] bool
-        parameters: What learns, by name.
+        parameters: The tensors that learn, by name.
         schedule: How fast.
         reach: How far beyond its anchor a Gaussian may lie, scene units.
         reaches: The same anchor by anchor, where a checkpoint knows it. By role, [A] each
@@ -113,13 +113,13 @@ class PhasePlan:
 
 @dataclass(frozen=True, slots=True)
 class PhaseStats:
-    """What some steps gave, read from the device at once.
+    """The results of some steps, read from the device at once.
 
     Attributes:
         losses, gradient_norms: Of every step.
         mean_square: Of the last picture, over all its pixels.
         n_gaussians: Of the last picture.
-        fault: What became not finite in the step behind these; None where all steps were done. Nothing has changed
+        fault: The values not finite in the step after these; None where all steps were done. Nothing has changed
             since the steps before it.
     """
 

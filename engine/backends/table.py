@@ -26,7 +26,7 @@ class BackendEntry(NamedTuple):
 
     Attributes:
         place: Module and class, "package.module:Class"; imported when it is asked for.
-        words: What it is, for help texts.
+        words: A description, for help texts.
         has_devices: Whether it is made for a device that may be named behind it, as in "reference:cpu".
     """
 
@@ -79,7 +79,7 @@ def choose_backend(name: str) -> None:
 
 
 def chosen_name() -> str:
-    """What was said to `choose_backend`, for the jobs of child processes."""
+    """The choice given to `choose_backend`, for the jobs of child processes."""
     return _chosen
 
 
@@ -118,7 +118,7 @@ def _device(name: str) -> torch.device:
 
 
 def backend_names() -> str:
-    """What may be chosen besides AUTO, as it is written."""
+    """The choices besides AUTO, as they are written."""
     return ", ".join(f"{name}[:DEVICE]" if entry.has_devices else name for name, entry in BACKENDS.items())
 
 

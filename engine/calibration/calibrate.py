@@ -24,7 +24,7 @@ FOLDER_PREFIX = "clipgstream-calibration-"
 
 
 class CalibrationJob(msgspec.Struct, frozen=True):
-    """What the child is asked; see `calibrate`. scratch: A folder for its files."""
+    """The child's job; see `calibrate`. scratch: A folder for its files."""
 
     folder: Path
     options: CalibrationOptions
@@ -58,7 +58,7 @@ def calibrate(
         folder: One video, or one folder of images, per camera.
         options: Lens, scale, up.
         follow_links: Whether links in the folder may lead out of it.
-        report: Told stage and share of the whole that is done. What it raises ends the work.
+        report: Called with stage and share of the whole that is done. An error raised by it ends the work.
         alive: Called several times a second; what it raises ends the work within a moment.
         stall_s: Seconds without any work of the child after which it is taken for hung.
     Raises:

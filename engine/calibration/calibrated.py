@@ -1,4 +1,4 @@
-"""What a calibration finds: plain values."""
+"""The results of a calibration: plain values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class CalibratedRig:
         rig: At the size of the videos' frames; its pictures are still as the lenses made them. World: z up, the floor
             or the middle of what the cameras see at 0.
         lenses: One per camera.
-        points: What was seen by several cameras. [P, 3]
+        points: Points seen by several cameras. [P, 3]
         point_errors_px: Mean distance of each point's sightings from where it lands. [P]
         camera_errors_px: Median distance, per camera. [C]
         n_sightings: Points that each camera sees. [C]
@@ -27,7 +27,7 @@ class CalibratedRig:
             cameras explain; low where patterns repeat or a camera is misplaced. [C]
         doubts: Why the place of each camera cannot be trusted; empty for one that nothing speaks against.
         is_metric: Whether units are metres, by a known distance.
-        up: What the up axis was found from: "floor" or "cameras".
+        up: The source of the up axis: "floor" or "cameras".
     """
 
     rig: CameraRig
@@ -66,7 +66,7 @@ class Calibration:
     Attributes:
         found: The cameras that were found, in natural order.
         missing: Those that were not.
-        warnings: What is doubtful about it, in sentences.
+        warnings: Doubts about it, in sentences.
         failure: Why it has failed although cameras were found; empty where it has not.
         pairs: Every two cameras that were found, with their matches.
     """

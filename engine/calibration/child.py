@@ -135,10 +135,10 @@ STAGES = {"Key points": 0.45, "Matching": 0.15, "Mapping": 0.2, "Adjusting": 0.2
 
 
 class StageProgress:
-    """What has been done, over all stages.
+    """The share done, over all stages.
 
     Args:
-        report: Told every step, one at a time.
+        report: Called at every step, one at a time.
     """
 
     def __init__(self, report: ReportProgress) -> None:
@@ -153,12 +153,12 @@ class StageProgress:
             self._report(Progress(stage, self._done, message))
 
     def count(self, stage: str, n: int, what: str, *, first: float = 0.0, last: float = 1.0) -> Callable[[float], None]:
-        """For threads that work on n things each: a function to be told which share of one thing was done since.
+        """For threads that work on n things each: a function to call with the share of one thing done since.
 
         Args:
             stage: Its name.
             n: How many there are.
-            what: What they are, as "cameras".
+            what: Their name, as "cameras".
             first, last: Shares of the stage at the beginning and at the end.
         """
         lock, done = threading.Lock(), 0.0

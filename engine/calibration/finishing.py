@@ -34,7 +34,7 @@ def finished(
     sizes: np.ndarray,
     options: CalibrationOptions,
 ) -> Calibration:
-    """What is handed back of a solution."""
+    """The part of a solution to hand back."""
     rows, tracks, errors = solution.rows, solution.tracks, solution.errors
     names = [videos[row].name for row in rows]
     warnings: list[str] = []

@@ -1,4 +1,4 @@
-"""What the user may choose about a calibration."""
+"""The user's options for a calibration."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def turn(vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     angle = float(np.linalg.norm(vector))
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-6:  # what is left out is smaller than rounding
+    if angle < 1e-6:  # the terms left out are smaller than rounding
         return np.eye(3) + cross + cross @ cross / 2, np.eye(3) + cross / 2 + cross @ cross / 6
     a, b = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2
     square = cross @ cross

@@ -1,7 +1,7 @@
 """How near and how far each camera has to look, derived from the rig and, where there are some, sparse points.
 
 No shape of the scene is assumed. Cameras may sit on the scene's own surface (a dome, the walls of a room), so the
-near plane is not a small constant but a share of the focus distance: otherwise wall Gaussians beside an unseen camera
+near plane is not a small constant but a share of the focus distance: otherwise wall Gaussians next to an unseen camera
 cover its whole picture.
 """
 

@@ -34,7 +34,7 @@ def turntable(
     """Round a point at an even pace, looking at it. Whole turns make a loop without a seam.
 
     Args:
-        center: What is looked at, scene units. [3]
+        center: The point looked at, scene units. [3]
         up: [3]
         radius: Distance from `center`, scene units.
         elevation: Angle above the horizon through `center`, radians; held within MAX_ELEVATION_RAD.

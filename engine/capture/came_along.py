@@ -1,4 +1,4 @@
-"""What came along with a capture, masks and points, as a key: what was made with them does not outlive others."""
+"""The masks and points that came along with a capture, as a key: results made with them do not outlive others."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PIECE_BYTES = 64 << 10
 
 
 def came_along(layout: Layout) -> dict[str, Any]:
-    """What stands for masks and points of a capture in keys of what is kept; empty where nothing came along.
+    """The part of a cache key that stands for a capture's masks and points; empty where nothing came along.
 
     Names, sizes and samples of the contents, not the times of files: a copied capture has the same key. Reads a few
     small pieces of files, whatever their size.

@@ -51,7 +51,7 @@ class Capture:
             the scale.
         follow_links: Whether the user allowed its files to lie outside of the folder.
         first_frame: Where those frames begin in the whole capture. Everywhere else frames are counted from there.
-        exclusions: What of it training does not see; see `without`.
+        exclusions: The parts that training does not see; see `without`.
     """
 
     path: Path
@@ -204,7 +204,7 @@ class Capture:
         return np.stack([np.ones((height, width), bool) if valid is None else valid for valid in found])
 
     def moving_mask(self, camera_index: int, frame_index: int) -> np.ndarray | None:
-        """What moves in a picture according to masks that came with the capture. Decoded anew at every call.
+        """The moving pixels of a picture according to masks that came with the capture. Decoded anew at every call.
 
         Returns:
             [H, W] bool at the working size, undistorted as the picture is; None where the camera has no masks.

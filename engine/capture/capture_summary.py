@@ -1,4 +1,4 @@
-"""What a capture is, as plain data for `clipgstream inspect`. Looks at numbers, not at pixels."""
+"""The summary of a capture, as plain data for `clipgstream inspect`. Looks at numbers, not at pixels."""
 
 from __future__ import annotations
 

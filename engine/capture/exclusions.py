@@ -1,4 +1,4 @@
-"""Exclusions: what training never sees of a capture, beside the cameras that are held out for measuring. Values."""
+"""Exclusions: the parts of a capture that training never sees, apart from cameras held out for measuring. Values."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class PaintedMask(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Exclusions(Struct, frozen=True, forbid_unknown_fields=True):
-    """What training never sees, beside the cameras that are held out for measuring.
+    """The parts of a capture that training never sees, apart from cameras held out for measuring.
 
     Attributes:
         cameras: Names of cameras that are left out altogether.
@@ -83,7 +83,7 @@ class Exclusions(Struct, frozen=True, forbid_unknown_fields=True):
     masks: tuple[PaintedMask, ...] = ()
 
     def within(self, first: int, stop: int) -> Exclusions:
-        """What of it concerns frames [first, stop)."""
+        """The exclusions that concern frames [first, stop)."""
 
         def touches(one: ExcludedFrames | PaintedMask) -> bool:
             return one.first < stop and first < one.stop

@@ -36,7 +36,7 @@ from engine.errors import CaptureError
 from engine.storage.files import open_regular
 
 MAX_DECODER_BYTES = 384 << 20
-"""What all open videos of a capture may hold in decoded frames that others refer to."""
+"""Limit of the decoded frames that all open videos of a capture hold because others refer to them."""
 DECODER_BYTES_PER_PIXEL = 24
 """Sixteen frames of one and a half bytes: what H.264 may refer to."""
 MAX_FORWARD_DECODE = 64
@@ -320,7 +320,7 @@ class FrameStore:
         return self._valid[camera_index]
 
     def moving_mask(self, camera_index: int, frame_index: int) -> np.ndarray | None:
-        """What moves in a picture. [H, W] bool, or None where the camera has no masks. Raises CaptureError."""
+        """The moving pixels of a picture. [H, W] bool, or None where the camera has no masks. Raises CaptureError."""
         masks = self.masks[camera_index]
         return None if masks is None else self.optics[camera_index].mask(next(iter(masks.read([frame_index]))))
 

@@ -26,7 +26,7 @@ _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_g
 _TO_BYTES = {
     **{"u1": 1.0, "i1": 1.0, "<u2": 255.0 / 65535.0, "<i2": 1.0, "<i4": 1.0, "<u4": 1.0, "<f4": 255.0, "<f8": 255.0}
 }
-"""What a colour is multiplied with, by the type that it has in the file."""
+"""The factor of a colour, by the type that it has in the file."""
 _BLOCK_POINTS = 1 << 12
 
 

@@ -161,6 +161,6 @@ def _read_npz(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None
 
 
 def said_of(points: CapturePoints, path: Path) -> Iterable[str]:
-    """What is worth saying about a cloud that was read."""
+    """Warnings about a cloud that was read."""
     if points.n_dropped:
         yield f"{points.n_dropped:,} points of {path.name} are not finite numbers and are left out."

@@ -1,6 +1,6 @@
 """The child's side: `python -m engine.children KIND [FOLDER]`. It hears, works, reports and answers.
 
-A child ends when its input does: nobody wants it any more, or the process that started it has died.
+A child ends when its input does: it is no longer wanted, or the process that started it has died.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ BEAT_EVERY_S = 1.0
 
 
 class Parent(Generic[Event]):
-    """What a child knows of the process that started it. For any thread.
+    """A child's view of the process that started it. For any thread.
 
     Args:
         heard, said: Descriptors of pipes.
@@ -42,7 +42,7 @@ class Parent(Generic[Event]):
         """Tell how far it is.
 
         Raises:
-            Unwanted: Nobody listens any more.
+            Unwanted: Nobody listens now.
         """
         if self._is_gone.is_set():
             raise Unwanted
@@ -52,7 +52,7 @@ class Parent(Generic[Event]):
         """The next command; None where none came in this time.
 
         Raises:
-            Unwanted: None will come any more.
+            Unwanted: No more will come.
         """
         assert self._kind is not None
         try:
@@ -76,13 +76,13 @@ class Parent(Generic[Event]):
         """Send the last message. From now on the folder is left to its owner, who reads the results in it.
 
         Raises:
-            Unwanted: Nobody listens any more.
+            Unwanted: Nobody listens now.
         """
         self._folder = None
         self.write(kind, value)
 
     def job(self, kind: ChildKind[Any, Event, Any]) -> Any:
-        """What this child is asked. Waits for it; ends the process where nobody asks."""
+        """The job of this child. Waits for it; ends the process where nobody asks."""
         self._kind = kind
         data = self._inbox.get()
         if data is None:

@@ -29,7 +29,7 @@ class ChildFailed(Exception):
 
 
 class Unwanted(Exception):
-    """Raised in a child once nobody waits for its result any more."""
+    """Raised in a child once nobody waits for its result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +40,11 @@ class ChildKind(Generic[Job, Event, Result]):
         place: Of this constant, as "module:NAME"; the child imports it from there.
         work: "module:function" that is called with the job and the child's `Parent`, and returns the result. Only the
             child imports it.
-        what: What it is called in reasons, as "the process that mends".
+        what: Its name in reasons, as "the process that mends".
         job, event, result, command: Types of what crosses, as msgspec decodes them, or "module:name" of one that is
             imported when it comes.
         priority: How the child competes for cores.
-        grace_s: A child that is not wanted any more may tidy up for so long, and one whose parent has died for as long
+        grace_s: A child that is no longer wanted may tidy up for so long, and one whose parent has died for as long
             as it takes; with 0 it ends at once.
         stall_s: Seconds without any work after which it is taken for hung; None for never. Time alone never decides:
             results would depend on what else the machine does.
@@ -66,6 +66,6 @@ class ChildKind(Generic[Job, Event, Result]):
 
 
 def find(place: str) -> Any:
-    """What stands at "module:name"."""
+    """The object at "module:name"."""
     module, _, name = place.partition(":")
     return cast("Any", getattr(import_module(module), name))

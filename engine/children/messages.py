@@ -1,4 +1,4 @@
-"""What crosses between processes: values of declared types as MessagePack, so that receiving one never runs code.
+"""Messages between processes: values of declared types as MessagePack, so that receiving one never runs code.
 
 Besides what msgspec knows, paths, ranges and small arrays may be part of them. Large arrays cross as files.
 """
@@ -42,7 +42,7 @@ class Refusal(msgspec.Struct, frozen=True):
 
     @staticmethod
     def of(error: EngineError) -> Refusal:
-        """What an error says."""
+        """The error as a message."""
         problems = tuple(Refusal.of(problem) for problem in getattr(error, "problems", ()))
         path = None if error.path is None else str(error.path)
         return Refusal(type(error).__name__, error.message, error.hint, path, problems)

@@ -44,9 +44,9 @@ class ChildProcess(Generic[Job, Event, Result]):
     """One child. It is started at once; that it could not be is its ending, like every other failure.
 
     Args:
-        kind: What it does.
-        job: What it is asked.
-        folder: What the child removes where this process has died before it.
+        kind: The kind of its work.
+        job: Its job.
+        folder: The folder the child removes where this process has died before it.
         sweep: Called with the child's number once it has died without an answer; removes what it would have removed
             itself.
     """
@@ -85,7 +85,7 @@ class ChildProcess(Generic[Job, Event, Result]):
 
     @property
     def pid(self) -> int | None:
-        """Its number; None where it could not be started."""
+        """The child's number; None where it could not be started."""
         return None if self._process is None else self._process.pid
 
     @property
@@ -98,7 +98,7 @@ class ChildProcess(Generic[Job, Event, Result]):
         self._outbox.put(framed(Message.COMMAND, command))
 
     def poll(self, n_most: int = MAX_EVENTS_PER_POLL) -> list[Event]:
-        """What it has reported since the last call, oldest first. Never waits."""
+        """The events reported since the last call, oldest first. Never waits."""
         events: list[Event] = []
         with suppress(queue.Empty):
             while len(events) < n_most:
@@ -111,10 +111,10 @@ class ChildProcess(Generic[Job, Event, Result]):
         self._has_news.clear()
 
     def result(self) -> Result:
-        """What it answered, once it is over.
+        """The child's answer, once it is over.
 
         Raises:
-            EngineError: What it raised.
+            EngineError: The child's own error.
             ChildFailed: It gave no answer.
         """
         if isinstance(self._ending, Exception):
@@ -122,7 +122,7 @@ class ChildProcess(Generic[Job, Event, Result]):
         return cast("Result", self._ending)
 
     def ask_to_end(self) -> None:
-        """Nobody wants it any more. It ends at once, or tidies up first, as its kind says."""
+        """The child is no longer wanted. It ends at once, or tidies up first, as its kind says."""
         self._outbox.put(None)
 
     def kill(self) -> None:
@@ -246,11 +246,11 @@ def run_child(
 
     Args:
         kind, job, folder: See `ChildProcess`.
-        report: Called with what it reports, once with what it repeats. What it raises ends the child.
+        report: Called with the child's reports, once for repeated ones. An error raised by it ends the child.
         alive: Called several times a second; what it raises ends the child, after its time to tidy up.
         stall_s: In place of the kind's.
     Raises:
-        EngineError: What the child raised.
+        EngineError: The child's own error.
         ChildFailed: It gave no result; says why.
     """
     stall_s = kind.stall_s if stall_s is None else stall_s

@@ -52,7 +52,7 @@ _KINDS = tuple(attribute.name for attribute in fields(StoredAnchors))
 
 @dataclass(frozen=True, slots=True)
 class AnchorRecord:
-    """What a clip file holds of the anchors of one role. A value.
+    """A clip file's record of the anchors of one role. A value.
 
     Attributes:
         own: The anchors, where the clip itself stores them.
@@ -82,7 +82,7 @@ class AnchorRecord:
 
 
 def read_records(arrays: Mapping[str, np.ndarray]) -> dict[str, AnchorRecord]:
-    """What the arrays of a clip say of anchors, by role, in the order in which roles are decoded.
+    """The anchor records in the arrays of a clip, by role, in the order in which roles are decoded.
 
     Raises:
         RecordError: Arrays of one role are missing, or do not fit together.

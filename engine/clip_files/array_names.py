@@ -16,7 +16,7 @@ LOG_DRIFT = "log_drift"
 
 
 def own_kind(name: str) -> str | None:
-    """What an array holds of the clip's own anchors, an attribute of StoredAnchors; None for any other array."""
+    """The part of the clip's anchors in an array, an attribute of StoredAnchors; None for any other array."""
     group, _, rest = name.partition(".")
     return rest.rpartition(".")[2] if group == OWN else None
 

@@ -48,7 +48,7 @@ class DecoderShape(Struct, frozen=True):
 
 
 class FieldShape(Struct, frozen=True):
-    """Sizes of a field, saved beside it.
+    """Sizes of a field, saved next to it.
 
     Attributes:
         n_knots: Frames of the clip.
@@ -120,7 +120,7 @@ class Coverage(Struct, frozen=True):
 
 
 class ClipFigures(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What was measured of a finished clip and its training.
+    """The figures of a finished clip and its training.
 
     Attributes:
         held_out_psnr: Of held-out pictures, dB.
@@ -173,7 +173,7 @@ class Place(Struct, frozen=True, kw_only=True):
 
 
 class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """What a clip file says of itself. Entries with a default came later than the others, or not every clip has them.
+    """The header of a clip file. Entries with a default came later than the others, or not every clip has them.
 
     Attributes:
         role: Whether other clips can inherit from this one, or it inherits itself.
@@ -189,7 +189,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
         fingerprint: Of the arrays: names what a source clip was trained against.
         rows_of: Fingerprint of the clip that this one was before it was mended, where it has the same anchors in the
             same rows still; see `origin`.
-        exclusions: What of its pictures was excluded from its training, see engine.capture.exclusions.exclusion_key.
+        exclusions: The parts of its pictures excluded from its training, see engine.capture.exclusions.exclusion_key.
         reference_fingerprint: Of the clip that this one inherits from.
         previous_fingerprint: Of the clip that this one continues from.
         metrics: Of a finished clip; see `figures`.
@@ -229,7 +229,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     @property
     def figures(self) -> ClipFigures:
-        """Of a finished clip; all of them missing elsewhere."""
+        """The figures of a finished clip; all of them missing elsewhere."""
         return self.metrics or ClipFigures()
 
     @property
@@ -268,7 +268,7 @@ def header_text(header: ClipHeader) -> str:
 
 
 def _bring_up_to_date(values: dict[str, Any]) -> None:
-    """What earlier versions wrote in another way."""
+    """Convert the entries that earlier versions wrote in another way."""
     if isinstance(values.get("resume"), str):
         values["resume"] = parse_object(values["resume"])
     figures = values.get("metrics")

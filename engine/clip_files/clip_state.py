@@ -34,7 +34,7 @@ from engine.storage.typed_json import EntryError
 _MAX_LOG_DRIFT = 3.0
 """Gains of a camera beyond a factor of 20 are damage."""
 _ENTRIES = ("header", "coding")
-"""Texts of a file beside its checksum."""
+"""Texts of a file apart from its checksum."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class ClipState:
 
     @property
     def anchors(self) -> dict[str, AnchorRecord]:
-        """What the clip stores of anchors, by role. Raises RecordError where arrays do not fit together."""
+        """The clip's anchor records, by role. Raises RecordError where arrays do not fit together."""
         return read_records(self.arrays)
 
     @property
@@ -100,7 +100,7 @@ class ClipState:
 
     @property
     def fingerprint(self) -> str:
-        """Of the arrays as they are, see `fingerprint_of`."""
+        """The fingerprint of the arrays as they are, see `fingerprint_of`."""
         return fingerprint_of(self.arrays)
 
     def stamped(self) -> ClipState:
@@ -205,18 +205,18 @@ def _decoded(payloads: dict[str, np.ndarray], specs: dict[str, Any]) -> dict[str
 
 @dataclass(frozen=True, slots=True)
 class DamagedClip:
-    """What stands in place of a header that cannot be read. A value.
+    """The stand-in for a header that cannot be read. A value.
 
     Attributes:
         path: The file.
-        reason: What is wrong with it, in words that fit into brackets.
+        reason: The fault, in words that fit into brackets.
     """
 
     path: Path
     reason: str
 
     def error(self) -> ProjectError:
-        """What to raise where the clip is needed."""
+        """The error to raise where the clip is needed."""
         return ProjectError(
             f"The clip file is damaged or not a clip file ({self.reason}).",
             hint="Restore it from a backup, or remove it and train the clip again.",

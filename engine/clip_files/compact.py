@@ -38,7 +38,7 @@ class CompactClip:
     """A clip as it is stored. A value.
 
     Attributes:
-        state: What the stored form decodes to; its header has the fingerprint of these arrays.
+        state: The decoded stored form; its header has the fingerprint of these arrays.
         coded: The stored form of every array.
     """
 
@@ -47,11 +47,11 @@ class CompactClip:
 
     @property
     def n_bytes(self) -> int:
-        """Of all arrays as stored."""
+        """The size of all arrays as stored."""
         return sum(len(array.payload) for array in self.coded.values())
 
     def with_figures(self, figures: ClipFigures) -> CompactClip:
-        """The same clip with what was measured of it."""
+        """The same clip with its measured figures."""
         return replace(self, state=ClipState(self.state.arrays, with_entries(self.state.header, metrics=figures)))
 
 

@@ -1,4 +1,4 @@
-"""How far one picture of a still camera lies beside another one: shift, turn and zoom that bring them together.
+"""How far one picture of a still camera lies off another one: shift, turn and zoom that bring them together.
 
 Only places with an edge count, and those that changed otherwise, such as people, count less and less.
 """

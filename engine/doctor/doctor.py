@@ -40,12 +40,12 @@ STAGE = "Capture doctor"
 N_TIME_STAGES = 5
 """Of engine.synchronisation."""
 USUAL_MATCH_S = 0.25
-"""Of one pair, for the progress of a child process that tells none."""
+"""Of one pair, for the progress of a child process that reports none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What was found out about a capture.
+    """The findings about a capture.
 
     Attributes:
         findings: The worst first.

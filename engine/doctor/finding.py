@@ -1,4 +1,4 @@
-"""Finding: one thing that a check has to say of a capture, with what it rests on and what can be done about it."""
+"""Finding: one result of a check of a capture, with its evidence and its remedy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class PictureEvidence(msgspec.Struct, frozen=True, tag=True):
     Attributes:
         camera: Name.
         frame: Capture frame index.
-        caption: What is to be seen.
+        caption: A description of the picture.
     """
 
     camera: str
@@ -36,7 +36,7 @@ class PairEvidence(msgspec.Struct, frozen=True, tag=True):
     Attributes:
         camera, other: Names.
         frame: Capture frame index to show.
-        caption: What is to be seen.
+        caption: A description of the pictures.
         points, other_points: Matches.
         lines: For each point the ends of its epipolar line across the second picture.
         errors_px: Distance of each match from its line, px of the picture that was matched.
@@ -57,18 +57,18 @@ Evidence = PictureEvidence | PairEvidence
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check found.
+    """The finding of a check.
 
     Attributes:
         kind: Which kind of thing, as "frozen"; see the files of engine.doctor.checks.
         severity: How bad it is.
         cameras: Names of those concerned; empty for the whole capture.
         frames: Capture frame indices concerned; empty for all.
-        text: What was found: one sentence with numbers.
+        text: The finding: one sentence with numbers.
         certainty: 0 to 1: how likely it is true.
-        advice: What to do.
+        advice: The remedy.
         fix: The correction that does it; None where capture.json cannot.
-        evidence: What to look at.
+        evidence: The pictures to look at.
     """
 
     kind: str

@@ -1,4 +1,4 @@
-"""How much memory the doctor takes, told before it begins."""
+"""How much memory the doctor takes, reported before it begins."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from engine.parallel import n_cores
 OWN_BYTES = 230 << 20
 """The program with its libraries and kernels, and what the allocator keeps."""
 KEPT_BYTES = 60 << 20
-"""What looking at pictures leaves behind in the libraries that decode them."""
+"""Memory that decoding pictures leaves in the libraries that decode them."""
 SMALL_BYTES = 200 << 10
-"""What is kept of each picture: small grey ones, and what moves in them."""
+"""Memory kept of each picture: small grey ones, and their moving pixels."""
 
 
 def memory_bytes(capture: Capture) -> int:

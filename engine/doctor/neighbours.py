@@ -1,4 +1,4 @@
-"""Which cameras stand beside which: pairs that probably see the same surfaces, and angles between them."""
+"""Which cameras stand next to which: pairs that probably see the same surfaces, and angles between them."""
 
 from __future__ import annotations
 

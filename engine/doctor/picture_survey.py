@@ -1,4 +1,4 @@
-"""What the checks look at: pictures of every camera, decoded once in order of time, made small where that will do."""
+"""The pictures for the checks: those of every camera, decoded once in order of time, made small where that will do."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MIN_FRAMES = 16
 RUN_LENGTH = 8
 """Frames in a row: what repeats is seen only where none is left out."""
 N_SPREAD = 12
-"""Pictures over the whole length, for exposure and for what stands still."""
+"""Pictures over the whole length, for exposure and for still parts."""
 BACKGROUND_ROWS = (0, 3, 6, 8, 11)
 """Of these the background is the median."""
 STEADY_WIDTH_PX = 320
@@ -52,7 +52,7 @@ class CameraLook:
 
 @dataclass(frozen=True, eq=False)
 class PictureSurvey:
-    """What was looked at.
+    """The survey's pictures.
 
     Attributes:
         capture: The capture.
@@ -70,7 +70,7 @@ class PictureSurvey:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the cameras."""
+        """The names of the cameras."""
         return self.capture.rig.names
 
     @property

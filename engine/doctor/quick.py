@@ -13,7 +13,7 @@ from engine.doctor.finding import Finding, in_order
 
 
 def quick_findings(capture: Capture) -> list[Finding]:
-    """What numbers alone tell of a capture, the worst first."""
+    """The findings from a capture's numbers alone, the worst first."""
     return in_order([*check_numbers(capture), *check_holdout(capture.rig, capture.default_holdout)])
 
 

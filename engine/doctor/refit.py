@@ -1,4 +1,4 @@
-"""What change of one camera's calibration would make it fit what its neighbours see, and how sure that is.
+"""The change of one camera's calibration that would make it fit its neighbours, and its certainty.
 
 Only the matches of that camera are looked at, and its neighbours stay as they are. The cost is robust, so that one
 neighbour that is wrong itself, or some wrong matches, do not pull a good camera along.
@@ -25,7 +25,7 @@ COLUMNS: dict[Model, tuple[int, ...]] = {
     "pose": (0, 1, 2, 3, 4, 5),
     "pose and focal": (0, 1, 2, 3, 4, 5, 6),
 }
-"""What each model changes: turn (3, radians), place (3, shares of the rig's extent), ln(focal length). Simple first."""
+"""Numbers that a model changes: turn (3, radians), place (3, shares of the rig's extent), ln(focal). Simple first."""
 SOFT_PX = 1.0
 """Errors beyond this weigh less and less (Cauchy)."""
 ENOUGH = 0.9
@@ -58,7 +58,7 @@ class Refit:
         sigmas: Standard deviations of them; 0 of what stays. [7]
         cost, cost_left: Robust cost with the calibration as it is, and after the change.
         before_px, after_px: Median error likewise.
-        n_matches, n_partners: What it rests on.
+        n_matches, n_partners: Matches and partners it rests on.
     """
 
     camera: int

@@ -14,7 +14,7 @@ from msgspec import Meta, Struct, structs
 
 from engine.setting import Flag, Setting, setting, settings_of
 
-__all__ = ["Delete", "Expose", "Hide", "Hold", "Recolor", "Smooth", "Transform"]  # what scripts import
+__all__ = ["Delete", "Expose", "Hide", "Hold", "Recolor", "Smooth", "Transform"]  # for scripts to import
 
 Vector = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
@@ -28,7 +28,7 @@ def value(meaning: str, label: str, written: str, *flags: Flag, **said: Any) -> 
     """The annotation of a value of an action.
 
     Args:
-        meaning: What it does, for help and as a tip.
+        meaning: Its meaning, for help and as a tip.
         label: Of its field.
         written: As help shows it: "--move X Y Z".
         flags: Other ways to write it.
@@ -43,8 +43,8 @@ class EditAction(Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         label: On buttons.
-        tip: What it does to what is selected, for menus, where the label is not enough.
-        meaning: What becomes of what an edit acts on, in a sentence.
+        tip: Its effect on the selection, for menus, where the label is not enough.
+        meaning: Its effect on an edit's target, in a sentence.
         verb: As it can follow "Undo", where that is not the label.
         adverb: The same, after what is acted on; the name of a value in braces stands for the value.
         opposite: Name of doing it to everything else, if there is one.
@@ -84,7 +84,7 @@ class EditAction(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def words(self) -> tuple[str, str]:
-        """What it does, as words before and after what it does it to; the latter may be empty."""
+        """The action in words, before and after its object; the latter may be empty."""
         return self.verb or self.label.lower(), self.adverb.format(**structs.asdict(self))
 
     def changed(self, name: str, found: Any) -> Self:
@@ -93,7 +93,7 @@ class EditAction(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Hide(EditAction, frozen=True, tag="hide"):
-    """They are drawn nowhere, but stay in the clips when edits are applied permanently."""
+    """The Gaussians are drawn nowhere, but stay in the clips when edits are applied permanently."""
 
     label = "Hide"
     meaning = "Does not draw it"
@@ -101,7 +101,7 @@ class Hide(EditAction, frozen=True, tag="hide"):
 
 
 class Delete(EditAction, frozen=True, tag="delete"):
-    """They are gone; from the clips too, once edits are applied permanently."""
+    """The Gaussians are gone; from the clips too, once edits are applied permanently."""
 
     label = "Delete"
     meaning = "Removes it"
@@ -119,7 +119,7 @@ def _turn(numbers: tuple[float, ...]) -> Quat:
 
 
 class Transform(EditAction, frozen=True, tag="transform"):
-    """They are scaled and turned about a pivot, then moved: x -> pivot + scale R (x - pivot) + translation.
+    """The Gaussians are scaled and turned about a pivot, then moved: x -> pivot + scale R (x - pivot) + translation.
 
     Raises:
         ValueError: A number is not finite, the scale not positive, or the quaternion is not a rotation.
@@ -157,7 +157,7 @@ class Transform(EditAction, frozen=True, tag="transform"):
 
     @property
     def words(self) -> tuple[str, str]:
-        """What is done of moving, rotating and scaling."""
+        """Which of moving, rotating and scaling are done."""
         is_done = {"move": any(self.translation), "rotate": abs(self.quat[0]) < 1.0, "scale": self.scale != 1.0}
         *others, last = [word for word in is_done if is_done[word]] or ["move"]
         return f"{', '.join(others)} and {last}" if others else last, ""
@@ -201,7 +201,7 @@ class Recolor(EditAction, frozen=True, tag="recolor"):
 
 
 class Expose(EditAction, frozen=True, tag="expose"):
-    """Their light is multiplied by 2 to the power of `stops`, in linear light."""
+    """The Gaussians' light is multiplied by 2 to the power of `stops`, in linear light."""
 
     label = "Exposure"
     tip = "Change the exposure of the selection"
@@ -224,7 +224,7 @@ class Expose(EditAction, frozen=True, tag="expose"):
 
 
 class Hold(EditAction, frozen=True, tag="hold"):
-    """They stand still, as they are at one frame; in clips without that frame, as at their frame next to it."""
+    """The Gaussians stand still as at one frame; in clips without that frame, as at their frame next to it."""
 
     label = "Set static"
     tip = "Set static: freeze the selection as in this frame"
@@ -246,7 +246,7 @@ class Hold(EditAction, frozen=True, tag="hold"):
 
 
 class Smooth(EditAction, frozen=True, tag="smooth"):
-    """They change more slowly: each is a weighted mean of itself over the frames of its clip around the moment."""
+    """The Gaussians change more slowly: each is a weighted mean of itself over frames of its clip around the moment."""
 
     label = "Smooth"
     tip = "Smooth the selection over time"

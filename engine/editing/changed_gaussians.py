@@ -1,4 +1,4 @@
-"""What edits do to the Gaussians that they act on, in place and colour. Whatever is not finite stays where it is."""
+"""The effects of edits on Gaussians, in place and colour. Whatever is not finite stays where it is."""
 
 from __future__ import annotations
 

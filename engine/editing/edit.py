@@ -1,4 +1,4 @@
-"""Edit: one change to a trained scene: what it acts on, what it does, and in which frames. Plain values that travel as
+"""Edit: one change to a trained scene: its target, its action, and its frames. Plain values that travel as
 JSON; nothing here touches Gaussians.
 
 Edits form a stack. Each acts on what those before it have left, in the frames of its scope, and on nothing outside of
@@ -51,7 +51,7 @@ class Scope(Struct, frozen=True, forbid_unknown_fields=True):
 
 EVERYWHERE = Scope()
 
-# ---------------------------------------------------------------- what it acts on
+# ---------------------------------------------------------------- targets
 
 
 class Everything(Struct, frozen=True, forbid_unknown_fields=True, tag="everything"):
@@ -131,9 +131,9 @@ class Edit(Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         edit_id: Names it for good; no two edits of a document have the same.
         name: For people.
-        target: What it acts on, ...
+        target: The Gaussians it acts on, ...
         is_inverted: ... or everything but that, as for cropping and isolating.
-        action: What it does.
+        action: The action to apply.
         scope: In which frames.
         is_on: Whether it counts now.
     """
@@ -148,7 +148,7 @@ class Edit(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def edits_at(edits: tuple[Edit, ...], frame: float) -> tuple[Edit, ...]:
-    """Those that count at a moment, in the order of the stack."""
+    """The edits that count at a moment, in the order of the stack."""
     return tuple(edit for edit in edits if edit.is_on and edit.scope.holds_at(frame))
 
 

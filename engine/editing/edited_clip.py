@@ -30,7 +30,7 @@ from engine.model.host_array import host_array
 from engine.raster.gaussians import Gaussians
 
 MAX_STILL = 4
-"""Stacks for which what stands still is kept: those at the playhead, and those of a drag a moment ago."""
+"""Stacks for which the still part is kept: those at the playhead, and those of a drag a moment ago."""
 REACH_SIGMAS = 3.0
 """Frames farther away than so many standard deviations do not count."""
 FRAME_BYTES = 48 << 20
@@ -42,7 +42,7 @@ class EditedGaussians:
     """A moment of a clip.
 
     Attributes:
-        gaussians: What is left, sets in the order of the model.
+        gaussians: The Gaussians left, sets in the order of the model.
         rows: Where each comes from.
         n_still: So many come first and differ in nothing but their colours between moments with equal effects.
     """
@@ -56,7 +56,7 @@ class EditedClip:
     """A clip, or a part of one, with edits. For one thread; the model is not changed.
 
     Args:
-        model: What is decoded; nothing in it learns.
+        model: The model to decode; nothing in it learns.
         clip: Its frames.
         named: The sets of the whole clip, see engine.editing.clip_rows.named_sets.
     """
@@ -80,7 +80,7 @@ class EditedClip:
     def decode(
         self, clip_time: float, effects: Effects = NO_EFFECTS, *, alive_at: float | None = None
     ) -> EditedGaussians:
-        """What is seen at a time of the clip.
+        """The Gaussians seen at a time of the clip.
 
         Args:
             clip_time: See ClipModel.decode.
@@ -103,10 +103,10 @@ class EditedClip:
 
     @property
     def n_bytes_kept(self) -> int:
-        """Memory of what is kept between moments, beside the model."""
+        """Memory kept between moments, apart from the model."""
         return sum(part.n_bytes for part in self._still.values()) + self._frames.n_bytes
 
-    # ---------------------------------------------------------------- what stands still
+    # ---------------------------------------------------------------- the still part
 
     def _still_part(self, effects: Effects) -> StillPart:
         if effects in self._still:
@@ -130,10 +130,10 @@ class EditedClip:
         parts = [self.model.lit_gaussians(role, clip_time) for role in self._still_roles]
         return parts[0] if len(parts) == 1 else Gaussians.concatenate(parts)
 
-    # ---------------------------------------------------------------- what moves
+    # ---------------------------------------------------------------- the moving part
 
     def _moving(self, effects: tuple[Effect, ...], clip_time: float, alive_at: float) -> IndexedGaussians:
-        """What does not stand still, after some effects."""
+        """The Gaussians that do not stand still, after some effects."""
         now = self._unedited(clip_time, alive_at)
         for number, effect in enumerate(effects):
             before, chosen = effects[:number], self._chosen(effect)

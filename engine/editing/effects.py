@@ -18,7 +18,7 @@ from engine.editing.edit import Edit, Target, edits_at
 
 
 class Effect(Struct, frozen=True):
-    """What one edit does where it holds. See Edit and Scope."""
+    """The effect of one edit where it holds. See Edit and Scope."""
 
     target: Target
     action: Action
@@ -28,7 +28,7 @@ class Effect(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """Those of a moment, in the order of the stack. A value; compared and hashed by what it does.
+    """The effects of a moment, in the order of the stack. A value; compared and hashed by what it does.
 
     Attributes:
         all: Each acts on what those before it have left.
@@ -82,7 +82,7 @@ class EditStack:
         self._effects: dict[int, Effects] = {}
 
     def at(self, frame: float) -> Effects:
-        """What holds at a moment, in frames of the capture; between two frames that of the one before."""
+        """The effects that hold at a moment, in frames of the capture; between two frames that of the one before."""
         place = bisect_right(self._bounds, math.floor(frame))
         if place not in self._effects:
             first = self._bounds[place - 1] if place else 0

@@ -1,4 +1,4 @@
-"""Picks that stand for nothing any more: their clip was trained anew since, so that its anchors are others."""
+"""Picks that no longer stand for anything: their clip was trained anew since, so that its anchors are others."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from engine.editing.edit import Edit, Picked
 
 @dataclass(frozen=True, slots=True)
 class LostPicks:
-    """An edit that does nothing in some clips, because what was picked there is gone.
+    """An edit that does nothing in some clips, because its picks there are gone.
 
     Attributes:
         edit_id: Of the edit.

@@ -22,7 +22,7 @@ def pack_rows(rows: np.ndarray) -> bytes:
 
 
 def unpack_rows(packed: bytes) -> np.ndarray:
-    """What was packed, rising. [N] int64
+    """The packed rows, rising. [N] int64
 
     Raises:
         ValueError: These bytes are not from `pack_rows`.

@@ -1,4 +1,4 @@
-"""In which frames an edit can act: where its scope meets clips that have what it acts on."""
+"""In which frames an edit can act: where its scope meets clips that have its target."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Reach:
     """Where an edit acts. Without known clips nothing is known, and everything is empty.
 
     Attributes:
-        acts: Frames of its scope in which there is something that it acts on.
+        acts: Frames of its scope in which its target exists.
         is_whole: Whether these are all frames of its scope.
         exists: All frames in which there is something that it would act on, whatever its scope.
         n_picked: Gaussians that were picked; 0 where it acts on a volume or on everything.
@@ -65,7 +65,7 @@ class Reach:
 
     @property
     def is_nowhere(self) -> bool:
-        """Whether it can act in no frame, although what it acts on is known."""
+        """Whether it can act in no frame, although its target is known."""
         return bool(self.exists) and not self.acts
 
 

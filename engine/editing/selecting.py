@@ -33,7 +33,7 @@ class TargetFinder:
     def is_chosen(self, effect: Effect, means: Tensor, index: Tensor) -> Tensor:
         """Whether an effect acts on each of some Gaussians. [N] bool
 
-        What is inverted is the target, not whether it must come from the reference clip. Picks from before a clip was
+        The target is inverted, not whether it must come from the reference clip. Picks from before a clip was
         trained anew stand for nothing, inverted or not. A centre that is not finite lies in no box and no sphere.
 
         Args:

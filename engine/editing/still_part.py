@@ -1,4 +1,4 @@
-"""StillPart: what stands still in a whole clip, as a stack of edits leaves it; only its light is worked out anew."""
+"""StillPart: the still part of a whole clip, as a stack of edits leaves it; only its light is worked out anew."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class StillPart:
         return sum(tensor.nbytes for tensor in tensors) + self.index.nbytes
 
     def at(self, clip_time: float) -> Gaussians:
-        """What is left of it, at a time of the clip."""
+        """The Gaussians left of the still part, at a time of the clip."""
         if self._has_light:
             return replace(self._shapes, colors=self._colors(clip_time, len(self._steps)), is_frozen=None)
         if self._unchanging is None:

@@ -63,7 +63,7 @@ def _block(planes: list[np.ndarray], first: int) -> bytes:
     lines = range(first, min(first + _LINES_PER_BLOCK, height))
     raw = b"".join(plane[y].tobytes() for y in lines for plane in planes)
     packed = zlib.compress(_rearranged(raw), 4)
-    data = packed if len(packed) < len(raw) else raw  # readers tell by the size which of the two it is
+    data = packed if len(packed) < len(raw) else raw  # readers infer from the size which of the two it is
     return struct.pack("<ii", first, len(data)) + data
 
 

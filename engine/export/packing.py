@@ -1,4 +1,4 @@
-"""What several file formats share: rotations by their three smaller components, an order along a space-filling curve,
+"""Shared by several file formats: rotations by their three smaller components, an order along a space-filling curve,
 and whole numbers of a few bits."""
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ class Splats:
         )
 
     def gaussians(self) -> Gaussians:
-        """What a rasterizer draws of them, on the CPU."""
+        """The Gaussians for a rasterizer, on the CPU."""
         import torch
 
         from engine.raster.gaussians import Gaussians

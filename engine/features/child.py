@@ -36,7 +36,7 @@ def work_on_arrays(
     """Hand arrays to a child. Returns what it answers.
 
     Args:
-        kind: What it does with them.
+        kind: The kind of work on them.
         arrays: By name.
         alive: Called several times a second; what it raises ends the child.
         stall_s: Seconds without any work of the child after which it is taken for hung.

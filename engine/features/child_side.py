@@ -1,4 +1,4 @@
-"""What modules share that `engine.features.child.work_on_arrays` starts, and the SIFT features that all of them need.
+"""Shared by modules that `engine.features.child.work_on_arrays` starts, and the SIFT features that all of them need.
 
 Imported by child processes only: pycolmap must stay out of the program's own.
 """

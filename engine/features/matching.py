@@ -1,4 +1,4 @@
-"""What two cameras see alike: matches of SIFT features, checked for some epipolar geometry, but not for a known one.
+"""Matches of two cameras: matches of SIFT features, checked for some epipolar geometry, but not for a known one.
 
 So a camera whose calibration is wrong has as many matches as the others, and they show that it is wrong.
 """
@@ -14,17 +14,17 @@ from engine.features.child import arrays_kind, work_on_arrays
 from engine.features.sift_memory import n_at_once, sift_bytes
 
 MAX_FEATURES = 1536
-"""Of one picture: a pair of cameras needs no more to be judged."""
+"""Limit of features of one picture: a pair of cameras needs no more to be judged."""
 MAX_SIFT_BYTES = 300 << 20
-"""What pictures may take while their key points are looked for."""
+"""Limit of the memory of pictures whose key points are looked for."""
 CHILD_BYTES = 170 << 20
-"""What the child takes apart from that, and from the pictures: its libraries, and matching."""
+"""The child's memory apart from that, and from the pictures: its libraries, and matching."""
 MATCHING = arrays_kind("engine.features.matching:MATCHING", "engine.features.match_child:main", "the matching process")
 
 
 @dataclass(frozen=True, slots=True)
 class PairMatches:
-    """What two pictures share.
+    """The matches of two pictures.
 
     Attributes:
         first, second: Rows of the pictures.
@@ -52,7 +52,7 @@ class Matches:
 
 
 def matching_bytes(n: int, width: int, height: int) -> int:
-    """What the child process of `match_pairs` takes for n pictures of this size, roughly."""
+    """The memory of `match_pairs`'s child process for n pictures of this size, roughly."""
     at_once = min(n_at_once(width, height, MAX_SIFT_BYTES), n)
     return CHILD_BYTES + 3 * n * width * height + at_once * sift_bytes(width, height)
 

@@ -11,7 +11,7 @@ BYTES_PER_PIXEL = 300
 
 
 def sift_bytes(width: int, height: int) -> int:
-    """What one picture takes."""
+    """The memory of one picture."""
     ratio = min(1.0, MAX_SIDE_PX / max(width, height))
     return int(width * ratio * height * ratio) * BYTES_PER_PIXEL
 

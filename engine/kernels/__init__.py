@@ -1,1 +1,1 @@
-"""What all kernels share: vector lanes, routines, threads, memory, and where compiled code is kept."""
+"""Shared by all kernels: vector lanes, routines, threads, memory, and where compiled code is kept."""

@@ -62,7 +62,7 @@ _CODE_VARIABLES = (
 
 
 class CacheKey(NamedTuple):  # a dataclass would double the time that importing this module takes
-    """What compiled kernels depend on; each part is a short hash or text, so that a difference can be named.
+    """The inputs that compiled kernels depend on; each part is a short hash or text, so that a difference can be named.
 
     Attributes:
         sources: Hash of all sources that end up in kernels.
@@ -81,7 +81,7 @@ class CacheKey(NamedTuple):  # a dataclass would double the time that importing 
 
 
 class CacheState(NamedTuple):
-    """What lies in the cache.
+    """The content of the cache.
 
     Attributes:
         folder: Where kernels are kept; need not exist.
@@ -202,7 +202,7 @@ def is_cache_warm() -> bool:
 
 
 def read_marker(folder: Path, name: str = MARKER) -> CacheKey | None:
-    """What the last completed warm-up in this folder compiled; None when there was none or it cannot be read."""
+    """The key of the last completed warm-up in this folder; None when there was none or it cannot be read."""
     from engine.storage.json_files import read_json_object
 
     try:
@@ -316,7 +316,7 @@ def _library_texts() -> list[bytes]:
 
 
 def _processor_text() -> str:
-    """Model and instruction sets of the first core, as the system tells them; a few lines at most."""
+    """Model and instruction sets of the first core, as the system reports them; a few lines at most."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
             wanted = ("model name", "flags", "Features", "CPU part", "CPU implementer", "isa")

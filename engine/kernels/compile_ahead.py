@@ -68,8 +68,8 @@ def compile_all(report: ReportGroups | None = None, *, backend: str = "cpu", n_p
     A group that fails is logged and left to its first use.
 
     Args:
-        report: Told about the progress; what it raises ends the compiling processes and passes on.
-        backend: What is computed with; groups of another one are left out.
+        report: Called with the progress; what it raises ends the compiling processes and passes on.
+        backend: The backend to compute with; groups of another one are left out.
         n_processes: How many at a time; as many as cores when None, MAX_PROCESSES at most.
     Returns:
         Whether all of them succeeded.
@@ -140,7 +140,7 @@ def _names(bundle: _Bundle) -> str:
 
 _IMPORT = "from importlib import import_module"
 _END_WITH_PARENT = "from engine.kernels.parent import end_with_parent; end_with_parent()"
-"""A compiler that nobody waits for any more takes a core for a minute all the same."""
+"""A compiler that nobody waits for takes a core for a minute all the same."""
 
 
 def _start(bundle: _Bundle, folder: Path) -> subprocess.Popen[bytes]:

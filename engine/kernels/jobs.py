@@ -45,7 +45,7 @@ class _Form(Enum):
 
 
 class _Kind(NamedTuple):
-    """What a field is: its form, dtype, the same for torch (None where torch has none), number of dimensions (-1 for
+    """A field's type: its form, dtype, the same for torch (None where torch has none), number of dimensions (-1 for
     any), and whether it holds whole numbers."""
 
     form: _Form
@@ -103,7 +103,7 @@ class Packed(NamedTuple):
 
     Attributes:
         table: Numbers, and addresses and lengths of arrays. int64
-        held: What the table points to beside the arrays of the job. Job and list must outlive the use of the table.
+        held: Objects in the table apart from the arrays of the job. Job and list must outlive the use of the table.
     """
 
     table: np.ndarray

@@ -122,7 +122,7 @@ def _call(typing_context, address, worker, arguments):
 
 @routine(ints(4))
 def _enter(arrays, lengths, steps, data):
-    """What a threading layer calls for a part of the workers: `data` holds the addresses of routine and job."""
+    """Called by a threading layer for a part of the workers: `data` holds the addresses of routine and job."""
     first = load_int(arrays)
     for part in range(load_int(lengths)):
         _call(load_int(data), load_int(first + part * load_int(steps)), load_int(data + 8))

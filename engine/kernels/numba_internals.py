@@ -24,12 +24,12 @@ WRITTEN_FOR = "0.68"
 
 
 def no_value(context: Any) -> Any:
-    """What an intrinsic that returns nothing has to return."""
+    """The value that an intrinsic without a result has to return."""
     return context.get_dummy_value()
 
 
 def external(symbol: str, signature: Any) -> Any:
-    """What kernels call to reach the code that `publish` has put under a symbol."""
+    """The function that kernels call to reach the code that `publish` has put under a symbol."""
     return types.ExternalFunction(symbol, signature)
 
 

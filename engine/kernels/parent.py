@@ -9,7 +9,7 @@ from contextlib import suppress
 
 
 def end_with_parent(before: Callable[[], None] = lambda: None) -> None:
-    """From here on this process ends as soon as nobody holds the other end of its standard input any more.
+    """From here on this process ends as soon as nobody holds the other end of its standard input.
 
     Args:
         before: Called then, for instance to remove files.

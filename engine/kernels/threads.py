@@ -14,7 +14,7 @@ from importlib import import_module
 
 SPIN_COUNT = 2_000
 """Rounds an idle OpenMP thread spins before it sleeps (GOMP_SPINCOUNT). libgomp's own 300,000 make a step several times
-slower beside two busy processes, and sleeping at once makes it slower where nothing else runs."""
+slower next to two busy processes, and sleeping at once makes it slower where nothing else runs."""
 
 _log = logging.getLogger(__name__)
 

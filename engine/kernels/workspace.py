@@ -65,7 +65,7 @@ class WorkspacePool:
             return Workspace()
 
     def give_back(self, workspace: Workspace) -> None:
-        """Offer it to the next rendering. The caller must not touch its arrays any more."""
+        """Offer it to the next rendering. The caller must no longer touch its arrays."""
         if workspace.n_bytes <= self._max_idle_bytes:
             self._idle.append(workspace)
 

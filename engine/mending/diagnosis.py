@@ -1,4 +1,4 @@
-"""What jumps at a boundary: what only stands there, in its light or in the cameras' colours, or what can move."""
+"""The cause of a jump at a boundary: still parts, in their light or in the cameras' colours, or moving ones."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class SeamDiagnosis(msgspec.Struct, frozen=True):
 
     Attributes:
         all: Of the picture as cameras show it.
-        still: What of it lies where static anchors alone show, in the scene's colours: their light.
-        colors: What cameras' colours add to the change of the picture in the scene's colours.
+        still: The part of it that lies where static anchors alone show, in the scene's colours: their light.
+        colors: The amount that cameras' colours add to the change of the picture in the scene's colours.
     """
 
     all: float

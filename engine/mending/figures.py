@@ -1,4 +1,4 @@
-"""What is known of a stretch before and after it was mended, as numbers. Free of torch: a window imports it."""
+"""The figures of a stretch before and after it was mended. Free of torch: a window imports it."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class StretchFigures(msgspec.Struct, frozen=True):
         excess: E on static pixels of the pairs that are to be mended, less the median of the other pairs inside the
             clips: at a boundary the seam score of `eval`. Mean over the training cameras.
         worst: The largest E on static pixels among all pairs of the stretch, mean over the training cameras.
-        elsewhere: Likewise among the other pairs of the clips, boundaries to the clips beside them included.
+        elsewhere: Likewise among the other pairs of the clips, boundaries to the neighbouring clips included.
         psnr: On the training cameras, by clip index as text: files know no other names.
-        held_out_excess, held_out_psnr: The same of the cameras that were held out: told, and decided by never.
+        held_out_excess, held_out_psnr: The same of the cameras that were held out: reported, and never decided by.
     """
 
     excess: float | None
@@ -67,10 +67,10 @@ class Attempt(msgspec.Struct, frozen=True):
 
     Attributes:
         method: One of METHODS.
-        words: What was done, as a sentence without its full stop.
+        words: The attempt, as a sentence without its full stop.
         figures: The result.
         is_kept: Whether it is part of the result.
-        seconds: What it took.
+        seconds: The time it took.
     """
 
     method: str
@@ -85,5 +85,5 @@ METHODS = {
     "fade": "dynamic features are faded from one clip into the other",
     "joint": "the frames around it are briefly trained towards each other",
 }
-"""Ways to mend and what they do, cheapest first."""
+"""Ways to mend and their effects, cheapest first."""
 CHOICES = ("auto", *METHODS, "retrain")

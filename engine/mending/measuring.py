@@ -23,7 +23,7 @@ MAX_CAMERAS = 12
 
 @dataclass(frozen=True, slots=True)
 class Threads:
-    """How many cameras are measured at a time, and what is called once on each of their threads."""
+    """How many cameras are measured at a time, and the function called once on each of their threads."""
 
     n: int = 1
     prepare: Callable[[], object] = lambda: None
@@ -34,7 +34,7 @@ class StretchMeasuring:
 
     Args:
         capture: Its pictures are the truth.
-        stretch: What is mended.
+        stretch: The stretch to mend.
         training_cameras: Indices of the cameras that clips are trained with.
         holdout: Of those that are not.
         threads: How it is spread.
@@ -61,7 +61,7 @@ class StretchMeasuring:
         """Figures of the stretch in some versions of its clips.
 
         Args:
-            clips: By index: those of the stretch, and of those beside them what is there.
+            clips: By index: those of the stretch, and their neighbours where there are any.
             with_held_out: Whether cameras that were held out are measured, too.
         """
         cameras = [*self._judging, *(self._holdout if with_held_out else ())]

@@ -1,6 +1,6 @@
 """Mending a stretch: ways to mend, cheapest first, each measured, and kept only where it helps and costs nothing.
 
-Clips that others inherit from are never touched. All of it is judged by training cameras; held-out ones are told.
+Clips that others inherit from are never touched. All of it is judged by training cameras; held-out ones are reported.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from engine.progress import Progress, ReportProgress
 
 MEASURING, LIGHT, FADING, TRAINING = "Measuring", "Measuring light", "Fading", "Training"
 _CLEAR_RATIO = 1.1
-"""Of two clips whose mean squared errors on what stands still differ by more, only the worse one changes."""
+"""Of two clips whose mean squared errors on still parts differ by more, only the worse one changes."""
 _SHARES = {"light": (0.1, 0.25), "fade": (0.3, 0.5), "joint": (0.55, 0.9)}
-"""From where to where on the way each attempt reaches, as it is told."""
+"""From where to where on the way each attempt reaches, as it is reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """What came of mending. A value.
+    """The outcome of mending. A value.
 
     Attributes:
-        stretch: What was mended.
+        stretch: The mended stretch.
         before, after: Figures; the same where nothing helped.
         attempts: All that was tried, in order.
         clips: The clips that changed, as they are stored.
-        diagnosis: What jumps.
+        diagnosis: The parts that jump.
     """
 
     stretch: Stretch
@@ -55,7 +55,7 @@ class Mended:
 
     @property
     def advice(self) -> str:
-        """What else would help, in a sentence; empty where enough was reached."""
+        """Another remedy, in a sentence; empty where enough was reached."""
         if self.after.is_enough(self.before):
             return ""
         worst = min(self.before.psnr, key=lambda index: self.before.psnr[index], default=None)
@@ -68,15 +68,15 @@ class StretchMending:
 
     Args:
         capture: At working size.
-        stretch: What is to be mended.
+        stretch: The stretch to mend.
         clips: All clips of the capture.
-        states: Finished clips by index: those of the stretch, and of those beside them what is there.
-        reference: What they inherit from.
+        states: Finished clips by index: those of the stretch, and their neighbours where there are any.
+        reference: The clip they inherit from.
         holdout: Camera indices that training never sees.
         make_training: Makes the training of a clip with some settings, not prepared.
-        backend: What clips are decoded and drawn with.
+        backend: The backend clips are decoded and drawn with.
         threads: How measuring is spread.
-        report: Told how far it is; what it raises ends the work.
+        report: Called with the progress; what it raises ends the work.
 
     Raises:
         ProjectError: A clip of the stretch is missing, or none of them may change, or cameras are not the capture's.
@@ -165,7 +165,7 @@ class StretchMending:
     # ---------------------------------------------------------------- ways to mend
 
     def _plan(self, method: str) -> list[tuple[str, bool]]:
-        """What to try, in order: a way, and whether with the other clip, where one was tried and it did not suffice."""
+        """Attempts, in order: a way, and whether with the other clip, where one was tried and it did not suffice."""
         names = ["light", "fade", "joint"] if method == "auto" else [method]
         plan = [(name, False) for name in names]
         return [*plan, ("joint", True)] if "joint" in names and len(self._open) > 1 else plan
@@ -209,7 +209,7 @@ class StretchMending:
         return Looks(self._capture, self._shown, self._cameras)
 
     def _moving(self, looks: Looks) -> list[int]:
-        """Clips that fade: of two, one of which shows much worse what stands still, that one."""
+        """Clips that fade: of two, one of which shows still parts much worse, that one."""
         if len(self._open) < 2:
             return self._open
         errors = looks.errors_across(self._clips[self._open[1]].start)
@@ -217,7 +217,7 @@ class StretchMending:
         return self._worse_first(looks)[:1] if is_clear else self._open
 
     def _worse_first(self, looks: Looks) -> list[int]:
-        """Clips that may change; of two, the one first that shows worse what stands still."""
+        """Clips that may change; of two, the one first that shows still parts worse."""
         if len(self._open) < 2:
             return self._open
         before, after = looks.errors_across(self._clips[self._open[1]].start)

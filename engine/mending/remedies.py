@@ -1,4 +1,4 @@
-"""What can be done to a clip: each takes a finished clip and gives it as it would be stored afterwards.
+"""Remedies for a clip: each takes a finished clip and gives it as it would be stored afterwards.
 
 Training itself is engine.training's, as it is for a new clip; only what it begins with and compares with differs.
 """
@@ -24,7 +24,7 @@ from engine.training.retired_settings import without_retired
 MakeTraining = Callable[[int, TrainConfig], ClipTraining]
 """Clip index and settings to a training that is not prepared."""
 ReportSteps = Callable[[int, int], None]
-"""Told steps done, and all of them."""
+"""Called with the steps done, and all of them."""
 _RATES = ("feature_lr", "scale_lr", "position_lr", "table_lr", "field_mlp_lr")
 _FADING, _LEARNING = (8, 0.5), (6, 0.5)
 """Passes over the pictures, and shares of the rates that a training begins with: what is learned is near already."""
@@ -66,7 +66,7 @@ def faded(
     *,
     is_learning: bool = False,
 ) -> CompactClip:
-    """A clip in which what stands still goes over evenly from what lies before a span to what lies behind it.
+    """A clip whose still parts pass evenly from the look before a span to the look after it.
 
     Args:
         state: The clip.
@@ -74,7 +74,7 @@ def faded(
         span: Frames of the capture that may change; of this clip and a neighbour perhaps.
         looks: All clips concerned, as they were.
         make: Makes its training.
-        report: Told steps.
+        report: Called with steps.
         is_learning: Whether all that the clip owns learns, and from the truth where there is nothing to go over into.
             Otherwise only its field does, and all else keeps its look.
     Raises:

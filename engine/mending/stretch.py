@@ -29,7 +29,7 @@ class Stretch:
 
     @property
     def words(self) -> str:
-        """What is mended, for a sentence."""
+        """The mended clips or boundary, for a sentence."""
         if len(self.pairs) == 1:
             return f"the seam at frame {self.pairs[0]}"
         return f"frames {self.pairs[0] - 1} to {self.pairs[-1]}"

@@ -1,4 +1,4 @@
-"""What the frames of a clip ought to look like: what stands still goes over evenly from the look of one neighbour into
+"""The target look of a clip's frames: still parts pass evenly from the look of one neighbour into
 that of the other.
 
 Where nothing moves between the frame before the span that may change and a frame inside it, that frame should look as
@@ -27,11 +27,11 @@ MAX_BYTES = 256 << 20
 
 
 class Looks:
-    """What training cameras see of clips as they were before, in the exposure of the reference clip.
+    """The training cameras' pictures of clips as they were before, in the exposure of the reference clip.
 
     Args:
         capture: With all cameras.
-        clips: By index; their models must not change any more.
+        clips: By index; their models must no longer change.
         camera_indices: Training cameras; a row is a position in this list.
     """
 
@@ -58,7 +58,7 @@ class Looks:
         return found
 
     def truth(self, row: int, frame: int) -> np.ndarray:
-        """What the camera took, in 0..1 and the same exposure. [H, W, 3] float32"""
+        """The camera's own picture, in 0..1 and the same exposure. [H, W, 3] float32"""
         pixels, trained = self._capture.frame(self._cameras[row], frame), self.clip_of(frame)
         if trained is not None and trained.drift is not None:
             pixels = to_reference(pixels, trained.drift[row, frame - trained.clip.start])
@@ -75,7 +75,7 @@ class Looks:
         return is_still
 
     def errors_across(self, frame: int) -> tuple[float, float]:
-        """How far what stands still is from the truth on both sides of a frame: before it, and in it. Mean squares."""
+        """How far still parts are from the truth on both sides of a frame: before it, and in it. Mean squares."""
         errors = []
         for row in range(len(self._cameras)):
             is_still = self.still_between(row, frame - 1, frame)
@@ -116,7 +116,7 @@ class FadedPictures(TrainingPictures):
         self._kept: ByteCache[tuple[int, int], np.ndarray] = ByteCache(MAX_BYTES)
 
     def picture(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
-        """What this frame ought to look like, in 0..1. [H, W, 3] float32"""
+        """The target picture of this frame, in 0..1. [H, W, 3] float32"""
         frame = self.clip.start + frame_in_clip
         found = self._kept.get((camera_row, frame))
         if found is None:

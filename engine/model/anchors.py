@@ -123,7 +123,7 @@ class AnchorSet(nn.Module):
 
         Args:
             is_chosen: [A] bool
-            presence: Takes the place of what they have. [n, M] bool
+            presence: Takes the place of their own. [n, M] bool
             is_trainable: None leaves it.
         """
         own = None if self.presence is None else self.presence[is_chosen]

@@ -1,4 +1,4 @@
-"""What each camera makes of the scene's colours: its gain, and its exposure in each frame of a clip.
+"""Each camera's rendition of the scene's colours: its gain, and its exposure in each frame of a clip.
 
 Of a camera that was trained on both are known. One that was held out is shown at the gain of the median camera, and
 with the exposure that its place and direction suggest: cameras that look at the same things from the same side change
@@ -37,7 +37,7 @@ class CameraColors:
     clip_length: int
 
     def gain(self, camera_name: str) -> np.ndarray:
-        """Of one camera in the reference clip; ones for a held-out camera. [3] float32"""
+        """The gain of one camera in the reference clip; ones for a held-out camera. [3] float32"""
         if camera_name in self.camera_names:
             return self.gains[self.camera_names.index(camera_name)]
         return np.ones(3, np.float32)

@@ -74,7 +74,7 @@ class ClipModel(nn.Module):
         field: Field of this clip; None while only static anchors exist.
         clip_length: M, the divisor of clip_time.
         n_frames: Frames of this clip.
-        backend: What decodes and draws the clip; anchors, decoder and field are moved to its device and dtype.
+        backend: It decodes and draws the clip; anchors, decoder and field are moved to its device and dtype.
         light: Log brightness of the reference clip's static anchors at the start and the end of this clip, hidden ones
             too; None where it is as in the reference clip. [A of the reference, 2]
         hidden: Rows of the reference clip's sets that this clip leaves out; the sets given are without them already.
@@ -98,7 +98,7 @@ class ClipModel(nn.Module):
         self.sets = nn.ModuleDict(sets)
         self.hidden = dict(hidden or {})
         self.light = light
-        self.reasons: dict[str, np.ndarray] = {}  # what the gate said of the anchors of a role, for display
+        self.reasons: dict[str, np.ndarray] = {}  # the gate's reasons for the anchors of a role, for display
         self.decoder = decoder
         self.clip_length, self.n_frames = clip_length, n_frames
         self._corners: dict[str, CornerTable] = {}
@@ -124,7 +124,7 @@ class ClipModel(nn.Module):
         self.sets[role] = anchors.to(self.backend.device, self.backend.dtype)
 
     def replace_sets(self, sets: dict[str, AnchorSet]) -> None:
-        """These sets take the place of all others; a field attached later covers them."""
+        """Replace all anchor sets by these; a field attached later covers them."""
         self.sets = nn.ModuleDict(sets).to(self.backend.device, self.backend.dtype)
         self._corners, self._frozen, self._lit, self.hidden = {}, {}, {}, {}
 
@@ -234,7 +234,7 @@ class ClipModel(nn.Module):
 
     @property
     def has_light(self) -> bool:
-        """Whether light on what stands still differs from the reference clip's somewhere."""
+        """Whether light on still parts differs from the reference clip's somewhere."""
         return self.light is not None
 
     def light_weights(self, clip_time: float) -> tuple[float, float]:
@@ -262,7 +262,7 @@ class ClipModel(nn.Module):
         return replace(gaussians, colors=gaussians.colors * factors[:, None])
 
     def _light_factors(self, clip_time: float) -> Tensor:
-        """Of the static anchors. [A]"""
+        """The brightness factors of the static anchors. [A]"""
         assert self.light is not None
         is_hidden, features = self.hidden.get(STATIC), self.anchor_set(STATIC).features
         light = (self.light if is_hidden is None else self.light[~is_hidden]).to(features.device, features.dtype)

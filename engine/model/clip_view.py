@@ -105,7 +105,7 @@ def render_gaussians(
     """Rasterize through one view; tensors of the rendering have a leading camera axis of 1.
 
     Args:
-        backend: What draws.
+        backend: The backend that draws.
         tile_mask: Tiles that are wanted, None for all. [rows, columns] bool
     """
     return rasterize(

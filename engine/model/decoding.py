@@ -50,7 +50,7 @@ def decode_anchors(
         decoder: Heads.
         field: Field of the clip; None only if no set has corners.
         knots: Frames of the clip and their weights, one or two, from `ClipModel.knots`.
-        backend: What decodes, from engine.backends.
+        backend: The backend that decodes, from engine.backends.
     Returns:
         K Gaussians per row, anchor-major, sets in order; rows of sets with `decoded` are frozen. Differentiable in
         features, log scales, heads and field wherever these require a gradient.

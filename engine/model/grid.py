@@ -87,7 +87,7 @@ def corner_table_reference(unit_positions: np.ndarray, cells: tuple[int, ...], n
 
 
 def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int) -> Tensor:
-    """What the entries of each knot and level are combined with by XOR, where all knots share a table.
+    """The keys combined with the entries of each knot and level by XOR, where all knots share a table.
 
     Knots of a level that fits the table n_knots times lie side by side; otherwise they are spread by the hash.
 

@@ -20,7 +20,7 @@ def join_frozen(frozen: Gaussians, rows: Tensor, learning: Gaussians, *, backend
         frozen: Any number.
         rows: Rows of `frozen`. [n] int64
         learning: Not frozen, or frozen in part.
-        backend: What joins, from engine.backends.
+        backend: The backend that joins, from engine.backends.
     Raises:
         ValueError: A row is out of range.
         TypeError: Rows are not int64 [n], or a column is not of the dtype and on the device that the back end needs.

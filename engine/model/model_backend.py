@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ModelBackend(Rasterizer, Protocol):
-    """What `decode_anchors` and `join_frozen` hand their checked arguments to, and what draws the result."""
+    """The receiver of the checked arguments of `decode_anchors` and `join_frozen`, which also draws the result."""
 
     def decode(
         self,

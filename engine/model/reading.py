@@ -1,4 +1,4 @@
-"""Clip models from stored states: what a clip has of its own, and what it inherits from the reference clip."""
+"""Clip models from stored states: a clip's own parts, and those inherited from the reference clip."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def load_clip_model(
 
     Args:
         state: The clip.
-        reference: What it inherits from; not used for a reference clip.
-        backend: What decodes and draws it.
+        reference: The clip it inherits from; not used for a reference clip.
+        backend: The backend that decodes and draws it.
         is_learning: Keep the clip's own parameters trainable. Otherwise nothing is, and what never changes over time
             is decoded only once.
     Raises:
@@ -133,7 +133,7 @@ def _read_light(state: ClipState, reference: ClipState) -> Tensor | None:
 
 
 def _reasons(state: ClipState, reference: ClipState | None, model: ClipModel) -> dict[str, np.ndarray]:
-    """What the gate said of each anchor, by role; the reference speaks where the clip itself was not asked."""
+    """The gate's reasons for each anchor, by role; those of the reference where the clip itself was not asked."""
     reasons: dict[str, np.ndarray] = {}
     for known in (reference, state) if reference is not None and not state.is_reference else (state,):
         reasons |= {role: record.reasons for role, record in known.anchors.items() if record.reasons is not None}

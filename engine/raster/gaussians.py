@@ -46,7 +46,7 @@ class Gaussians:
         return Gaussians(*(tensor.detach() for tensor in self.tensors()), is_frozen=self.is_frozen)
 
     def to(self, device: torch.device, dtype: torch.dtype) -> Gaussians:
-        """The same values elsewhere; frozen rows are not marked any more."""
+        """The same values elsewhere; frozen rows are no longer marked."""
         return Gaussians(*(tensor.to(device, dtype) for tensor in self.tensors()))
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""What counts as a Gaussian that can be drawn. Both back ends read these, so that they drop the same rows.
+"""The limits of a Gaussian that can be drawn. Both back ends read these, so that they drop the same rows.
 
 A row outside these limits is not drawn and gets a zero gradient; it never touches another row. NaN fails every one
 of the comparisons, so none of them needs a test of its own.

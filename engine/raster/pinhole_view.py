@@ -19,7 +19,7 @@ TILE_PX = 32
 _FLAT = 1e-9
 """A matrix whose determinant is below this share of what its size allows turns space into less than space."""
 _BOTTOM_ERROR = 1e-6
-"""What products and inverses in float32 may leave in the bottom row of a pose."""
+"""The error that products and inverses in float32 may leave in the bottom row of a pose."""
 
 
 def n_tiles(width: int, height: int) -> tuple[int, int]:

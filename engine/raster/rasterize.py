@@ -40,11 +40,11 @@ def rasterize(
     pass. Safe to call from several threads at once.
 
     Args:
-        gaussians: What to draw; all five tensors share one floating dtype and one device.
+        gaussians: The Gaussians to draw; all five tensors share one floating dtype and one device.
         viewmats: World to camera, OpenCV axes. [C, 4, 4]
         Ks: Pinhole intrinsics for `width` x `height`, no skew. [C, 3, 3]
         width, height: Image size, pixels.
-        backend: What draws, from engine.backends.
+        backend: The backend that draws, from engine.backends.
         background: Colour behind everything; black if None. [3]
         near_plane: Centres at or before this depth are dropped, scene units.
         tile_mask: Tiles of TILE_PX x TILE_PX pixels that are wanted; None for all. Pixels of others hold the background

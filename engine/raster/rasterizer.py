@@ -14,7 +14,7 @@ from engine.raster.tile_boxes import TileBoxes
 
 
 class Rasterizer(Protocol):
-    """What `rasterize` and `tile_boxes` hand their checked arguments to.
+    """The receiver of the checked arguments of `rasterize` and `tile_boxes`.
 
     Raises a TypeError that names the tensor where dtype or device are not those it can work with.
     """

@@ -42,7 +42,7 @@ class TileBoxes:
         return edges.cumsum(0).cumsum(1)[:-1, :-1] > 0
 
     def meeting(self, tile_mask: Tensor, rows: Tensor) -> Tensor:
-        """Those of `rows`, one a box, whose box holds a tile of the mask; in order.
+        """The entries of `rows`, one a box, whose box holds a tile of the mask; in order.
 
         Args:
             tile_mask: [rows, columns] bool

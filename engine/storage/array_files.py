@@ -50,7 +50,7 @@ def write_arrays(
     Args:
         path, is_durable: As of `engine.storage.files.atomic_path`.
         arrays: Any shapes; numbers or bool.
-        metadata: Texts beside them.
+        metadata: Texts next to them.
         what: Names the file in the message, as "The clip".
     Raises:
         DiskError: The disk refused; nothing is left behind.

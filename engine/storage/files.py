@@ -143,7 +143,7 @@ def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> It
 
 
 def disk_error(error: OSError, *, what: str, path: Path | str) -> DiskError:
-    """What to raise when a file could not be written."""
+    """The error to raise when a file could not be written."""
     is_full = error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
     hint = "Free some space and try again." if is_full else "Check the disk and the rights of the folder."
     return DiskError(f"{what} could not be written ({error.strerror or error}).", hint=hint, path=path)

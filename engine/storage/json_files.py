@@ -25,7 +25,7 @@ MAX_DIGITS = 40
 """Digits of a whole number; states of random number generators have 39."""
 CHECKSUM = "checksum"
 HAND_EDITED = f'If it was edited by hand, take out its entry "{CHECKSUM}"; otherwise restore it from a backup.'
-"""What to do about a checksum that does not fit."""
+"""The remedy for a checksum that does not fit."""
 _LARGE_EXPONENT = re.compile(rb"[eE]\+?\d{3}")
 _ALL_DIGITS_ZERO = bytes.maketrans(b"123456789", b"0" * 9)
 _BLOCK_BYTES = 1 << 20
@@ -187,7 +187,7 @@ def write_checked_json(
 
 
 def checked_text(document: dict[str, Any], *, is_for_people: bool = True) -> tuple[str, str]:
-    """What `write_checked_json` writes, and the checksum in it.
+    """The text that `write_checked_json` writes, and the checksum in it.
 
     Args:
         is_for_people: Over many lines, which takes several times as long.

@@ -44,7 +44,7 @@ def to_type(document: Any, kind: type[T]) -> T:
 
 
 def _said(text: str, document: Any) -> str:
-    """What msgspec found, with the entry first."""
+    """The fault that msgspec found, with the entry first."""
     found = _FOUND.match(text)
     assert found is not None  # every text matches
     what, place = found["what"], found["place"] or ""
@@ -65,7 +65,7 @@ def _wanted(expected: re.Match[str]) -> str:
 
 
 def _value_at(document: Any, place: str) -> Any:
-    """The value of an entry; where a key is not told, what holds it."""
+    """The value of an entry; where a key is not named, the value that holds it."""
     for step in _STEP.finditer(place):
         if step["index"] == "...":
             break

@@ -16,7 +16,7 @@ def present_offsets(capture: Capture) -> np.ndarray:
     """Offsets that a capture was opened with, in frames. [C] float64
 
     Raises:
-        CaptureError: Its capture.json cannot be read any more.
+        CaptureError: Its capture.json can no longer be read.
     """
     present = dict.fromkeys(capture.rig.names, 0.0)
     if (capture.path / capture_json.FILE).is_file():
@@ -31,7 +31,7 @@ def corrections_for(capture: Capture, found: Synchronisation) -> Corrections:
 
     Args:
         capture: As it was when they were measured.
-        found: What was measured on it.
+        found: The offsets measured on it.
     """
     known = np.array([camera.source is not None for camera in found.cameras])
     present = present_offsets(capture)

@@ -29,7 +29,7 @@ SIGMA_S = 0.002
 SOUND_PATH_S = 0.004
 """How uncertain offsets are by the way of the sound, which nobody measures: a metre and a half."""
 PARTNERS = 5
-"""Cameras that each one is compared with, beside those that are compared with it."""
+"""Cameras that each one is compared with, apart from those that are compared with it."""
 
 
 def audio_estimate(

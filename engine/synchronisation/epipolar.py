@@ -14,9 +14,9 @@ from engine.synchronisation.motion_pictures import MotionPictures
 
 BLUR_BINS = 1.0
 POWER = 0.25
-"""Profiles are compared as this power of the motion in a plane: that something moves there tells more than how much."""
+"""Profiles are compared as this power of the motion in a plane: that something moves there says more than how much."""
 MAX_PAIRS_PER_CAMERA = 12
-"""Pairs of cameras that look the same way see the same side of what moves and tell most; some far ones close loops."""
+"""Pairs of cameras that look the same way see the same side of what moves and say most; some far ones close loops."""
 FAR_SHARE = 0.25
 
 
@@ -46,7 +46,7 @@ def epipolar_curves(
     """The agreement of pairs for every offset between them.
 
     Args:
-        motions: What moves in each camera, evenly in time.
+        motions: The motion in each camera, evenly in time.
         starts_frames: Frame of the camera at which its motion begins.
         rig: Cameras at any size of the same shape as the pictures.
         max_lag: Shift up to which signals are compared.

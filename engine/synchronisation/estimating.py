@@ -1,7 +1,7 @@
 """estimate_offsets: asks every source in turn and puts their answers together.
 
-Tags and sound come first: they tell how far apart cameras are at all. Then pictures are compared around the same
-moment, as far as that is known, which tells parts of a frame.
+Tags and sound come first: they show how far apart cameras are at all. Then pictures are compared around the same
+moment, as far as that is known, which gives parts of a frame.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from engine.synchronisation.tags import tag_estimates
 MAX_FRAMES = 150
 """Pictures of each camera that are compared, from the middle of what all recorded."""
 MIN_FRAMES = 16
-"""Fewer successive pictures tell nothing."""
+"""Fewer successive pictures are not enough."""
 EPIPOLAR_SIGMA_FRAMES, MOTION_SIGMA_FRAMES = 0.06, 0.9
-"""What is uncertain beside the scatter of pairs: views differ, and those of neighbours in the same way."""
+"""The uncertainty apart from the scatter of pairs: views differ, and those of neighbours in the same way."""
 
 
 def synchronise(capture: Capture, *, report: ReportProgress = lambda progress: None) -> Synchronisation:
@@ -91,7 +91,7 @@ def estimate_offsets(
 def _look(
     recordings: Sequence[Recording], fps: float, rough_frames: np.ndarray, report: ReportProgress
 ) -> tuple[list[MotionPictures] | None, list[float]]:
-    """What moves around the same moment in each camera, and the frame, by `fps`, where each of them begins. None where
+    """The motion around the same moment in each camera, and the frame, by `fps`, where each of them begins. None where
     there are too few frames."""
     lengths = np.array([recording.times_s[-1] * fps for recording in recordings])
     first, last = float((-rough_frames).max()), float((lengths - rough_frames).min())

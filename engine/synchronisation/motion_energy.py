@@ -14,7 +14,7 @@ from engine.synchronisation.correlating import PairCurve, correlate, overlaps
 from engine.synchronisation.motion_pictures import MotionPictures
 
 SLOW_S = 1.0
-"""What changes more slowly than in this time depends on the view more than on the event."""
+"""Changes slower than this depend on the view more than on the event."""
 
 
 def motion_curves(
@@ -34,7 +34,7 @@ def motion_curves(
 
 
 def _signal(motion: MotionPictures, fps: float) -> np.ndarray:
-    """What is compared: how much changes, how much is there, and how high in the picture, without slow parts. [T, 3]"""
+    """To compare: how much changes, how much is there, and how high in the picture, without slow parts. [T, 3]"""
     width, height = motion.size
     rows = np.repeat(np.arange(height), width)
     changes, presence = (np.asarray(part.sum(axis=1)).ravel() for part in (motion.changes, motion.presence))

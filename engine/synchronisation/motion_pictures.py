@@ -1,4 +1,4 @@
-"""What moves in the pictures of one camera: how much each pixel changes, and how much it differs from what is usual.
+"""The motion in the pictures of one camera: how much each pixel changes, and how much it differs from what is usual.
 
 Small pictures, read once and kept as sparse matrices: of a thousand pixels some ten move.
 """
@@ -31,7 +31,7 @@ MIN_LEVEL = 10.0
 
 @dataclass(frozen=True, eq=False)
 class MotionPictures:
-    """What moves in one camera, over successive frames.
+    """The motion in one camera, over successive frames.
 
     Attributes:
         changes: Difference from the frame before, 0..1 per pixel; the first row is the second one
@@ -88,7 +88,7 @@ def _weights(frame: np.ndarray, reference: np.ndarray) -> sparse.csr_matrix:
 
 
 def evenly(motion: MotionPictures, fps: float) -> tuple[MotionPictures, float]:
-    """The same at even times, mixed from the two frames beside each; and the first of them, in frames of that rate.
+    """The same at even times, mixed from the two frames next to each; and the first of them, in frames of that rate.
 
     Args:
         motion: At times that may be uneven, or at another rate.

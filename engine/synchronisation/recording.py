@@ -23,7 +23,7 @@ class Recording:
     """One camera.
 
     Attributes:
-        name: What it is called.
+        name: Its name.
         source: Its pictures; undistorted and of the size of the rig where a rig is given along with it.
         times_s: When each picture is shown, in seconds from the first. [T] float64
         video: The file with sound and tags; None for images.
@@ -96,7 +96,7 @@ def recordings_in_videos(videos: Sequence[Path], names: Sequence[str] | None = N
 
 
 def _check_times(times_s: np.ndarray, path: Path) -> None:
-    """Raise CaptureError where times tell no rate that a camera has."""
+    """Raise CaptureError where times give no rate that a camera has."""
     if len(times_s) < 2:
         raise CaptureError(
             "The video has 1 frame, so there is nothing to compare.", hint="Remove it from the folder.", path=path

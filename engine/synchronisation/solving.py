@@ -1,4 +1,4 @@
-"""From comparisons of pairs of cameras to one offset per camera: pairs err, loops of pairs tell which ones.
+"""From comparisons of pairs of cameras to one offset per camera: pairs err, loops of pairs show which ones.
 
 First whole frames: the offsets under which the curves of all pairs are highest together. Then parts of a frame: the
 top of each curve nearby is a measurement, and a robust fit over all of them gives offsets and their uncertainty.
@@ -157,7 +157,7 @@ def _climb(n_cameras: int, curves: list[PairCurve], groups: np.ndarray) -> np.nd
 
 
 def _top_near(curve: PairCurve, expected: float) -> PairOffset | None:
-    """What a pair says: the top of its curve near the expected offset if that is about the highest; else the highest,
+    """A pair's offset: the top of its curve near the expected offset if that is about the highest; else the highest,
     which is then an error of this pair."""
     near = np.flatnonzero(np.abs(curve.offsets_frames - expected) <= NEAR_FRAMES)
     inner = near[(near > 0) & (near < len(curve.scores) - 1)]
@@ -213,7 +213,7 @@ def _weighted(system: np.ndarray, measured: np.ndarray, weights: np.ndarray) -> 
 
 
 def _scale(errors: np.ndarray, n_spare: int) -> float:
-    """By how much errors are larger than the pairs' own uncertainty; 1 where too few loops could tell."""
+    """By how much errors are larger than the pairs' own uncertainty; 1 where loops are too few."""
     if n_spare < 2:
         return 1.0
     usual = 1.4826 * float(np.median(np.abs(errors))) * np.sqrt(len(errors) / n_spare)

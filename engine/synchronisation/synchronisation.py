@@ -1,4 +1,4 @@
-"""What was found out about the time offsets of cameras: by which source, how certain, and where sources disagree."""
+"""The findings about the time offsets of cameras: by which source, how certain, and where sources disagree."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PairOffset:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What one source says.
+    """The result of one source.
 
     Attributes:
         source: Which one.
@@ -85,7 +85,7 @@ class CameraOffset:
 
     @property
     def is_in_step(self) -> bool:
-        """Whether the camera needs no shift, as far as can be told."""
+        """Whether the camera needs no shift, as far as is known."""
         return self.source is not None and abs(self.offset_frames) <= IN_STEP_FRAMES
 
     @property

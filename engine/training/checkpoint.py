@@ -23,16 +23,16 @@ _REACH = "resume.reach."
 
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
-    """What a checkpoint file holds. A value.
+    """The content of a checkpoint file. A value.
 
     Attributes:
-        state: The clip, with the optimiser's arrays beside its own.
+        state: The clip, with the optimiser's arrays next to its own.
         gains: Of the training cameras, learned so far. [C, 3] float32
         backgrounds: Of the training cameras.
         place: Where the training stands.
         reaches: How far Gaussians of each anchor were expected when the phase began, scene units, by role; none in
             checkpoints of earlier versions. [A] float32 each
-        cameras: What their poses and focal lengths have learned; None where these do not learn. [C, 7] float32
+        cameras: The learned corrections of their poses and focal lengths; None where these do not learn. [C, 7] float32
     """
 
     state: ClipState
@@ -105,6 +105,6 @@ def read_checkpoint(
 
 
 def damaged_checkpoint(error: Exception, path: Path | str) -> ProjectError:
-    """What to raise when the content of a checkpoint cannot be used."""
+    """The error to raise when the content of a checkpoint cannot be used."""
     reason = f"no entry {error}" if isinstance(error, KeyError) else str(error)
     return ProjectError(f"The checkpoint is damaged or does not fit its clip ({reason}).", path=path)

@@ -62,7 +62,7 @@ class ClipTraining:
         clip: Frames to train on.
         config: All numbers.
         method: All decisions.
-        backend: What it is computed with.
+        backend: The backend it is computed with.
         holdout: Camera indices never looked at in training.
         reference: Finished reference clip for a source clip, None to train the reference clip itself, or a clip that
             shares nothing.
@@ -252,7 +252,7 @@ class ClipTraining:
         n_done = len(stats.losses)
         self.steps_done += n_done
         if stats.fault is not None:
-            if n_done + 1 < len(items):  # what was drawn for the steps behind is drawn again
+            if n_done + 1 < len(items):  # the items drawn for the steps behind are drawn again
                 self._order.restore(order)
                 items = [self._items[self._order.draw()] for _ in range(n_done + 1)]
             where = f"step {self.steps_done + 1}, camera {self.rig.names[self.place(items[n_done])[0]]}"
@@ -397,8 +397,8 @@ class ClipTraining:
 
         Args:
             state: The clip, based on the same reference.
-            pictures: What is compared with, in the exposure of the reference clip; their truth may be any picture.
-            items: What is drawn in a pass: camera row * frames of the clip + frame in the clip.
+            pictures: To compare with, in the exposure of the reference clip; their truth may be any picture.
+            items: The items drawn in a pass: camera row * frames of the clip + frame in the clip.
             n_steps: How many steps.
             learning: How the names of what learns begin, as the model names its parameters.
         Raises:
@@ -458,7 +458,7 @@ class ClipTraining:
         self.pictures = self._preparation.read_pictures()
         try:
             self._go_on(kept)
-        except ProjectError as error:  # what was rebuilt knows no file
+        except ProjectError as error:  # a rebuilt state knows no file
             raise ProjectError(error.message, hint=error.hint, path=error.path or path) from error
         except (
             ArithmeticError,
@@ -524,5 +524,5 @@ def _training_cameras(capture: Capture, holdout: Sequence[int], base: ClipState 
 
 
 def _reasons_in(state: ClipState) -> dict[str, np.ndarray]:
-    """What the gate said, by role, as a clip stores it."""
+    """The gate's reasons, by role, as a clip stores them."""
     return {role: record.reasons for role, record in state.anchors.items() if record.reasons is not None}

@@ -32,7 +32,7 @@ def key_points(pictures: CameraPictures, name: str, advance: Callable[[float], N
     Args:
         pictures: Of one camera.
         name: Of the camera, for messages.
-        advance: Told several times a second the share that was done since it was last told, which is a guess.
+        advance: Called several times a second with the share done since its last call, which is a guess.
     Raises:
         PreparationError: The process gave no result.
         DiskError: There is no room for what it reads.

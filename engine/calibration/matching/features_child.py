@@ -1,7 +1,7 @@
 """The process that looks for the key points of one camera.
 
 pycolmap keeps the interpreter to itself for the seconds that one picture takes: in one process cameras would wait for
-each other, and nothing could be told meanwhile. Never imported by the program.
+each other, and nothing could be reported meanwhile. Never imported by the program.
 """
 
 from __future__ import annotations

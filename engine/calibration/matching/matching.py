@@ -53,7 +53,7 @@ def match_all(key_points: list[KeyPoints], advance: Callable[[float], None] = la
 
     Args:
         key_points: Of all cameras.
-        advance: Told 1 by any thread whenever a pair is done.
+        advance: Called with 1 by any thread whenever a pair is done.
     """
 
     def one(pair: Pair) -> np.ndarray:

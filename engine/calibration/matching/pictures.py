@@ -1,4 +1,4 @@
-"""What of each video is matched: the scene without what moves, and some moments for what moves."""
+"""The pictures of each video to match: the scene without moving parts, and some moments for these."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MIN_MOVING_PIXELS = 150
 
 @dataclass(frozen=True, slots=True)
 class MovingPart:
-    """What moves in one picture.
+    """The moving pixels of one picture.
 
     Attributes:
         moment: Its number, from 1.
@@ -42,7 +42,7 @@ class MovingPart:
 
 @dataclass(frozen=True, slots=True)
 class CameraPictures:
-    """What one camera is matched by: background [H, W, 3] uint8, and what moves in some moments."""
+    """The pictures one camera is matched by: background [H, W, 3] uint8, and moving parts in some moments."""
 
     background: np.ndarray
     moving: tuple[MovingPart, ...]
@@ -68,7 +68,7 @@ def read_pictures(
         video: The camera.
         n_frames: Frames that all cameras have; moments are chosen from these, the same for each.
         n_moments: 0 takes backgrounds only.
-        advance: Told the share that was done since it was last told.
+        advance: Called with the share done since its last call.
     Raises:
         CaptureError: Frames cannot be decoded.
     """

@@ -63,7 +63,7 @@ class Observations:
         return len(self.cameras)
 
     def chosen(self, is_kept: np.ndarray) -> Observations:
-        """Those of a mask, points numbered as before."""
+        """The sightings of a mask, points numbered as before."""
         return Observations(self.cameras[is_kept], self.points[is_kept], self.pixels[is_kept])
 
 
@@ -91,7 +91,7 @@ def adjust(
         points: The start. [M, 3]
         seen: Every point is seen at least twice.
         middles, widths: Of the pictures, px. [C, 2], [C]
-        expect: What is expected of lenses.
+        expect: Expectations about the lenses.
         focals: Focal lengths that are expected, px; None expects those of the start. [C]
     Returns:
         Cameras and points [M, 3].
@@ -237,7 +237,7 @@ class _System:
         self._g += (stiffness * expected).reshape(-1)
 
     def step(self, damping: float) -> tuple[np.ndarray, np.ndarray]:
-        """What to take from the numbers of the cameras [C P] and from the points [M, 3]."""
+        """The step to subtract from the numbers of the cameras [C P] and from the points [M, 3]."""
         diagonal = np.maximum(np.einsum("mii->mi", self._V), 1e-9)
         inverse = np.linalg.inv(self._V + damping * diagonal[:, :, None] * np.eye(3))
         blocks = (inverse, np.arange(len(inverse)), np.arange(len(inverse) + 1))

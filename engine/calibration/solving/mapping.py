@@ -109,7 +109,7 @@ def map_cameras(
         focal: Per longer side of the picture.
         are_alike: Hold on to this focal length; otherwise every camera's own is sought from there.
         seed: Of all that is tried at random.
-        progress: Told the share of the cameras that has been placed.
+        progress: Called with the share of the cameras that has been placed.
     """
     import pycolmap
 

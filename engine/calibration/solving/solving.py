@@ -82,7 +82,7 @@ def solve(
         sizes: Of all pictures. [C, 2]
         lens, is_shared: Of CalibrationOptions.
         stages: ROUGH or FINE.
-        progress: Told the share that is done.
+        progress: Called with the share that is done.
     """
     rows, cameras = estimate.rows, estimate.cameras
     chosen = [key_points[row] for row in rows]

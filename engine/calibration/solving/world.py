@@ -22,7 +22,7 @@ def find_up(cameras: Cameras, points: np.ndarray, way: str) -> tuple[np.ndarray,
 
     Args:
         cameras: Any scale and axes.
-        points: What they see. [P, 3]
+        points: The points they see. [P, 3]
         way: "floor" or "cameras"; a floor that cannot be found is replaced by the cameras.
     """
     upper = -cameras.rotations[:, 1]  # the direction of each picture's upper edge

@@ -111,11 +111,11 @@ def match_names(names: Sequence[str], candidates: Sequence[str]) -> dict[str, st
 
 
 def missing_frames(names: Sequence[str], found: CameraFrames, path: Path) -> list[CaptureError]:
-    """One problem that names all cameras for which there is nothing, beside the problems of single ones.
+    """One problem that names all cameras for which there is nothing, and the problems of single ones.
 
     Args:
         names: Of all cameras.
-        found: What there is.
+        found: The files found.
         path: The file with the cameras.
     """
     problems = list(found.problems.values())

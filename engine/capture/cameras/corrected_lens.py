@@ -11,12 +11,12 @@ from engine.errors import CaptureError
 
 MAX_ERROR_PX = 0.5
 """How far the two models may be apart anywhere in the picture: 0.0001 px where both have one centre, some tenths where
-the centre of the correction lies 20 px beside the principal point."""
+the centre of the correction lies 20 px off the principal point."""
 _ACROSS = 33
 """Samples of the picture along each side."""
 _ROUNDS = 6
 _RADIAL, _RATIONAL, _OTHERS = (0, 1, 4), (5, 6, 7), (2, 3, 8, 9, 10, 11)
-"""Which parameters of OpenCV's model are k1 to k3, k4 to k6, and those that stand beside the fraction."""
+"""Which parameters of OpenCV's model are k1 to k3, k4 to k6, and those that stand next to the fraction."""
 
 
 def lens_of_correction(

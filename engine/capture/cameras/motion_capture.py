@@ -1,4 +1,4 @@
-"""What the readers of motion capture systems share: where their XML lies, numbers in it, cameras without a video."""
+"""Shared by the readers of motion capture systems: where their XML lies, numbers in it, cameras without a video."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ Value = str | list[str] | np.ndarray
 
 _ITEM = re.compile(r" *-(?: +(?P<rest>.*))?$")
 _INDICATORS = frozenset("-&*!|>{}[]%@`")
-"""What begins something else than a plain text."""
+"""Characters that begin something other than plain text."""
 _ODD_NUMBERS = {".nan": "nan", ".inf": "inf", "-.inf": "-inf", "+.inf": "inf"}
 
 

@@ -1,4 +1,4 @@
-"""What is odd about the cameras of a capture taken together: where they stand and where they look. Numbers only."""
+"""Oddities of a capture's cameras taken together: where they stand and where they look. Numbers only."""
 
 from __future__ import annotations
 

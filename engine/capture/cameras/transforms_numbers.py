@@ -52,7 +52,7 @@ def K_of(values: Mapping[str, Any], size: tuple[int, int], path: Path) -> np.nda
 
 
 def _focal(angle: float, side: int) -> float:
-    """Pixels, of a view of so many radians; NaN of an angle that is none, which check_K then tells."""
+    """Pixels, of a view of so many radians; NaN of an angle that is none, which check_K then reports."""
     return side / 2 / math.tan(angle / 2) if 0 < angle < math.pi else math.nan
 
 
@@ -89,7 +89,7 @@ def world_to_camera_of(camera_to_world: np.ndarray, path: Path) -> np.ndarray:
     pose = camera_to_world @ FLIP
     rotation = pose[:3, :3]
     inverse = np.eye(4)
-    inverse[:3, :3] = rotation.T  # check_pose tells when it is not a rotation
+    inverse[:3, :3] = rotation.T  # check_pose reports when it is not a rotation
     with np.errstate(over="ignore", invalid="ignore"):
         inverse[:3, 3] = -rotation.T @ pose[:3, 3]
     return inverse

@@ -1,1 +1,1 @@
-"""What COLMAP writes: cameras, images and points of a sparse model, as binary files or as text."""
+"""COLMAP's output: cameras, images and points of a sparse model, as binary files or as text."""

@@ -67,7 +67,7 @@ def read_rig(model_folder: Path) -> ModelRig:
     """The cameras of the model in a folder.
 
     Raises:
-        CaptureError: The files are missing or damaged. What concerns single cameras is among `problems`.
+        CaptureError: The files are missing or damaged. Faults of single cameras are among `problems`.
     """
     model = read_model(model_folder)
     rig = ModelRig(model.images_file)

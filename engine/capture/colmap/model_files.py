@@ -1,8 +1,8 @@
 """Cameras and images of a sparse model, read strictly from binary files or text. Nothing of COLMAP is needed for it.
 
 Binary files are little endian: a count, then records one after the other. What is not needed, as the features of the
-images, is skipped in the file and never loaded. Files that newer versions write beside these (rigs, frames) repeat
-what is here.
+images, is skipped in the file and never loaded. Files that newer versions add (rigs, frames) repeat
+the data here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What lies in a folder that could not be opened as a capture, in the words of the message that says so."""
+"""The contents of a folder that could not be opened as a capture, in the words of the message that says so."""
 
 from __future__ import annotations
 

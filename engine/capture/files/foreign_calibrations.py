@@ -26,7 +26,7 @@ _KINDS = (
 
 
 def foreign_calibrations(folder: Path) -> list[tuple[str, str]]:
-    """What was seen, as "calibration/Calib.qca.txt looks like a calibration of Qualisys", and what to do about it.
+    """The finding, as "calibration/Calib.qca.txt looks like a calibration of Qualisys", and the remedy.
 
     Looks at names only, in the folder and those in it. At most one of each kind.
 

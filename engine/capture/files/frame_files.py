@@ -135,7 +135,7 @@ def check_one_kind(names: Sequence[str], folder: Path) -> None:
 
 
 def plain_name(name: str) -> str:
-    """What is the same for names that people would call the same, as cam1 and Cam_001."""
+    """A key that is the same for names that people would call the same, as cam1 and Cam_001."""
     return _ZEROS.sub("", _SEPARATORS.sub("", name).casefold())
 
 

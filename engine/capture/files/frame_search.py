@@ -15,7 +15,7 @@ from engine.text import shown
 
 
 class FrameSearch:
-    """What lies in the folders where a layout keeps its frames, listed once for all cameras.
+    """The contents of the folders where a layout keeps its frames, listed once for all cameras.
 
     Args:
         folder: The capture folder.

@@ -1,6 +1,6 @@
-"""What the headers of images and videos say. No pixel is decoded; nothing but regular files is opened.
+"""The facts in the headers of images and videos. No pixel is decoded; nothing but regular files is opened.
 
-Libraries that decode are told which kinds of files they may take for granted: others can name further files, or start
+Decoding libraries are given the kinds of files that they may open: other kinds can name further files, or start
 programs, when they are opened.
 """
 
@@ -34,16 +34,16 @@ IMAGE_FAULTS = (
     *(OSError, SyntaxError, ValueError, TypeError, EOFError, LookupError, ArithmeticError, struct.error, zlib.error),
     *(Image.DecompressionBombError, Image.DecompressionBombWarning, MemoryError),
 )
-"""What Pillow raises for damaged images."""
+"""Pillow's errors for damaged images."""
 VIDEO_FAULTS = (av.error.FFmpegError, UnicodeError, ArithmeticError, MemoryError)
-"""What PyAV raises for damaged videos. Beside these a kind of ValueError for a file without streams."""
+"""PyAV's errors for damaged videos. It also raises a kind of ValueError for a file without streams."""
 _ORIENTATION = 0x0112
 """The EXIF entry that says how to turn a picture for display; 1 is upright."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImageHeader:
-    """What an image file says of itself.
+    """The facts in an image file's header.
 
     Attributes:
         size: Width and height as stored.
@@ -91,7 +91,7 @@ def read_image_header(path: Path) -> ImageHeader:
 
 
 def unreadable(error: OSError, what: str, path: Path) -> CaptureError:
-    """What to raise when the system refuses a file of a capture. what: "The image"."""
+    """The error to raise when the system refuses a file of a capture. what: "The image"."""
     if isinstance(error, FileNotFoundError):
         return CaptureError(f"{what} is missing.", hint="Put the file back or export it again.", path=path)
     return CaptureError(
@@ -143,7 +143,7 @@ def set_pixel_limit(stream: Any) -> None:
 
 @dataclass(frozen=True, slots=True)
 class VideoHeader:
-    """What the container of a video says.
+    """The facts in a video's container.
 
     Attributes:
         n_frames: Frames shown.

@@ -22,7 +22,7 @@ _POSE2SIM = re.compile(r"(?:int|ext)_(.+?)_(?:img|images)|(?:int|ext)_(.+)", re.
 
 
 def folder_names(name: str) -> list[str]:
-    """What a camera may be called besides, as Pose2Sim names it after its folder: cam1 of "int_cam1_img"."""
+    """A camera's other name, as Pose2Sim names it after its folder: cam1 of "int_cam1_img"."""
     found = _POSE2SIM.fullmatch(name)
     return [] if found is None else [found[1] or found[2]]
 
@@ -87,7 +87,7 @@ def _pairs(names: Sequence[str], plain: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _around(stem: str, name: str) -> list[tuple[str, str]]:
-    """What stands before and behind a name in a text, once for each place where the text has it."""
+    """The parts of a text before and after a name, once for each place where the text has it."""
     places = [at for at in range(len(stem) - len(name) + 1) if stem.startswith(name, at)]
     return [(stem[:at], stem[at + len(name) :]) for at in places]
 

@@ -121,7 +121,7 @@ def _stereo(samples: np.ndarray, *, is_mono: bool) -> np.ndarray:
 
 
 def _from_start(samples: np.ndarray, at: int) -> Iterator[np.ndarray]:
-    """What of the samples lies at or after 0, where the first of them lies at `at`."""
+    """The samples at or after 0, where the first of them lies at `at`."""
     kept = samples[max(-at, 0) :]
     if len(kept):
         yield kept

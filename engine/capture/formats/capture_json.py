@@ -99,7 +99,7 @@ class CaptureDocument:
         points: A .ply, or a file of another layout's points, in the world that `world_to_camera` is written in.
         points_to_world: Brings the points into that world, where they are in another one. 4x4
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to.
-        fit: What became of frames of another shape than `width` and `height` of their camera.
+        fit: The fit of frames of another shape than `width` and `height` of their camera.
         world_scale: All distances are multiplied by it.
         up: Direction in the world that is up; the world is turned so that it becomes +z.
     """

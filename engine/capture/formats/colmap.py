@@ -1,4 +1,4 @@
-"""A rig calibrated with COLMAP: a sparse model, and beside it a video, a folder of images or one image per camera.
+"""A rig calibrated with COLMAP: a sparse model, and next to it a video, a folder of images or one image per camera.
 
 The model lies in sparse/0, sparse or colmap/sparse/0, as binary files or text. Cameras and frames belong together by
 name: "cam00.jpg", "cam00/000000.jpg" and "images/cam00.png" are all of camera cam00.
@@ -22,7 +22,7 @@ FORMAT = "colmap"
 LAYOUT = "a COLMAP model in sparse/0 with a video, a folder of images or an image per camera"
 """The layout in words."""
 POINTS = ("points3D.bin", "points3D.txt", "points3D.ply")
-"""Point clouds beside a model, best first."""
+"""Point clouds next to a model, best first."""
 
 
 def probe(folder: Path) -> Probe:
@@ -73,7 +73,7 @@ def layout_of(
     """A layout from the cameras of a model and their frames; those without frames are left out.
 
     Args:
-        other_points: Names of point clouds relative to the capture's folder, better than those beside the model.
+        other_points: Names of point clouds relative to the capture's folder, better than those next to the model.
     Raises:
         CaptureError: Listing every problem found.
     """

@@ -42,7 +42,7 @@ POINTS = (
     "downsampled_points_50.ply",
     "downsampled_points_10.ply",
 )
-"""Clouds that other programs put beside the poses, in their world."""
+"""Clouds that other programs put next to the poses, in their world."""
 MAX_FILE_BYTES = 1 << 24
 IMAGES = "images"
 """Of captures of a single moment, as of LLFF: one image per camera."""
@@ -117,7 +117,7 @@ def _rows(path: Path) -> np.ndarray:
 
 
 def _candidates(folder: Path) -> dict[str, list[str]]:
-    """What may be the cameras, by kind: videos, folders of frames, single images; relative names in natural order."""
+    """Possible cameras, by kind: videos, folders of frames, single images; relative names in natural order."""
     folders = [name for name in folders_in(folder) if any(sign.isdigit() for sign in name)]
     return {
         "video": listed(folder, VIDEO_SUFFIXES),
@@ -163,7 +163,7 @@ def _described(name: str, row: np.ndarray, files: Files, path: Path) -> Describe
 
 
 def _other_count(n_rows: int, candidates: dict[str, list[str]], path: Path) -> CaptureError:
-    """What to say where nothing has as many cameras as there are rows: how many there are, and which are missing."""
+    """The error where nothing has as many cameras as there are rows: how many there are, and which are missing."""
     words = {"video": "videos", "folder": "folders of frames", "image": "images in images/"}
     there = [f"{len(names)} {words[kind]}" for kind, names in candidates.items() if names]
     fullest = max(candidates.values(), key=len)

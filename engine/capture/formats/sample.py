@@ -50,7 +50,7 @@ RATE_TOLERANCE = 0.01
 
 @dataclass(slots=True)
 class _Reading:
-    """What reading has found so far.
+    """The findings of reading so far.
 
     Attributes:
         headers: Of the videos that could be opened, by camera.

@@ -51,7 +51,7 @@ FORMATS = (
 
 
 def read_layout(folder: Path, *, follow_links: bool) -> Layout:
-    """What the first reader that knows the folder's layout makes of it.
+    """The result of the first reader that knows the folder's layout.
 
     Raises:
         CaptureError: No reader knows it, or the one that does finds problems.
@@ -71,7 +71,7 @@ def read_layout(folder: Path, *, follow_links: bool) -> Layout:
 
 
 def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
-    """What was seen in the folder, what can be read, and what to do."""
+    """The error with the folder's contents, the layouts that can be read, and the remedy."""
     with os.scandir(folder) as entries:
         inside = sorted(entry.name for entry in islice(entries, MAX_LOOKED_AT) if _is_capture(entry))
     close = [probe for probe in probes if probe.seen]

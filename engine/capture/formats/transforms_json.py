@@ -39,10 +39,10 @@ VALUES = (
     *("fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2"),
     *("camera_angle_x", "camera_angle_y", "camera_model", "is_fisheye"),
 )
-"""What may stand at the top or with a picture."""
+"""Keys that may stand at the top or with a picture."""
 HINT = "docs/layouts/transforms_json.md describes the file."
 MAX_PROBLEMS = 50
-"""Pictures whose faults are told."""
+"""Limit of the pictures whose faults are reported."""
 
 
 def probe(folder: Path) -> Probe:

@@ -1,1 +1,1 @@
-"""What readers of formats return, and the checks that they share."""
+"""The results that readers of formats return, and the checks that they share."""

@@ -68,9 +68,9 @@ def assemble(
         default_holdout: Names of cameras that the capture sets aside; unknown ones are a problem.
         points, points_to_world: See `Layout`.
         fisheye_fov_deg: See `Layout`.
-        fit: What became of frames that have another shape than their calibration; None where nothing says so.
-        problems: What the reader found already; they are reported with the others.
-        warnings: What the reader found odd but usable.
+        fit: The fit of frames that have another shape than their calibration; None where nothing says so.
+        problems: Problems the reader found already; they are reported with the others.
+        warnings: The reader's warnings: odd but usable.
         said_in: The file that the cameras come from, for messages.
     Raises:
         CaptureError: Listing every problem found.

@@ -11,13 +11,13 @@ T = TypeVar("T")
 
 
 class Findings:
-    """Problems so far. Readers go on after one and hand all of them to `assemble`."""
+    """Problems so far. Readers continue after one and hand all of them to `assemble`."""
 
     def __init__(self) -> None:
         self.problems: list[CaptureError] = []
 
     def tried(self, make: Callable[[], T], *, camera: str | None = None) -> T | None:
-        """What `make` gives; where it raises a CaptureError, that is kept and the result is None.
+        """The result of `make`; where it raises a CaptureError, that is kept and the result is None.
 
         Args:
             make: Reads one thing.

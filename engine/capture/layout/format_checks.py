@@ -147,7 +147,7 @@ def parse_size(width: object, height: object) -> tuple[int, int] | None:
 
 
 def size_problem(text: str, width: object, height: object, path: Path) -> CaptureError:
-    """What to say where `parse_size` gives None. text: what has them, such as "w and h are"."""
+    """The error to raise where `parse_size` gives None. text: its subject and verb, such as "w and h are"."""
     return CaptureError(
         f"{text} {shown(width)} and {shown(height)}.",
         hint=f"Give whole numbers from 1 to {MAX_SIDE:,}, at most {MAX_PIXELS:,} pixels.",

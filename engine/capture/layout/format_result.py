@@ -1,4 +1,4 @@
-"""What a format reader returns: cameras with their calibration and frame source. No pixels, no policy."""
+"""The result of a format reader: cameras with their calibration and frame source. No pixels, no policy."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from engine.capture.pixels.undistortion import undistorted_K
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """What a reader makes of a folder at a glance.
+    """A reader's first look at a folder.
 
     Attributes:
         is_match: Whether `read` is worth calling.
-        seen: What of the layout is there, as "poses_bounds.npy"; empty where nothing of it was recognised.
+        seen: The part of the layout that is there, as "poses_bounds.npy"; empty where nothing of it was recognised.
         lacks: Why that is not enough, as a part of a sentence: "no cameras.json".
-        hint: What to do about it; empty where nothing was recognised.
+        hint: The remedy; empty where nothing was recognised.
     """
 
     is_match: bool
@@ -47,7 +47,7 @@ class CameraEntry:
         lens: How its lens bends rays.
         masks: Where masks of what moves come from, one per frame, bright where something moves; None without.
         color_matrix: Applied to display-encoded RGB, new = matrix @ old; None leaves colours as they are. [3, 3]
-        calibrated: What K was made of, where the calibration is for another size; None where it is for this one.
+        calibrated: The original K and size, where the calibration is for another size; None where it is for this one.
     """
 
     name: str
@@ -80,7 +80,7 @@ class Layout:
         points: File with a point cloud that came along; None without.
         points_to_world: Brings its points into the world of the cameras; None where they are in it. [4, 4]
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to; None takes the usual one.
-        fit: What the user said of frames of another shape than their calibration; None where that is not known.
+        fit: The user's fit for frames of another shape than their calibration; None where that is not known.
     """
 
     format: str

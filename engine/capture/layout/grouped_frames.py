@@ -27,7 +27,7 @@ class ListedFrame:
     Attributes:
         file: As the table names it.
         camera_to_world: As the table has it. [4, 4]
-        values: What else it says of the camera; must be the same in all pictures of one camera.
+        values: Its other values of the camera; must be the same in all pictures of one camera.
         time: When it was taken, in any unit; None where nothing says so.
         mask: File of its mask, or None.
         table: The file that lists it, among several.
@@ -53,7 +53,7 @@ def grouped(frames: Sequence[ListedFrame]) -> list[FrameGroup]:
     """Cameras with their pictures in the order of time, or of names; cameras in natural order of theirs."""
     by_pose: dict[bytes, FrameGroup] = {}
     for frame in frames:
-        with np.errstate(over="ignore", invalid="ignore"):  # what is not a pose is refused later
+        with np.errstate(over="ignore", invalid="ignore"):  # an invalid pose is refused later
             key = (np.round(frame.camera_to_world, POSE_DIGITS) + 0.0).tobytes()  # no minus zeros
         by_pose.setdefault(key, FrameGroup()).frames.append(frame)
     groups = list(by_pose.values())
@@ -102,7 +102,7 @@ def _name_all(groups: Sequence[FrameGroup]) -> None:
 
 
 def _shared_start(first: str, last: str) -> str:
-    """What the first and the last of sorted texts, and with them all between, begin with."""
+    """The common beginning of the first and the last of sorted texts, and so of all between."""
     n_same = next(
         (row for row, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), min(len(first), len(last))
     )

@@ -38,7 +38,7 @@ class ExcludedPixels:
     """For any thread. Pixels of a camera are worked out when they are first asked for, and kept.
 
     Args:
-        exclusions: What is excluded; names of cameras that there are not do nothing.
+        exclusions: The exclusions to apply; names of cameras that there are not do nothing.
         names: Of all cameras.
         n_frames: Frames that are worked on.
         size: Width and height of the pictures.

@@ -1,4 +1,4 @@
-"""Masks of what moves that lie beside a capture: masks/<camera>/ with an image a frame, or a video masks/<camera>.mp4.
+"""Masks of moving parts, next to a capture: masks/<camera>/ with an image a frame, or a video masks/<camera>.mp4.
 
 They are found here for every layout; capture.json may name others. White moves. A mask belongs to the frame at its
 place in natural order, so there must be as many as the camera has frames; they may be smaller than the frames.
@@ -25,7 +25,7 @@ ASPECT_TOLERANCE = 0.02
 
 
 def with_masks(layout: Layout, folder: Path, *, follow_links: bool) -> Layout:
-    """A capture with the masks that lie beside it, and with what is odd about them among its warnings.
+    """A capture with the masks that lie next to it, and with their oddities among its warnings.
 
     Raises:
         CaptureError: Masks that the capture itself names are fewer than its frames.
@@ -90,7 +90,7 @@ def _beside(entry: CameraEntry, folder: Path, *, follow_links: bool) -> FrameSou
 
 
 def _lacking(entry: CameraEntry, n_frames: int) -> CaptureError | None:
-    """What is wrong with masks that a capture names."""
+    """The problem with masks that a capture names."""
     masks = entry.masks
     if masks is None:
         return None

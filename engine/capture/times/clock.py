@@ -99,7 +99,7 @@ def common_clock(
         fps: Moments per second, evenly spaced; where it is the rate of the slowest camera, or None, moments are those
             of a camera.
         offsets_s: How far the time of each camera is ahead: its time = common time + offset. None: all by nothing.
-        names: What cameras are called in messages.
+        names: The cameras' names in messages.
     Raises:
         CaptureError: Times are missing, not numbers or not rising, or there is no moment that all cameras show.
     """
@@ -147,7 +147,7 @@ def _moments_of_a_camera(
         if len(moments):
             missed = sum(float(np.abs(other[_nearest(other, moments)] - moments).mean()) for other in times)
             candidates.append((-len(moments), missed, camera_index, moments))
-    if not candidates:  # the slowest camera has its frames beside the short time that all cameras share
+    if not candidates:  # the slowest camera has its frames outside the short time that all cameras share
         return np.array([(first + last) / 2])
     moments = min(candidates, key=lambda candidate: candidate[:3])[3]
     taken = np.stack([times_s[_nearest(times_s, moments)] for times_s in slow])  # [S, T]

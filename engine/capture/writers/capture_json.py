@@ -22,7 +22,7 @@ from engine.storage.json_files import json_text
 
 @dataclass(frozen=True, slots=True)
 class Corrections:
-    """What a user, or a check that the user agreed to, changes about a capture.
+    """The changes that a user, or a check that the user agreed to, makes to a capture.
 
     Attributes:
         is_excluded: By camera name.
@@ -32,7 +32,7 @@ class Corrections:
         world_scale, up: See `CaptureDocument`; None leaves them.
         fps: None leaves it.
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to, 10 to 150; None leaves it.
-        fit: What became of frames of another shape than their calibration; None leaves it.
+        fit: The fit of frames of another shape than their calibration; None leaves it.
     """
 
     is_excluded: Mapping[str, bool] = field(default_factory=dict)

@@ -25,7 +25,7 @@ TARGETS: tuple[Target, ...] = ("colmap", "transforms", "capture.json")
 
 @dataclass(frozen=True, slots=True)
 class Conversion:
-    """What was written. lines: sentences about what the new layout cannot say, or was left out."""
+    """The outcome of a conversion. lines: sentences about facts that the new layout cannot hold, or were left out."""
 
     folder: Path
     lines: tuple[str, ...]
@@ -46,7 +46,7 @@ def convert(
         layout: As it was read.
         out: Must not exist, or be an empty folder.
         target: The layout to write.
-        frames: What becomes of the frames; see `with_frames_in`.
+        frames: The treatment of the frames; see `with_frames_in`.
         is_binary: COLMAP's files as binary instead of text.
         report: Called with how many files of frames are done, and of how many.
     Raises:
@@ -98,7 +98,7 @@ def _is_part_of_a_video(entry: CameraEntry, layout: Layout) -> bool:
 
 
 def _unsaid(layout: Layout, target: Target, frames: Frames) -> list[str]:
-    """What the new layout cannot say."""
+    """Sentences about the facts that the new layout cannot hold."""
     lines = []
     if target != "capture.json":
         if any(entry.color_matrix is not None for entry in layout.cameras):

@@ -20,7 +20,7 @@ from engine.storage.files import check_regular
 
 Frames = Literal["none", "link", "copy", "png"]
 FRAMES: tuple[Frames, ...] = ("none", "link", "copy", "png")
-"""What becomes of the frames: left where they are, linked to, copied as they are, or decoded into images."""
+"""The treatment of the frames: left where they are, linked to, copied as they are, or decoded into images."""
 _UNFIT = re.compile(r'[\\/:*?"<>|%]')
 Report = Callable[[int, int], None]
 
@@ -68,7 +68,7 @@ def with_frames_in(layout: Layout, folder: Path, frames: Frames, report: Report)
 
 
 class _Plan:
-    """What to do for one camera."""
+    """The work for one camera."""
 
     def __init__(self, entry: CameraEntry, name: str, folder: Path, frames: Frames, n_frames: int) -> None:
         self._entry, self._name, self._folder, self._frames = entry, name, folder, frames
@@ -127,7 +127,7 @@ def plain_source(source: FrameSource, n_frames: int) -> tuple[FrameSource, np.nd
 
 
 def name_in(path: Path, folder: Path) -> str:
-    """What a file in `folder` calls a path: relative where it lies inside, else absolute."""
+    """A path as a file in `folder` names it: relative where it lies inside, else absolute."""
     absolute, root = os.path.abspath(path), os.path.abspath(folder)
     inside = os.path.commonpath((absolute, root)) == root
     return Path(os.path.relpath(absolute, root)).as_posix() if inside else absolute

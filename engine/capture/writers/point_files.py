@@ -11,7 +11,7 @@ from engine.capture.points import CapturePoints
 
 _VERTEX = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1")]
-)  # what viewers expect
+)  # as viewers expect
 
 
 def write_ply(path: Path, cloud: CapturePoints) -> None:

@@ -76,7 +76,7 @@ def write_transforms(layout: Layout, folder: Path, points: CapturePoints | None)
 
 
 def _row(entry: CameraEntry) -> dict[str, Any]:
-    """What a row says about the camera."""
+    """A row's facts about the camera."""
     width, height = entry.image_size
     return {
         "transform_matrix": (np.linalg.inv(entry.world_to_camera) @ FLIP).tolist(),

@@ -1,1 +1,1 @@
-"""What each camera sees when nothing moves."""
+"""The background of each camera: its picture when nothing moves."""

@@ -1,4 +1,4 @@
-"""What each camera sees when nothing moves: the tightest cluster of colours over time, per pixel.
+"""The picture of each camera when nothing moves: the tightest cluster of colours over time, per pixel.
 
 Not a model over space (engine.cloud.background.recheck compares with the other views) and not a mask.
 A person who stands still for half of the frames makes a second cluster; skin and cloth still sway, so among clusters

@@ -38,10 +38,10 @@ of a real capture scatter by 0.0004."""
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """One camera's exposure in the reference clip, by which its other pictures are told brighter or darker.
+    """One camera's exposure in the reference clip, by which its other pictures are found brighter or darker.
 
     Attributes:
-        look: What it sees while nothing moves, at working size, 0 to 255. [h, w, 3] float32
+        look: Its picture while nothing moves, at working size, 0 to 255. [h, w, 3] float32
         gain: Of the look against the exposure that is meant. [3] float64
     """
 

@@ -49,7 +49,7 @@ class AnchorLight:
     Args:
         points: Static anchors, scene units. [A, 3]
         rig: Training cameras at full size.
-        backgrounds: What they see while nothing moves. [C, H, W, 3] uint8
+        backgrounds: Their pictures while nothing moves. [C, H, W, 3] uint8
     """
 
     def __init__(self, points: np.ndarray, rig: CameraRig, backgrounds: np.ndarray) -> None:

@@ -1,1 +1,1 @@
-"""What moves as points: visual hulls of all frames."""
+"""The moving parts as points: visual hulls of all frames."""

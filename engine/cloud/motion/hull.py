@@ -66,7 +66,7 @@ def carve(
         near: Points nearer than this to a camera are not judged by it, scene units.
         n_misses: Cameras that see the voxel outside their mask and are outvoted.
         min_hits: Cameras that have to see the voxel inside their mask.
-        is_valid: Pixels that the cameras see, None for all: of a voxel that falls elsewhere, as of one beside the
+        is_valid: Pixels that the cameras see, None for all: of a voxel that falls elsewhere, as of one outside the
             picture, a camera says nothing. [C, H, W] bool
     Returns:
         Integer voxels, sorted by block and then x, y, z. [P, 3] int64

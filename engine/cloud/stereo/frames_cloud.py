@@ -180,7 +180,7 @@ class _FrameStereo:
         """Points [P, 3] and colours [P, 3] 0..255 of one frame, float64. Frames have to come in order.
 
         Args:
-            spacing: What the frames are going to be merged at, if that is known.
+            spacing: The spacing at which the frames will be merged, if known.
         """
         started = time.perf_counter()
         found = self._keep(f"points of frame {frame_in_clip}", lambda: self._find(frame_in_clip, spacing))
@@ -192,7 +192,7 @@ class _FrameStereo:
         return found["points"], found["colors"]
 
     def _find(self, frame_in_clip: int, spacing: float | None) -> Arrays:
-        """What is kept of a frame: its points and colours, and the spacing and the gains that they have."""
+        """The data kept of a frame: its points and colours, and the spacing and the gains that they have."""
         pictures, is_stable, is_valid = self._pictures(frame_in_clip)
         maps, is_new = self._maps(frame_in_clip, pictures, is_stable)
         width = int(maps.rig.image_sizes[0, 0])

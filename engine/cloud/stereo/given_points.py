@@ -34,7 +34,7 @@ MAX_POINTS = 20_000
 
 @dataclass(frozen=True, slots=True)
 class GivenPoints:
-    """What was found about a cloud.
+    """The findings about a cloud.
 
     Attributes:
         points: Those that win, float64; empty where the cloud is not used. [P, 3]

@@ -1,7 +1,7 @@
 """The static scene as points: depth maps of the backgrounds by a multi-view sweep, checked, filled and fused.
 
 No shape is assumed (no floor, no dome): the same steps serve a ring of cameras, a room and a forward-facing rig.
-What moves is not here (engine.cloud.motion.moving_cloud).
+Moving parts are not here (engine.cloud.motion.moving_cloud).
 Letters: C cameras, H W full pictures, h w working pictures (about 160 x 90).
 """
 

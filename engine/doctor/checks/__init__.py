@@ -1,1 +1,1 @@
-"""The checks: one file each, with a function that takes what it needs and returns findings."""
+"""The checks: one file each, with a function that takes its inputs and returns findings."""

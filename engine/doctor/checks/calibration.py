@@ -1,4 +1,4 @@
-"""Which cameras are calibrated wrongly, what is wrong with them and by how much.
+"""Which cameras are calibrated wrongly, in which way and by how much.
 
 A wrong camera disagrees with all of its neighbours, a good neighbour with one only. So the camera that a change of its
 own would help most is named first, left out, and the others are judged again without it.
@@ -27,7 +27,7 @@ LEAST_HELP = 0.35
 """Share of its cost that a change has to take away."""
 BAD_RIG_PX, MIN_PAIRS = 1.5, 3
 """A rig whose pairs usually miss each other by more, in pictures up to 640 px wide, fits its pictures badly as a whole;
-fewer pairs than that with MIN_MATCHES do not tell."""
+fewer pairs than that with MIN_MATCHES do not suffice."""
 MIN_OF_PAIR = 8
 """Matches of a pair with fewer are not counted as agreeing or disagreeing."""
 MOST_PARTNERS = 0.6
@@ -123,7 +123,7 @@ def _disagrees(
 
 
 def _is_helped(fit: Refit) -> bool:
-    """Whether a change of the camera explains what it misses."""
+    """Whether a change of the camera explains its misses."""
     return fit.cost - fit.cost_left > LEAST_HELP * fit.cost and fit.after_px < 0.6 * fit.before_px
 
 

@@ -46,7 +46,7 @@ def check_frozen(look: PictureSurvey) -> list[Finding]:
         return []
     ratios = moved / np.maximum(usual[:, None], 1e-9)
     is_empty = np.stack([np.logical_or(*empty_pictures(c.gray))[1:][is_next] for c in look.cameras if c is not None])
-    is_still = (ratios < STILL_SHARE) & can_tell[:, None] & ~is_empty  # which another check tells
+    is_still = (ratios < STILL_SHARE) & can_tell[:, None] & ~is_empty  # which another check reports
     n_telling = int(can_tell.sum())
     is_everywhere = is_still.sum(0) >= max(MANY * n_telling, 2)
     found = _repeated(look, later[is_everywhere], n_telling) if is_everywhere.any() else []

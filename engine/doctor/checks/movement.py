@@ -13,7 +13,7 @@ from engine.doctor.picture_survey import PictureSurvey
 from engine.parallel import map_ordered
 
 MOVED_SHARE = 0.0022
-"""Of the picture's width; less than this much motion is not told from people who move."""
+"""Of the picture's width; less motion than this cannot be distinguished from moving people."""
 LEAST_GAIN = 0.25
 """Share of the difference between two pictures that the motion has to explain."""
 ROWS = (2, 4, 6, 8, 11)

@@ -16,7 +16,7 @@ LEAST_FRAMES = 0.5
 STRONG: set[SourceName] = {"timecode", "audio", "epipolar"}
 """Sources whose disagreement means something; how much moves differs between views."""
 UNSURE = 0.4
-"""Less likely offsets are not told."""
+"""Less likely offsets are not reported."""
 
 
 def check_synchronisation(capture: Capture, report: ReportProgress = lambda progress: None) -> list[Finding]:
@@ -29,7 +29,7 @@ def check_synchronisation(capture: Capture, report: ReportProgress = lambda prog
 
 
 def offset_findings(capture: Capture, found: Synchronisation) -> list[Finding]:
-    """What measured offsets mean for a capture."""
+    """The findings from measured offsets of a capture."""
     late = [camera for camera in found.cameras if camera.source and abs(camera.offset_frames) >= LEAST_FRAMES]
     sure = [camera for camera in late if camera.is_sure]
     unsure = [camera for camera in late if not camera.is_sure and camera.confidence >= UNSURE]
@@ -81,7 +81,7 @@ def _said(camera: CameraOffset) -> str:
 
 
 def _evidence(capture: Capture, found: Synchronisation, camera: CameraOffset) -> tuple[PairEvidence, ...]:
-    """The camera beside the nearest one that is in step, in the middle of the capture."""
+    """The camera next to the nearest one that is in step, in the middle of the capture."""
     names = capture.rig.names
     row = names.index(camera.name)
     still = [i for i, other in enumerate(found.cameras) if i != row and abs(other.offset_frames) < LEAST_FRAMES]

@@ -1,1 +1,1 @@
-"""Deleting for good: which anchors no frame shows any more, and clips without them."""
+"""Deleting for good: which anchors no frame shows now, and clips without them."""

@@ -22,7 +22,7 @@ def without_anchors(state: ClipState, own: Chosen, inherited: Chosen, gone_from_
 
     Args:
         own: Rows of the clip's own sets that go.
-        inherited: Rows of the reference clip's sets that this clip does not show any more.
+        inherited: Rows of the reference clip's sets that this clip no longer shows.
         gone_from_reference: Rows of these sets that the reference clip itself loses; none of them is shown here.
     Returns:
         With a fingerprint of its own; its reference is still that of before.
@@ -82,8 +82,8 @@ def _inherited_without(
 
 
 def _reasons_of_replacing(records: Mapping[str, AnchorRecord]) -> np.ndarray | None:
-    """What the gate said of anchors that replace static ones: as long as as many of those are hidden as there are of
-    these, it says so of the hidden ones alone. See engine.model.clip_model."""
+    """The gate's reasons for anchors that replace static ones: as long as as many of those are hidden as there are of
+    these, the reasons are those of the hidden ones. See engine.model.clip_model."""
     static, replacing = records.get(STATIC), records.get("replacing")
     if static is None or replacing is None or replacing.own is None or replacing.reasons is not None:
         return None

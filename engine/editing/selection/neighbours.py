@@ -10,7 +10,7 @@ from numba import njit
 
 
 def grown(means: np.ndarray, selected: np.ndarray, distance: float) -> np.ndarray:
-    """What is selected, and every Gaussian whose centre is within a distance of one of those.
+    """The selection, and every Gaussian whose centre is within a distance of one of those.
 
     Args:
         means: Scene units. [N, 3]
@@ -30,13 +30,13 @@ def grown(means: np.ndarray, selected: np.ndarray, distance: float) -> np.ndarra
 
 
 def shrunk(means: np.ndarray, selected: np.ndarray, distance: float) -> np.ndarray:
-    """What is selected without those near the edge: no Gaussian that is not selected lies within a distance of what is
+    """The selection without those near the edge: no Gaussian that is not selected lies within a distance of those
     left. Arguments as of `grown`. [N] bool"""
     return ~grown(means, ~np.asarray(selected, np.bool_), distance) & selected
 
 
 def flooded(means: np.ndarray, colors: np.ndarray, seed: int, distance: float, color_tolerance: float) -> np.ndarray:
-    """What hangs together with one Gaussian: from neighbour to neighbour, as long as colours are like its own.
+    """The Gaussians connected to one Gaussian: from neighbour to neighbour, as long as colours are like its own.
 
     Args:
         means: Scene units. [N, 3]
@@ -133,7 +133,7 @@ def _near_any(points, is_asked, starts, items, distance, found):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _flood(points, starts, items, distance, seed, found):
-    """What was reached leaves the grid, so that nothing is looked at twice in vain."""
+    """Remove the Gaussians reached from the grid, so that none is looked at twice in vain."""
     n_buckets = len(starts) - 1
     ends = starts[1:].copy()
     waiting = np.empty(len(items) + 1, np.int64)

@@ -1,7 +1,7 @@
 """Gaussians in a picture: where their centres lie, how far away they are, and how wide they look. One compiled kernel.
 
 The projection is the rasterizer's (3DGS): the lens is linearised at each centre. In float64, because an orthographic
-view stands so far away that float32 could not tell depths apart.
+view stands so far away that float32 could not separate depths.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What becomes of a selection when something more is selected."""
+"""The new selection when something more is selected."""
 
 from __future__ import annotations
 

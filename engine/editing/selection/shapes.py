@@ -61,7 +61,7 @@ def brush_mask(points: np.ndarray, radius_px: float, size: tuple[int, int]) -> n
 
 
 def _usable(points: np.ndarray) -> np.ndarray:
-    """Those that are finite, held where a number of pixels still is one, and not too many. [P, 2] float64"""
+    """The points that are finite, held where a number of pixels still is one, and not too many. [P, 2] float64"""
     array = np.asarray(points, dtype=np.float64).reshape(-1, 2)
     array = np.clip(array[np.isfinite(array).all(axis=1)], -1e7, 1e7)
     if len(array) > MAX_POINTS:

@@ -10,7 +10,7 @@ from engine.editing.selection.projected import ProjectedGaussians
 from engine.editing.selection.visibility import footprint, small_picture
 
 ENOUGH = 0.1
-"""What comes through where less than this is left is not looked at."""
+"""Where less light than this is left, the Gaussians behind are not looked at."""
 
 
 def selected_share(projected: ProjectedGaussians, opacities: np.ndarray, selected: np.ndarray) -> np.ndarray:

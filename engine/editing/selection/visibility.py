@@ -17,7 +17,7 @@ from engine.editing.selection.seen_from import SeenFrom
 PICTURE_PX = 60_000
 """Pixels of the picture in which it is looked, at most."""
 SEEN_TRANSMITTANCE = 0.5
-"""What stops half of the light is what one sees."""
+"""A surface is seen where it stops half of the light."""
 DEPTH_SIGMAS = 2.0
 """A Gaussian is as thick as this in the direction of view, standard deviations to either side."""
 DEPTH_SHARE = 2e-3
@@ -63,7 +63,7 @@ def footprint(centers, spreads, reach, i, scale, height, width):
     yy = scale * scale * spreads[i, 2] + EPS2D_PX2
     xz, yz = scale * spreads[i, 3], scale * spreads[i, 4]
     area = xx * yy - xy * xy
-    if not 0.0 < area < np.inf:  # so wide, or so thin, that float64 does not tell: it is nowhere
+    if not 0.0 < area < np.inf:  # so wide, or so thin, that float64 does not suffice: it is nowhere
         return u, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, -1, 0, -1
     inverse = 1.0 / area
     ixx, ixy, iyy = inverse * yy, -inverse * xy, inverse * xx

@@ -49,7 +49,7 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` wrote. Raises ProjectError where it is something else."""
+    """Read a file of `write`. Raises ProjectError where it is something else."""
     elements = read_header(file)
     if [(name, tuple(columns)) for name, (_, columns) in elements.items()] != [
         ("chunk", _CHUNK_COLUMNS),

@@ -1,4 +1,4 @@
-"""What a reader of a file format says of a file that it cannot make sense of."""
+"""The error of a file format's reader for a file that it cannot make sense of."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` wrote, as it lies before the node is turned. Raises ProjectError where it is something else."""
+    """Read a file of `write`, as it lies before the node is turned. Raises ProjectError where it is something else."""
     head = file.read(20)
     if len(head) < 20:
         raise damaged("it ends too early")

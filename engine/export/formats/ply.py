@@ -58,7 +58,7 @@ def _rows(splats: Splats) -> np.ndarray:
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` or `write_full` wrote. Raises ProjectError where it is something else."""
+    """Read a file of `write` or `write_full`. Raises ProjectError where it is something else."""
     elements = read_header(file)
     names = tuple(elements.get("vertex", (0, ()))[1])
     if names not in (COLUMNS, FULL_COLUMNS):

@@ -62,7 +62,7 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` wrote. Raises ProjectError where it is something else."""
+    """Read a file of `write`. Raises ProjectError where it is something else."""
     try:
         with zipfile.ZipFile(file) as archive:
             meta: dict[str, Any] = json.loads(_member(archive, "meta.json"))

@@ -28,7 +28,7 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` wrote. Raises ProjectError where it is something else."""
+    """Read a file of `write`. Raises ProjectError where it is something else."""
     data = file.read()
     if len(data) % _ROW.itemsize:
         raise damaged("it ends in the middle of a Gaussian")

@@ -29,7 +29,7 @@ _COLOR_SCALE = 0.15
 _QUAT_TOP = 511
 _LEAST_BYTES = 20
 _MAX_BYTES = 1 << 32
-"""Of an unzipped file that is read."""
+"""Limit of an unzipped file that is read."""
 _MANY = 0.01
 """Share of the sides of Gaussians that are too thin from which on it is worth a word."""
 LN_SCALES = (-10.0, 255.0 / 16.0 - 10.0)
@@ -65,7 +65,7 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """What `write` wrote, axes as stored. Raises ProjectError where it is something else."""
+    """Read a file of `write`, axes as stored. Raises ProjectError where it is something else."""
     try:
         with gzip.GzipFile(fileobj=file, mode="rb") as unzipped:
             head = unzipped.read(_HEAD.size)

@@ -13,8 +13,8 @@ class Format(NamedTuple):
     """One file format.
 
     Attributes:
-        title: What users call it.
-        use: What it is for, in a few words.
+        title: Its name for users.
+        use: Its purpose, in a few words.
         suffix: With its point.
         min_psnr_db: A file that was read back looks this much like the scene, or something went wrong.
         bytes_each: Of a Gaussian in a file, about; for a forecast.

@@ -29,7 +29,7 @@ class Block:
 
 
 class Packer:
-    """Makes the blocks of one page, clip by clip. What stands still in the first one is what clips share."""
+    """Makes the blocks of one page, clip by clip. The still part of the first one is shared by all clips."""
 
     def __init__(self) -> None:
         self._shared: Splats | None = None
@@ -41,7 +41,7 @@ class Packer:
 
         Args:
             n_frames: Of the clip, as far as they are wanted.
-            still, moving: What stands still and what moves, by the number of the frame in the clip.
+            still, moving: The still and the moving splats, by the number of the frame in the clip.
         """
         part = still_part(n_frames, lambda frame: seen(still(frame)))
         if part is None:  # then all of it is stored for every frame

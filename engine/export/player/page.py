@@ -35,9 +35,9 @@ SCRIPTS = (
 """In the order in which they are joined."""
 WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_main.js")
 SHADERS = ("splat.vert", "splat.frag", "resolve.vert")
-"""Those of the window, in assets/shaders."""
+"""The shaders of the window, in assets/shaders."""
 CONSTANTS = ("ALPHA_MIN", "ALPHA_MAX", "EPS2D_PX2", "FRUSTUM_MARGIN")
-"""Of engine.conventions, which shaders see as #define."""
+"""Names of engine.conventions, which shaders see as #define."""
 FORMAT, VERSION = "clipgstream-player", 1
 
 _PRECISION = "".join(f"precision highp {kind};\n" for kind in ("float", "int", "sampler2D"))
@@ -66,7 +66,7 @@ def page_writer(stream: TextIO, header: dict[str, Any], *, folder: Path | None =
 
     Args:
         stream: Of the page, UTF-8.
-        header: What the page knows of the scene; see docs/player_format.md. It may be completed until the end.
+        header: The page's facts about the scene; see docs/player_format.md. It may be completed until the end.
         folder: Where blocks go as files of their own; None to put them into the page.
     """
     before, after = _asset("player.html").split("{{blocks}}\n")
@@ -111,7 +111,7 @@ def web_shader(name: str) -> str:
 
 
 def _policy(script: str, style: str, *, has_folder: bool) -> str:
-    """What the page may load: itself, and the blocks beside it where there are some. No network in any case."""
+    """The sources the page may load: itself, and the blocks next to it where there are some. No network in any case."""
     scripts = f"'sha256-{_digest(script)}' blob:" + (" 'self' file:" if has_folder else "")
     rules = {
         "default-src": "'none'",

@@ -69,12 +69,12 @@ def fitting_rounding(parts: Sequence[Splats]) -> Rounding:
 
 
 def color_max(colors: Sequence[np.ndarray]) -> float:
-    """What 255 has to stand for so that all colours fit; a light on the scene can make them brighter than 1."""
+    """The brightness of 255 that lets all colours fit; a light on the scene can make them brighter than 1."""
     return max([1.0, *(float(part.max()) for part in colors if part.size)])
 
 
 def rounded_colors(colors: np.ndarray, brightest: float) -> np.ndarray:
-    """Colours as bytes. brightest: What 255 stands for. Same shape, uint8"""
+    """Colours as bytes. brightest: The brightness of 255. Same shape, uint8"""
     return np.floor(np.clip(colors / brightest, 0.0, 1.0) * _MAX_BYTE + 0.5).astype(np.uint8)
 
 

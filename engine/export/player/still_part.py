@@ -1,5 +1,5 @@
-"""What stands still: rows that the clips of a capture share are stored once, and each clip says which of them it shows,
-what it has beside them, and in which light they stand."""
+"""The still part: rows that the clips of a capture share are stored once, and each clip says which of them it shows,
+its further rows, and in which light they stand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAME_COLOR = 0.25 / 255.0
 
 @dataclass(frozen=True, slots=True)
 class PlayerStillPart:
-    """What stands still in one clip.
+    """The still part of one clip.
 
     Attributes:
         splats: At the clip's first frame. [N rows]
@@ -29,7 +29,7 @@ class PlayerStillPart:
 
 
 def still_part(n_frames: int, at: Callable[[int], Splats]) -> PlayerStillPart | None:
-    """What stands still in a clip; None where anything but colours differs between its frames.
+    """The still part of a clip; None where anything but colours differs between its frames.
 
     Args:
         n_frames: Of the clip.

@@ -1,4 +1,4 @@
-"""What the pixels say of the anchors behind them: maps of one camera spread over the anchors that they show.
+"""Measures of anchors from the pixels before them: maps of one camera spread over the anchors that they show.
 
 A pixel is the sum over Gaussians of weight times colour, so the derivative of (pixels times map) by a Gaussian's colour
 is the sum over pixels of map times weight: one backward pass of the rasterizer shares maps out by exactly the weights

@@ -108,7 +108,7 @@ class Evaluation:
         frames: Collection[int],
         pairs: Collection[int],
     ) -> Iterator[EvalRow | PairRow]:
-        """What one camera has to say of a clip, frame by frame: the row, then the pair with the frame before.
+        """One camera's measurements of a clip, frame by frame: the row, then the pair with the frame before.
 
         May be iterated for several cameras on several threads at a time.
 
@@ -161,7 +161,7 @@ class Evaluation:
         """R, G and E of one camera from the frame before to a frame, for a picture.
 
         Args:
-            before, after: What shows the two frames; one clip for both inside of it.
+            before, after: The clips that show the two frames; one clip for both inside of it.
             frame: Capture frame index of the later one.
         """
         return self._maps(camera, self._shot(after, camera, frame), self._shot(before, camera, frame - 1))
@@ -203,7 +203,7 @@ class Evaluation:
         )
 
     def _background(self, camera: int) -> tuple[np.ndarray, Exposure]:
-        """What a camera sees when nothing moves, in its mean exposure, and that exposure."""
+        """A camera's picture when nothing moves, in its mean exposure, and that exposure."""
         if camera not in self._backgrounds:
             spread = spread_frames(self.capture.n_frames, _BACKGROUND_FRAMES)
             frames = self.capture.frames_of(camera, spread)

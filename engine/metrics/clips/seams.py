@@ -34,7 +34,7 @@ class SeamMaps:
         truth_change: G. [H, W] float32 in 0..1
         excess: E. [H, W] float32 in 0..1
         is_static: The truth changes by less than STATIC_THRESHOLD and neither frame's motion mask is set. [H, W] bool
-        is_valid: What the camera sees; None for all. [H, W] bool
+        is_valid: The pixels the camera sees; None for all. [H, W] bool
     """
 
     change: np.ndarray
@@ -120,9 +120,9 @@ def seam_maps(
 
     Args:
         image, previous_image: Renders in 0..1, the later frame first. [H, W, 3]
-        truth, previous_truth: What the camera took, in 0..1. [H, W, 3]
+        truth, previous_truth: The camera's own pictures, in 0..1. [H, W, 3]
         is_moving: Motion masks of both frames together. [H, W] bool
-        is_valid: What the camera sees, None for all; the others are black in all four pictures. [H, W] bool
+        is_valid: The pixels the camera sees, None for all; the others are black in all four pictures. [H, W] bool
     """
     change, truth_change = change_of(image, previous_image), change_of(truth, previous_truth)
     is_static = stands_still(truth_change) & ~is_moving
@@ -150,7 +150,7 @@ def _finite_mean(values: np.ndarray) -> float | None:
 
 
 def summarize(rows: Sequence[PairRow]) -> dict[str, Any]:
-    """Seams of all boundaries, and what is normal inside the clips. JSON-able.
+    """Seams of all boundaries, and the normal figures inside the clips. JSON-able.
 
     Returns:
         boundaries: one entry per boundary, in order: frame_index, clips (before and after), the measures of `_measures`

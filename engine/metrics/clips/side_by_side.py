@@ -21,7 +21,7 @@ def side_by_side(
 ) -> Iterator[Item]:
     """Items of all iterators: those of one in their order, those of several mixed.
 
-    Each iterator belongs to one thread, which takes the next when it is exhausted. What one of them raises ends all and
+    Each iterator belongs to one thread, which takes the next when it is exhausted. An error of one of them ends all and
     is raised here. When the caller stops early, or is interrupted, each thread ends with the item it is at.
 
     Args:
@@ -60,7 +60,7 @@ def side_by_side(
         thread.start()
     try:
         while True:
-            is_over = not any(thread.is_alive() for thread in threads)  # asked first: then nothing is added any more
+            is_over = not any(thread.is_alive() for thread in threads)  # asked first: then nothing more is added
             try:
                 item, error = ready.get(timeout=0.0 if is_over else _POLL_S)
             except queue.Empty:

@@ -1,4 +1,4 @@
-"""Rows of an evaluation brought together: means, curves over time, worst frames, and what is missing."""
+"""Rows of an evaluation brought together: means, curves over time, worst frames, and missing figures."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class EvalRow:
     missing: dict[str, str]
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON-able, figures beside the rest; reasons are left to `columns_of`."""
+        """JSON-able, figures next to the rest; reasons are left to `columns_of`."""
         which = {name: getattr(self, name) for name in ("clip_index", "frame_index", "camera", "is_held_out")}
         return which | self.figures
 
@@ -101,7 +101,7 @@ def worst_by_group(rows: Sequence[EvalRow]) -> dict[str, dict[str, list[dict[str
 
 
 def columns_of(rows: Sequence[EvalRow]) -> dict[str, dict[str, Any]]:
-    """What each column is, how many rows have it, and how many have not for which reason."""
+    """The meaning of each column, how many rows have it, and how many have not for which reason."""
     found = {}
     for name, column in COLUMNS.items():
         reasons = Counter(row.missing[name] for row in rows if name in row.missing)

@@ -42,7 +42,7 @@ class TrainedClip:
         """A loaded state of a clip; None where its files do not say what the cameras make of the scene's colours.
 
         Args:
-            reference: What the clip inherits from; None for one that inherits nothing.
+            reference: The clip that it inherits from; None for one that inherits nothing.
         """
         base = state if state.is_reference or reference is None else reference
         gains = base.arrays.get(GAINS)
@@ -53,7 +53,7 @@ class TrainedClip:
 
     @property
     def colors(self) -> CameraColors:
-        """What the cameras make of the scene's colours in this clip."""
+        """The cameras' renditions of the scene's colours in this clip."""
         header = self.base.header
         return CameraColors(tuple(header.camera_names), self.base.arrays[GAINS], self.drift, self.clip.clip_length)
 
@@ -87,7 +87,7 @@ class TrainedClip:
         return corrected(rig, self.base.header.camera_names, self.base.corrections)
 
     def view(self, rig: CameraRig, camera: int) -> View:
-        """What a camera of the capture's rig looks at, corrected where it was refined in training."""
+        """The view of a camera of the capture's rig, corrected where it was refined in training."""
         rig = self.rig(rig)
         width, height = (int(v) for v in rig.image_sizes[camera])
         near_plane = self.base.header.near_plane
@@ -96,6 +96,6 @@ class TrainedClip:
         )
 
     def picture(self, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
-        """What a camera of the rig sees, in its own colours where they are known. Not clamped. [H, W, 3] float32"""
+        """The picture of a rig's camera, in its own colours where they are known. Not clamped. [H, W, 3] float32"""
         image = render_model(self.model, self.view(rig, camera), clip_time, reach=self.reach)
         return self.colors.in_camera(host_array(image), rig, camera, clip_time)

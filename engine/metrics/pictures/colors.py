@@ -13,7 +13,7 @@ Precision = Literal["float", "8bit"]
 
 
 def as_shown(image: np.ndarray, precision: Precision) -> np.ndarray:
-    """What a reader of the picture gets: clamped to 0..1, and rounded to the 256 levels of a PNG file for "8bit".
+    """The picture as its reader gets it: clamped to 0..1, and rounded to the 256 levels of a PNG file for "8bit".
 
     Published figures are mostly of 8-bit files; "float" leaves the rounding out of the error. [H, W, 3] float32
     """

@@ -35,7 +35,7 @@ _MARGIN = 16
 
 
 class Seen(NamedTuple):
-    """What FLIP compares of a picture: L, a, b after the eye's blur, edges and points.
+    """The features of a picture that FLIP compares: L, a, b after the eye's blur, edges and points.
 
     Attributes:
         planes: Rows are padded to whole vectors. [5, H, >= W] float32

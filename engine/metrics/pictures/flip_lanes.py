@@ -64,7 +64,7 @@ def _feature_taps() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _trimmed(taps: np.ndarray) -> np.ndarray:
-    """Without the ends that single precision cannot tell from nothing."""
+    """Without the ends that single precision cannot distinguish from 0."""
     n = int((np.abs(taps) < 1e-9 * np.abs(taps).max()).sum()) // 2
     return taps[n : len(taps) - n]
 

@@ -55,7 +55,7 @@ def measure_picture(
 
     Args:
         image: Rendered, any float type; clamped, and rounded if `precision` says so. [H, W, 3]
-        pixels: What the camera took. [H, W, 3] uint8
+        pixels: The camera's own picture. [H, W, 3] uint8
         is_moving: Which pixels move. [H, W] bool
         is_valid: Which pixels the camera sees; None for all. [H, W] bool
         metrics: "quick" is PSNR, SSIM and DSSIM1; "all" is every column, at about twice the time.

@@ -21,7 +21,7 @@ MS_MIN_SIDE_PX = 11 * 2 ** (len(MS_WEIGHTS) - 1)
 
 
 class Similarity(NamedTuple):
-    """What all figures of one pair of pictures share, of each pixel and channel. All [H, W, 3] float32
+    """The terms that all figures of one pair of pictures share, of each pixel and channel. All [H, W, 3] float32
 
     Attributes:
         ssim: SSIM with data range 1.

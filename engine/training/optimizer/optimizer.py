@@ -88,7 +88,7 @@ class PhaseOptimizer:
     Args:
         parameters: By name.
         schedule: How fast they learn.
-        backend: What Adam is computed with.
+        backend: The backend Adam is computed with.
     """
 
     def __init__(self, parameters: Mapping[str, nn.Parameter], *, schedule: Schedule, backend: Backend) -> None:
@@ -125,7 +125,7 @@ class PhaseOptimizer:
         return tuple(name for name, grad in gradients if grad is not None and not torch.isfinite(grad).all())
 
     def mark(self) -> Mark:
-        """What to go back to if the steps from here on change nothing."""
+        """The state to return to if the steps from here on change nothing."""
         return self.steps_done, dict(self._adam.steps)
 
     def go_back(self, mark: Mark) -> None:

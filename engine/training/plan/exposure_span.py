@@ -14,7 +14,7 @@ from engine.training.config import TrainConfig
 from engine.training.preparation.cloud_preparation import key_of_corrected, read_backgrounds
 
 N_CAMERAS = 8
-"""Looked at, spread over the rig: enough to tell drift from none, and quick where many clips are planned."""
+"""Looked at, spread over the rig: enough to detect drift, and quick where many clips are planned."""
 
 
 def exposure_span(

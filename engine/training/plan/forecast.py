@@ -45,7 +45,7 @@ class MeasuredClip:
 
 
 def measured_clip(header: ClipHeader, *, disk_mb: float | None, uncounted_s: float = 0.0) -> MeasuredClip:
-    """What a clip's file says.
+    """The measurements in a finished clip's file.
 
     Args:
         header: Of the finished clip.

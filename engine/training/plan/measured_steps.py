@@ -18,7 +18,7 @@ from engine.training.step.losses import photometric_loss
 
 N_WARM, N_STEPS = 10, 40
 MOTION_SHARE = 0.4
-"""Of width and height: what moves is mostly in the middle of a picture, so that source clips draw a part of it."""
+"""Of width and height: moving parts are mostly in the middle of a picture, so that source clips draw a part of it."""
 
 
 def measured_step_s(sizes: StepSizes, phase: str, backend: Backend) -> float:
@@ -30,7 +30,7 @@ def measured_step_s(sizes: StepSizes, phase: str, backend: Backend) -> float:
     Args:
         sizes: Of the clip.
         phase: "static", "joint" or "source".
-        backend: What they are computed with.
+        backend: The backend they are computed with.
     """
     run = _Steps(sizes, phase, backend)
     times_s = []

@@ -1,4 +1,4 @@
-"""TrainingPlan: what is known of a clip's training before it begins, and a forecast of what it takes.
+"""TrainingPlan: the facts known of a clip's training before it begins, and a forecast of its time and memory.
 
 Numbers of steps and pictures are exact. Of anchors, which follow from the pictures, a plan knows limits. The forecast
 is the median of the project's own clips of the same kind; without one, timed steps times their number, rough
@@ -31,7 +31,7 @@ SEEN_SHARE = 0.6
 
 @dataclass(frozen=True, slots=True)
 class StepSizes:
-    """What the time of a training step follows from.
+    """The quantities that the time of a training step follows from.
 
     Attributes:
         width, height: Of a picture, pixels.
@@ -75,13 +75,13 @@ class PlanLine:
 
 @dataclass(frozen=True, slots=True)
 class TrainingPlan:
-    """What a training is going to do and what it is expected to take. A value.
+    """The plan of a training, with the time and memory it is expected to take. A value.
 
     Attributes:
         clip_index, start, n_frames: The clip.
         role: "reference" or "source".
         n_steps: Of all phases.
-        lines: What it is going to do.
+        lines: The work ahead, in sentences.
         preparation_s, training_s: Forecast; together the wall time, compiling of kernels left out.
         memory_mb: Most that the training process will hold, 10^6 bytes.
         disk_mb: The finished clip, 10^6 bytes.
@@ -135,7 +135,7 @@ def resumed_plan(plan: TrainingPlan, steps_done: int, n_steps: int) -> TrainingP
 
     Args:
         plan: Of the whole training.
-        steps_done, n_steps: As the checkpoint says; steps of the whole are not forecast any more.
+        steps_done, n_steps: As the checkpoint says; steps of the whole are no longer forecast.
     """
     left = 1.0 - steps_done / n_steps if n_steps else 0.0
     training_s = None if plan.training_s is None else plan.training_s * left
@@ -144,7 +144,7 @@ def resumed_plan(plan: TrainingPlan, steps_done: int, n_steps: int) -> TrainingP
 
 @dataclass(frozen=True, slots=True)
 class Footage:
-    """What there is to train on.
+    """The footage to train on.
 
     Attributes:
         width, height: Working size, pixels.
@@ -201,7 +201,7 @@ def make_plan(
     """The plan of one clip.
 
     Args:
-        footage: What there is to train on.
+        footage: The footage to train on.
         clip: Which frames.
         config: All settings.
         is_source: Whether the clip begins with what another one has learned, and so has one phase instead of two.

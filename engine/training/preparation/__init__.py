@@ -1,1 +1,1 @@
-"""What a clip's training starts from: pictures, clouds, anchors, field."""
+"""The start of a clip's training: pictures, clouds, anchors, field."""

@@ -147,10 +147,10 @@ def uncovered_points(cloud: MovingCloud, is_new: np.ndarray, n_used: int, config
     """Points that no inherited anchor covers, as far as `config.max_moving_points` lets them become anchors.
 
     A clip has no more anchors that move than that, inherited ones that it uses included. Which of the others become
-    anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one beside them.
+    anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one next to them.
 
     Args:
-        cloud: What moves in the clip.
+        cloud: The clip's moving points.
         is_new: Points that no inherited anchor covers. [P] bool
         n_used: Inherited anchors that exist in some frame of the clip.
         config: Gives the most anchors.
@@ -242,7 +242,7 @@ def _residual_budget(presence: np.ndarray, n_used: int, config: TrainConfig) -> 
 
 
 def _within_budget(cloud: MovingCloud, is_new: np.ndarray, budget: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows that become anchors [P], presence with that of the points beside them [P, M], points within reach [P]."""
+    """Rows that become anchors [P], presence with that of the points next to them [P, M], points within reach [P]."""
     rows = np.flatnonzero(is_new)
     is_chosen, stand_in = choose_within_budget(
         cloud.points[rows], cloud.presence[rows], budget=budget, reach=_REACH_SPACINGS * cloud.spacing

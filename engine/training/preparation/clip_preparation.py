@@ -1,4 +1,4 @@
-"""What a clip's training starts from: its pictures, and made of them model, gains and backgrounds.
+"""The start of a clip's training: its pictures, and model, gains and backgrounds made of them.
 
 Reference clip: `static_parts` before its first phase, `with_motion` between the phases, when the static anchors have
 been trained. Source clip: `source_parts` does all of it at once.
@@ -74,11 +74,11 @@ class ClipParts:
         model: Everything that is visible in the clip.
         gains: Of the training cameras. [C, 3] float32
         drift: Exposure of each training camera in each frame against the reference clip's. [C, M, 3] float32
-        backgrounds: What the training cameras see when nothing moves.
+        backgrounds: The training cameras' pictures when nothing moves.
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
         reasons: Of the gate, by role; empty without a decision.
-        coverage: How much of what moves in a source clip has an anchor near it; None for a reference clip.
+        coverage: How many moving points of a source clip have an anchor near them; None for a reference clip.
     """
 
     model: ClipModel
@@ -113,10 +113,10 @@ class ClipPreparation:
         clip: Frames to prepare.
         config: All numbers.
         method: All decisions.
-        backend: What the model is made for and drawn with.
+        backend: The backend the model is made for and drawn with.
         camera_indices: Training cameras, in capture numbering.
         cameras: The same, as they are by now.
-        base: What the clip inherits from; None for a reference clip.
+        base: The clip to inherit from; None for a reference clip.
         previous: The clip before, finished, for a method that continues from it.
         regions: Where the user overrules the gate.
         seed: Of new decoder heads.
@@ -195,7 +195,7 @@ class ClipPreparation:
         return replace(parts, reasons=self._make_dynamic(parts, cloud.spacing))
 
     def with_motion(self, parts: ClipParts, pictures: TrainingPictures) -> ClipParts:
-        """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
+        """A reference clip whose static anchors were trained, with corrected backgrounds and moving parts."""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures, keep)
         parts = replace(parts, backgrounds=backgrounds)
@@ -232,7 +232,7 @@ class ClipPreparation:
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
     def measured_colors(self, reference: ClipState, pictures: TrainingPictures) -> ClipColors:
-        """What `source_parts` measures of a clip's colours, and nothing of what it builds. Removes the pictures' drift.
+        """The colours that `source_parts` measures of a clip, without the parts it builds. Removes the pictures' drift.
 
         Raises:
             ProjectError: The reference was trained with other cameras.
@@ -264,7 +264,7 @@ class ClipPreparation:
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points):,} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
-        if "static" in self._method.covering(model):  # what can change learns its light by itself
+        if "static" in self._method.covering(model):  # parts that can change learn their light by themselves
             return parts
         measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
         return parts
@@ -284,10 +284,10 @@ class ClipPreparation:
         if kept is None or not kept.equals(backgrounds):
             write_backgrounds(self._prep_dir, backgrounds, key)
 
-    # ---------------------------------------------------------------- what is kept of an attempt
+    # ---------------------------------------------------------------- the kept parts of an attempt
 
     def _key(self) -> dict[str, Any]:
-        """What a preparation depends on, apart from what `_keep_after` adds."""
+        """The inputs a preparation depends on, apart from those `_keep_after` adds."""
 
         def named(state: ClipState | None) -> str | None:
             return None if state is None else state.header.fingerprint
@@ -346,7 +346,7 @@ class ClipPreparation:
         """The cloud of all frames of the clip, kept or new.
 
         Args:
-            drift: What was taken out of the pictures.
+            drift: The drift taken out of the pictures.
             spacing, gains: Of the reference clip; None for a reference clip.
         """
         rig, config, keep = self._cameras.rig, self._config, self._stages.keep
@@ -369,7 +369,7 @@ class ClipPreparation:
         return cloud
 
     def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:
-        """What the reference clip left behind, made anew from its pictures where it is gone."""
+        """The files the reference clip left behind, made anew from its pictures where gone."""
         clip = _clip_of(reference.header)
         pictures = TrainingPictures(self._capture, clip, self._camera_indices)
         _, exposures = self._without_drift(pictures)
@@ -410,10 +410,10 @@ class ClipPreparation:
             )
         return cloud
 
-    # ---------------------------------------------------------------- what moves
+    # ---------------------------------------------------------------- moving parts
 
     def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
-        """What moves in each picture. [M, C, H, W] bool"""
+        """The moving pixels of each picture. [M, C, H, W] bool"""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         brightness = brightness_in(parts.model, self._cameras.views) if parts.model.has_light else None
         return motion_masks(pictures, parts.backgrounds, brightness, self._report, keep)
@@ -421,7 +421,7 @@ class ClipPreparation:
     def _moving_cloud(
         self, parts: ClipParts, pictures: TrainingPictures, masks: np.ndarray
     ) -> tuple[MovingCloud, float | None]:
-        """What moves, and the spacing of moving anchors."""
+        """The moving points, and the spacing of moving anchors."""
         static_points = host_array(parts.model.anchor_set("static").positions)
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         gains = host_array(parts.gains)

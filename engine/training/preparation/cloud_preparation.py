@@ -1,4 +1,4 @@
-"""From pixels to clouds: what has to be known before a clip can be trained.
+"""From pixels to clouds: the inputs needed before a clip can be trained.
 
 Reference clip: backgrounds of the training cameras and a dense static cloud first; once the static part has been
 trained, its renders correct the backgrounds, and what differs from them is what moves. Source clip: the reference's
@@ -47,7 +47,7 @@ BACKGROUNDS_FILE = "backgrounds.safetensors"
 
 @dataclass(frozen=True, slots=True)
 class Backgrounds:
-    """What each training camera sees when nothing moves.
+    """The background of each training camera: its picture when nothing moves.
 
     Attributes:
         images: [C, H, W, 3] uint8
@@ -59,7 +59,7 @@ class Backgrounds:
 
     @classmethod
     def none(cls) -> Backgrounds:
-        """Of no camera: for a clip that continues without them."""
+        """Backgrounds of no camera: for a clip that continues without them."""
         return cls(np.zeros((0, 0, 0, 3), np.uint8), np.zeros((0, 0, 0), bool))
 
     def equals(self, other: Backgrounds) -> bool:
@@ -91,7 +91,7 @@ def estimate_backgrounds(
     """Backgrounds from frames spread over the whole capture, or over the clip with backgrounds=clip.
 
     Args:
-        clip: What is prepared.
+        clip: The clip to prepare.
         exposures: Of each camera, the one that its background comes in; None leaves frames as they are.
     """
     start, stop = _background_range(capture, clip, config)
@@ -102,7 +102,7 @@ def estimate_backgrounds(
         pictures = pictures if exposure is None else exposure.applied_to(pictures)
         background = estimate_background(pictures, capture.valid(camera))
         masks = [mask for frame in frames if (mask := capture.moving_mask(camera, frame)) is not None]
-        if masks:  # who stands still for most of the time looks like background, but a mask tells
+        if masks:  # who stands still for most of the time looks like background, but a mask shows it
             background.is_stable[2 * np.sum(masks, axis=0) > len(masks)] = False
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
@@ -133,7 +133,7 @@ def static_cloud(
     keep: Keep = do_now,
     layout: Layout | None = None,
 ) -> StaticCloud:
-    """Dense points of what stands still, with white balance gains.
+    """Dense points of still parts, with white balance gains.
 
     Args:
         is_valid: Pixels that the cameras see; None for all. [C, H, W] bool
@@ -244,7 +244,7 @@ def motion_masks(
     report: ReportProgress,
     keep: Keep = do_now,
 ) -> np.ndarray:
-    """What differs from the background, per frame and camera. [M, C, H, W] bool
+    """The pixels that differ from the background, per frame and camera. [M, C, H, W] bool
 
     Args:
         brightness: (camera row, frame in clip) -> factor by which light changes the background [H, W, 1]; None where it
@@ -278,7 +278,7 @@ def motion_masks(
 def moving_pixels(
     picture: np.ndarray, background: np.ndarray, capture: Capture, camera_index: int, frame_index: int
 ) -> np.ndarray:
-    """What moves in one picture: what differs from the background, and what a mask of the capture says. [H, W] bool
+    """The moving pixels of one picture: those that differ from the background or lie in a capture's mask. [H, W] bool
 
     Both together: masks are mostly of people and things, without the shadows that go with them.
 
@@ -299,7 +299,7 @@ def stable_in_clip(backgrounds: Backgrounds, pictures: TrainingPictures, masks: 
     """Backgrounds in the light of a clip: where a camera sees something stand still in most frames, their mean.
 
     Args:
-        masks: What moves, of the same pictures. [M, C, H, W] bool
+        masks: The moving pixels of the same pictures. [M, C, H, W] bool
     Returns:
         Trusted are the pixels that were seen so; the others are as they were.
     """
@@ -401,7 +401,7 @@ def moving_cloud(
     voxel_size: float | None,
     keep: Keep = do_now,
 ) -> MovingCloud:
-    """Surface points of what moves, fused over the frames of the clip, with the frames each exists in.
+    """Surface points of moving parts, fused over the frames of the clip, with the frames each exists in.
 
     Args:
         voxel_size: The reference clip's for a source clip, so that the same place gives the same anchors; None
@@ -432,10 +432,10 @@ def _background_range(capture: Capture, clip: Clip, config: TrainConfig) -> tupl
 
 
 def key_of_corrected(capture: Capture, clip: Clip, camera_indices: Sequence[int], config: TrainConfig) -> dict:
-    """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them.
+    """The key of corrected backgrounds, as `write_backgrounds` keeps it next to them.
 
     Args:
-        clip: What they were estimated for.
+        clip: The clip they were estimated for.
     """
     rig = capture.rig.subset(list(camera_indices))
     excluded = exclusion_key(capture.exclusions, (0, capture.n_frames))

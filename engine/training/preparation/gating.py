@@ -23,7 +23,7 @@ from engine.model.host_array import host_array
 
 
 def without_static_regions(cloud: MovingCloud, regions: Sequence[GateRegion]) -> MovingCloud:
-    """What moves outside the regions marked as static."""
+    """The moving points outside the regions marked as static."""
     is_kept = ~marked(cloud.points, regions, "static")
     if is_kept.all():
         return cloud
@@ -35,7 +35,7 @@ def decide(model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool) 
 
     Args:
         model: Its static set is split; before a field is attached.
-        regions: What the user marked; later regions overrule earlier ones.
+        regions: The regions the user marked; later regions overrule earlier ones.
         is_source: Whether the clip inherits from another one.
     Returns:
         Reasons by role, and the decision in one line.

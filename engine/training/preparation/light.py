@@ -37,7 +37,7 @@ def measure_light(
         model: Of a clip; one whose static anchors learn, or change over time, or that has none, stays as it is.
         pictures: Of the clip, in the exposure of the backgrounds.
         rig: Training cameras.
-        backgrounds: What they see in the reference clip when nothing moves.
+        backgrounds: Their pictures in the reference clip when nothing moves.
         exposures: That of each background; None where no camera's exposure is looked at.
         report: Gets one line.
     """
@@ -89,7 +89,7 @@ def _frames_in(
 
 
 def brightness_in(model: ClipModel, views: Sequence[View]) -> Callable[[int, int], np.ndarray]:
-    """By which factor light changes what stands still: (row of the views, frame in clip) -> [H, W, 1] float32."""
+    """The factor by which light changes still parts: (row of the views, frame in clip) -> [H, W, 1] float32."""
     times = (0.0, model.n_frames / model.clip_length)
     ends = [np.stack([_light_in(model, view, clip_time) for clip_time in times]) for view in views]
 

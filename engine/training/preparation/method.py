@@ -41,11 +41,11 @@ class Method:
     keeps_unread_entries = False
 
     def base(self, reference: ClipState | None, previous: ClipState | None) -> ClipState | None:
-        """What a clip begins with: the reference clip that it inherits from; None for a clip that inherits nothing."""
+        """The reference clip that a clip inherits from; None for a clip that inherits nothing."""
         return reference
 
     def words(self, config: TrainConfig) -> str:
-        """What becomes of what a source clip takes over, in one line."""
+        """How a source clip treats the parts that it takes over, in one line."""
         moving = ", moving ones keep learning" if config.inherit == "moving" else ""
         return f"inherited anchors kept{moving}, decoder kept"
 
@@ -68,7 +68,7 @@ class Method:
         """Which moving points of a source clip become anchors: those that inherited anchors do not cover.
 
         Args:
-            cloud: What moves in the clip.
+            cloud: The clip's moving points.
             is_new: Points that no inherited anchor covers. [P] bool
             n_used: Inherited anchors that exist in some frame of the clip.
             config: Gives the most anchors.

@@ -34,8 +34,8 @@ class Stages:
     Args:
         prep_dir: Folder for the files; need not exist.
         clip_index: Of the clip.
-        key: What every piece depends on; JSON-able.
-        report: Gets one line about what is taken over or removed.
+        key: The inputs that every piece depends on; JSON-able.
+        report: Gets one line about files taken over or removed.
         clock: Seconds; tests bring their own.
     """
 

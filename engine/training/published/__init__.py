@@ -1,1 +1,1 @@
-"""What the published method says, point by point, and what `--preset paper` does about it."""
+"""The published method, point by point, and how `--preset paper` follows it."""

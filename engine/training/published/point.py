@@ -18,9 +18,9 @@ class Point:
     Attributes:
         name: Short and unique.
         follows: Whom the preset follows there.
-        paper: What the paper says; empty where it is silent.
-        released: What the released code does; empty where it does as the paper says.
-        here: What is done here; empty where that is as `follows` says.
+        paper: The paper's statement; empty where it is silent.
+        released: The behaviour of the released code; empty where it does as the paper says.
+        here: The behaviour here; empty where that is as `follows` says.
         reason: Why the paper or the released code has it otherwise; empty where neither has.
         settings: Values in the preset that make it so.
     """

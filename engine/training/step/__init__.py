@@ -1,1 +1,1 @@
-"""What one training step consists of, beside decoding and drawing."""
+"""The parts of one training step, apart from decoding and drawing."""

@@ -24,19 +24,19 @@ from engine.raster.gaussians import Gaussians
 from engine.training.step.valid_pixels import ValidPixels
 
 MAX_BYTES = 1 << 30
-"""Memory for what is kept of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
+"""Memory for the kept views of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
 
 
 @dataclass(frozen=True, slots=True)
 class ActivePicture:
-    """What is to be drawn and compared of one training picture.
+    """The part of one training picture to draw and compare.
 
     Attributes:
         gaussians: Those that touch an active tile, and all that learn.
         learning: The ones that learn alone.
         n_all: How many there would be with all tiles.
         tile_mask: Active tiles, or None for all; tiles that the camera sees nothing of are none. [rows, columns] bool
-        rest: What the other tiles hold; None where nothing of them counts. [H, W, 3]
+        rest: The picture in the other tiles; None where nothing of them counts. [H, W, 3]
     """
 
     gaussians: Gaussians
@@ -48,7 +48,7 @@ class ActivePicture:
 
 @dataclass(frozen=True, slots=True)
 class _FrozenView:
-    """What a camera sees of the constant Gaussians.
+    """A camera's view of the constant Gaussians.
 
     Attributes:
         pictures: All of them, scene colours over black: in the light of the clip's start and of its end, one where that
@@ -73,9 +73,9 @@ class ActiveTiles:
 
     Args:
         model: A clip in which one set is constant; see `applies`.
-        backend: What it is trained with.
+        backend: The backend it is trained with.
         valid: Which pixels of its cameras count.
-        max_bytes: Memory for what is kept.
+        max_bytes: Memory for the kept views.
     """
 
     def __init__(

@@ -40,12 +40,12 @@ def photometric_loss(
     Args:
         image: Rendered. [H, W, 3]
         truth: Values in 0..1 of the image's dtype, or uint8, read as value / 255. No gradient. [H, W, 3]
-        backend: What compares, from engine.backends.
+        backend: The backend that compares, from engine.backends.
         ssim_weight: w in 0..1.
         gain: Colour gain of the camera, multiplied onto the image. [3]
         is_counted: Pixels that count; None means all. [H, W] bool
         tile_mask: Active tiles of 32 px, the last ones cut off by the picture; None means all. [rows, columns] bool
-        rest: What tiles hold that are not active, like the image; None for the truth. No gradient, neither by it nor,
+        rest: Content of inactive tiles, like the image; None for the truth. No gradient, neither by it nor,
             in its tiles, by the gain. [H, W, 3]
     Returns:
         Loss and mean square error. A NaN or infinity in a pixel that counts makes both NaN or infinite.

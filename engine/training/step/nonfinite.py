@@ -14,7 +14,7 @@ def not_finite(fault: Fault, *, where: str, config: TrainConfig) -> NonFiniteLos
     cause, or the parameters.
 
     Args:
-        fault: What was found.
+        fault: The fault found.
         where: Step and camera.
         config: Settings of the training, for the advice.
     """
@@ -32,7 +32,7 @@ def not_finite(fault: Fault, *, where: str, config: TrainConfig) -> NonFiniteLos
 
 
 def advice(config: TrainConfig) -> str:
-    """What to change when it happens again. Settings of a project with progress stay, hence another folder."""
+    """The settings to change when the fault returns. Settings of a project with progress stay, hence another folder."""
     clip = config.max_gradient_norm / 10 or 1.0
     return (
         f"If it happens again, train into another project folder with --set table_lr={config.table_lr / 2:g} "

@@ -40,7 +40,7 @@ class ShuffledOrder:
         """Inverse of `state`.
 
         Raises:
-            ValueError: What is left of the pass are not items.
+            ValueError: The rest of the pass are not items.
         """
         left = list(state["left"])
         if not all(type(item) is int and 0 <= item < self.n_items for item in left):

@@ -29,7 +29,7 @@ MAX_BYTES = 4 << 30
 
 
 class _Terms(NamedTuple):
-    """What a picture was compared to. loss is the sum of the terms, all scalars; image is the rendered one."""
+    """The outcome of comparing a picture. loss is the sum of the terms, all scalars; image is the rendered one."""
 
     loss: Tensor
     photometric: Tensor
@@ -43,8 +43,8 @@ class StepwisePhase:
     """See engine.backends.phase.Phase.
 
     Args:
-        plan: What it is given.
-        backend: What it is computed with.
+        plan: The phase's inputs.
+        backend: The backend it is computed with.
     """
 
     def __init__(self, plan: PhasePlan, backend: Backend) -> None:
@@ -145,7 +145,7 @@ class StepwisePhase:
         return _Terms(loss, compared.loss, volume, mean_square, image, active.n_all)
 
     def _fault_of(self, item: int) -> Fault:
-        """What is not finite in a step that changed nothing: it is done again, up to the update."""
+        """The values not finite in a step that changed nothing: the step is done again, up to the update."""
         terms = self._compare(item)
         is_of_gradient = bool(terms.loss.isfinite())
         if is_of_gradient:
@@ -157,7 +157,7 @@ class StepwisePhase:
         return Fault(*values, n_bad, terms.image.numel(), is_of_gradient, names)
 
     def active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
-        """What is drawn and compared of a picture."""
+        """The parts of a picture to draw and compare."""
         rows = self.sight.rows(camera_row, clip_time)
         if self.tiles is not None:
             return self.tiles.split(camera_row, view, clip_time, rows)

@@ -1,11 +1,11 @@
-"""TrainingCameras: the cameras a clip is trained with, and how their poses and focal lengths learn beside the model.
+"""TrainingCameras: the cameras a clip is trained with, and how their poses and focal lengths learn with the model.
 
 Moving a camera is the same as moving the scene in front of it, so the gradient of a pose follows from the gradients of
 the Gaussians: no kernel knows of it. Where the focal length is concerned, the footprint of a Gaussian is taken to grow
 evenly; what its slant adds away from the picture's centre is left out.
 
-What learns is counted in pixels: by how much the picture moves at its middle and at a typical depth. So one rate suits
-all seven numbers of all cameras, and their gradients are no larger than others.
+The learned numbers are counted in pixels: by how much the picture moves at its middle and at a typical depth. So one
+rate suits all seven numbers of all cameras, and their gradients are no larger than others.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class TrainingCameras:
         self._start = start
         self._views: dict[int, View] = {}
         self.first_views = self.views
-        """Of all cameras, as they were at first: what they may see of the scene is looked up once."""
+        """Views of all cameras, as they were at first: what they may see of the scene is looked up once."""
         self._watched: Gaussians | None = None
 
     @property
@@ -68,7 +68,7 @@ class TrainingCameras:
 
     @property
     def kept(self) -> np.ndarray | None:
-        """What a checkpoint holds, to the last bit; None where nothing learns. [C, 7]"""
+        """The corrections for a checkpoint, to the last bit; None where nothing learns. [C, 7]"""
         return host_array(self.pixels).copy() if self.is_learning else None
 
     def restore(self, kept: np.ndarray | None) -> None:
@@ -87,11 +87,11 @@ class TrainingCameras:
 
     @property
     def views(self) -> list[View]:
-        """Of all cameras, as they are by now."""
+        """Views of all cameras, as they are by now."""
         return [self.view(row) for row in range(len(self._original))]
 
     def view(self, row: int) -> View:
-        """Of one camera, as it is by now."""
+        """View of one camera, as it is by now."""
         if row not in self._views:
             pose, K = self._original.world_to_camera[row], self._original.Ks[row]
             if self.corrections is not None:
@@ -166,7 +166,7 @@ def _gradient(tensor: Tensor) -> np.ndarray:
 
 
 def _units(rig: CameraRig) -> np.ndarray:
-    """What one pixel is of each number of each camera's correction. [C, 7]"""
+    """The size of one pixel in each number of each camera's correction. [C, 7]"""
     pixel = 1.0 / focal_px(rig.Ks)
     units = np.repeat(pixel[:, None], N_VALUES, axis=1)
     units[:, TRANSLATION] *= np.linalg.norm(rig.centers - rig.focus_point(), axis=1)[:, None]

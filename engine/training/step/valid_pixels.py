@@ -11,7 +11,7 @@ from engine.raster.pinhole_view import TILE_PX
 
 
 class ValidPixels:
-    """What a step needs to know of the valid pixels of each training camera. Owns one flag a pixel.
+    """The valid pixels of each training camera, as a step needs them. Owns one flag a pixel.
 
     Cameras that see all of their pictures have None everywhere, and their steps are as without this class.
 

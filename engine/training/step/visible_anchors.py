@@ -1,4 +1,4 @@
-"""What each training camera can see of a clip's anchors, so that a step decodes no others."""
+"""The anchors of a clip that each training camera can see, so that a step decodes no others."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class _Wanted(NamedTuple):
 
 @dataclass(slots=True)
 class _Plan:
-    """What a decode is made of, apart from the tensors that may learn.
+    """The inputs of a decode, apart from the tensors that may learn.
 
     Those come as one list: three of each set, then the weights in the order of `layout`, then the tables of the knots.
 

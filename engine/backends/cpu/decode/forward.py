@@ -54,7 +54,7 @@ def load_inputs(arguments, first, n_lanes, encoded, scratch):
     """Static and dynamic features of one block to region `inputs`, with the field network applied on the way.
 
     Args:
-        encoded: What `encode_block` wrote; 0 for a set without dynamic feature, whose inputs are the static ones.
+        encoded: The output of `encode_block`; 0 for a set without dynamic feature, whose inputs are the static ones.
         scratch: The worker's scratch memory.
     """
     job = read(DecodeJob, arguments)

@@ -1,4 +1,4 @@
-"""What the kernels of the decode agree on: sizes, where things lie in scratch memory, and how weights are numbered.
+"""Conventions of the decode's kernels: sizes, where things lie in scratch memory, and how weights are numbered.
 
 A block is 64 anchors that go the whole way together. Inside a block a value of all anchors is one row of 64 floats,
 so that anchors lie along the lanes: layers of any width need no padding, and what is wrong with one anchor stays in
@@ -108,7 +108,7 @@ def regions(sizes: Sizes, *, is_backward: bool) -> Regions:
 
 
 class DecodeJob(NamedTuple):
-    """What the kernels that go through the blocks of one set are given; None stands for an array that is not there.
+    """The inputs of kernels that go through the blocks of one set; None stands for an array that is not there.
 
     Attributes:
         Sizes: as in `Sizes`. Regions: as in `Regions`, as byte offsets into a worker's scratch memory.
@@ -118,7 +118,7 @@ class DecodeJob(NamedTuple):
         corner_indices, corner_weights: Of all its anchors, or None for a set without dynamic feature. [A, L, 8]
         table, next_table: Of the one or two knots. [L, T, C] float32
         knot_weights: [2] float32
-        knot_keys: What entries of each knot and level are combined with. [2, L] int32
+        knot_keys: The key combined with entries of each knot and level. [2, L] int32
         is_rectified: Whether the field's network ends in a ReLU.
         n_levels, n_entries, n_channels: L, T, C.
         encoded: Grid values, one row of padded width per chosen anchor. [blocks * 64, ..] float32, or one block per
@@ -129,7 +129,7 @@ class DecodeJob(NamedTuple):
         scratch, scratch_bytes: Memory of all workers, and bytes of each.
         counter: The next block, or group of blocks.
         d_means, d_quats, d_scales, d_opacities, d_colors: Gradient of the output.
-        wants_features, wants_scales, wants_heads, wants_field: What to compute.
+        wants_features, wants_scales, wants_heads, wants_field: The outputs to compute.
         d_features, d_log_offset_scales, d_log_base_scales: Written at the chosen rows, where wanted.
         d_encoded: Written where the field is wanted; laid out like `encoded`.
         places: Starts of `gradient_places`. int64

@@ -21,7 +21,7 @@ from engine.kernels.lanes import FLOATS, INT64, VECTOR_BYTES, LaneBuilder, Lanes
 from engine.kernels.routines import ints, routine
 
 PLAIN, RELU, WHERE_POSITIVE, ADD = range(4)
-"""What happens to a finished product: nothing; max with 0; 0 wherever the mask is not above 0; added to `out`."""
+"""The treatment of a finished product: nothing; max with 0; 0 wherever the mask is not above 0; added to `out`."""
 
 _ROWS = 4
 _WIDEST = 4 if llvm.get_host_cpu_features().get("avx512f", False) else 1

@@ -99,7 +99,7 @@ class BlendJob(NamedTuple):
         n_columns: Tiles per image row.
         background: [3]
         image: Written. [H, W, 3]
-        transmittance, alpha: What is let through behind the last Gaussian, and one minus it, written. [H, W]
+        transmittance, alpha: Share of light let through behind the last Gaussian, and one minus it, written. [H, W]
         pair_blocks: Blocks of the tile that each pair changed, one bit each, written. [pairs]
         scratch: One row per worker, 64-byte aligned. [workers, SCRATCH_FLOATS]
         counter: Next tile.

@@ -68,7 +68,7 @@ class _Drawing:
 
 @dataclass(frozen=True, slots=True)
 class _Request:
-    """What is not a tensor that a gradient flows to."""
+    """The inputs that no gradient flows to."""
 
     view: PinholeView
     is_frozen: np.ndarray

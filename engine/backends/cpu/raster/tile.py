@@ -1,4 +1,4 @@
-"""What the forward and the backward kernel of a tile share: scratch layout, reach, the footprint, scheduling.
+"""The parts that a tile's forward and backward kernel share: scratch layout, reach, the footprint, scheduling.
 
 A tile is 8x8 blocks of 4x4 pixels; lane l of a block is the pixel (l % 4, l // 4). Both kernels evaluate a Gaussian by
 the same `Footprint`, in the same operations, so that the backward pass repeats the decisions of the forward one.

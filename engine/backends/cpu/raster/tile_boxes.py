@@ -62,7 +62,7 @@ class MeetJob(NamedTuple):
     Attributes:
         boxes: [N, 2]
         mask_sums: Of the wanted tiles, see `binning.mask_sums`.
-        rows: What stands for each box in the result. [N]
+        rows: The number that stands for each box in the result. [N]
         found: Written: `rows` of boxes over a wanted tile, in order. [N]
         n_found: Written: how many. [1]
     """

@@ -364,7 +364,7 @@ class LossWorkspace:
 
 @dataclass(frozen=True, slots=True)
 class LossTerms:
-    """What one pass gives: sums over all values of the picture, and gradients of the loss.
+    """The results of one pass: sums over all values of the picture, and gradients of the loss.
 
     Attributes:
         l1, square, dissimilarity: Sums of |a - b|, (a - b)^2 and 1 - SSIM.

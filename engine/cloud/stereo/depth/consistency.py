@@ -17,7 +17,7 @@ EDGE_SHARE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class DepthAgreement:
-    """What the other cameras say about each pixel of one depth map.
+    """The other cameras' check of each pixel of one depth map.
 
     Attributes:
         n_agree: Cameras whose own depth matches. [H, W] int32

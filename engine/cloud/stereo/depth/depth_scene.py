@@ -1,4 +1,4 @@
-"""What depth maps are made of and checked against: small pictures of all cameras at one moment, and their neighbours.
+"""The inputs and checks of depth maps: small pictures of all cameras at one moment, and their neighbours.
 
 Letters: C cameras, H W full pictures, h w working pictures (about 160 x 90).
 """
@@ -41,7 +41,7 @@ KEPT_CAMERAS = 8
 
 @dataclass(frozen=True, slots=True)
 class DepthScene:
-    """What all steps after the sweep look at.
+    """The data of all steps after the sweep.
 
     Attributes:
         greys: White-balanced. [C, h, w] float32
@@ -61,7 +61,7 @@ class DepthScene:
     gains: np.ndarray
 
     def checked(self, depths: np.ndarray, tolerance: float) -> list[DepthAgreement]:
-        """What the neighbours say about each depth map [C, h, w]."""
+        """The neighbours' check of each depth map [C, h, w]."""
         return map_ordered(
             lambda camera: check_depths(
                 depths, self.rig, camera=camera, others=self.sources[camera], tolerance=tolerance
@@ -81,7 +81,7 @@ class DepthScene:
             low, high = 1.0 / self.far[camera], 1.0 / self.near[camera]
             if agreed.sum() >= MIN_AGREED_PIXELS:  # a plate extrapolates freely: keep it within what was measured
                 nearest, farthest = np.percentile(check.depths[agreed], [1.0, 99.0])
-                if is_alone.any():  # what stands close to a camera, hardly another one sees
+                if is_alone.any():  # hardly another camera sees surfaces close to one
                     nearest = min(nearest, float(np.percentile(check.depths[is_alone], 5.0)))
                 low, high = max(low, 0.95 / farthest), min(high, 1.1 / nearest)
             filled = fill_inverse_depth(1.0 / check.depths, weights, self.greys[camera], low=low, high=high)
@@ -149,7 +149,7 @@ class DepthMaps:
     """Complete depth maps at working size and what backs every pixel.
 
     Attributes:
-        scene: What they were made of.
+        scene: The scene they were made of.
         measured: Inverse depths as they were matched, whether or not others agree. [C, h, w] float64
         depths: Camera z, positive everywhere. [C, h, w] float64
         is_agreed: At least two other cameras measured the same depth. [C, h, w] bool

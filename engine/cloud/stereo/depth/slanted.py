@@ -27,13 +27,13 @@ N_SCANS = 4
 """Passes over the picture, alternating in direction."""
 N_NEIGHBORS = 6
 FAR_PX = 5
-"""Planes are taken from six pixels: three beside this one, and three this far away."""
+"""Planes are taken from six pixels: three next to this one, and three this far away."""
 N_CHANCES = 2
 """Planes by chance that each pixel begins with, besides those of the map."""
 MAX_SLOPE = 0.1
 """Slope of planes by chance: relative change of inverse depth per pixel at most."""
 PRIOR_WEIGHT = 0.1
-"""What a plane far from the map to begin with costs more: bare walls match everywhere and have to stay smooth."""
+"""The extra cost of a plane far from the initial map: bare walls match everywhere and have to stay smooth."""
 PRIOR_SHARE = 0.05
 """Relative difference of depth at which that has grown to about two thirds."""
 MIN_SEEN = 0.6
@@ -264,7 +264,7 @@ def _search(grey, sources, are_usable, matrices, shifts, seeds, is_wanted, n_sca
                         state = _anywhere(low, high, state, trial)
                     elif (
                         t < N_NEIGHBORS
-                    ):  # those that this scan has been at: beside, above and diagonally, near and far
+                    ):  # those that this scan has been at: next to it, above and diagonally, near and far
                         distance = step * (1 if t < 3 else FAR_PX)
                         dx = 0 if t % 3 == 1 else (distance if t % 3 == 0 else -distance)
                         dy = 0 if t % 3 == 0 else distance
