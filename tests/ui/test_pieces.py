@@ -17,7 +17,6 @@ from ui.panels.picture.panes import arrange, fit
 from ui.panels.state import Rect
 from ui.panels.training.clip_quality import clip_quality
 from ui.panels.training.curves import MAX_PLOT_POINTS, plot_arrays, seen_part
-from ui.panels.training.training import anchors_text
 
 
 def test_plot_arrays_are_contiguous_finite_and_short() -> None:
@@ -192,9 +191,3 @@ def test_nonsense_arguments_end_with_2_and_one_line(capsys: pytest.CaptureFixtur
         assert ended.value.code == 2
         assert expected in message
         assert message.count("\n") == 1
-
-
-def test_anchors_of_a_clip_are_a_number_or_a_sum() -> None:
-    assert anchors_text(0, 0) == "–"
-    assert anchors_text(0, 24291) == "24,291"
-    assert anchors_text(24291, 6646) == "24,291 + 6,646"

@@ -103,9 +103,9 @@ def test_a_reason_where_there_is_none(open_residuals, project):
     opened = open_residuals()
     opened.timeline.seek(4)
     heat = opened.residuals.anchor_heat(opened.timeline, "error")
-    assert (len(heat.values), heat.note) == (0, "Clip 1 is not trained.")
+    assert (len(heat.values), "Clip 1" in heat.note) == (0, True)
     opened.timeline.seek(0)
-    assert opened.residuals.anchor_heat(opened.timeline, "E").note == "Frame 0 has no previous frame."
+    assert opened.residuals.anchor_heat(opened.timeline, "E").note.startswith("Frame 0")
     assert finished(opened, "error", 0).note == ""
 
 

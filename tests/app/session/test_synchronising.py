@@ -126,4 +126,4 @@ def test_closing_ends_the_measurement(session, monkeypatch):
 def test_without_a_capture_there_is_a_notice(make_session):
     session = make_session(is_open=False)
     session.dispatch(SynchroniseCameras())
-    assert session.notices[0].title == "The cameras cannot be synchronised"
+    assert len(session.notices) == 1

@@ -20,12 +20,6 @@ def test_copies_are_told_once_for_each_group(tmp_path):
     assert 'Cameras "a" and "b" and 1 more show the same pictures: a-0 and b-0' in problem.message
 
 
-def test_the_same_file_is_told_as_such(tmp_path):
-    one = camera(tmp_path, "a", b"x")
-    (problem,) = check_duplicates({"a": one, "b": one})
-    assert "use the same file: a-0" in problem.message
-
-
 def test_files_that_differ_at_their_ends_alone_are_different(tmp_path):
     middle = bytes(4 * SAMPLE_BYTES)
     contents = {"a": b"1" + middle + b"1", "b": b"2" + middle + b"1", "c": b"1" + middle + b"2"}

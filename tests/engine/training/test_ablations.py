@@ -341,12 +341,7 @@ def test_merging_makes_residual_anchors_moving_ones(streamed):
         ({"inherit": "off", "residual": "none"}, "with nothing that moves"),
         ({"start": "previous"}, "needs independent=true"),
         ({"decoder": "fresh"}, "'frozen', 'finetune' or 'new'"),
-        ({"residual": "some"}, "'dedup', 'none' or 'full'"),
-        ({"inherit": "no"}, "'frozen', 'moving', 'trainable' or 'off'"),
-        ({"field": "one"}, "'per_clip', 'continue' or 'joint'"),
-        ({"field_tables": "none"}, "'shared' or 'per_frame'"),
         ({"passes": -1.0}, "passes is -1.0"),
-        ({"field_levels": 17}, "field_levels is 17"),
     ],
 )
 def test_wrong_combinations_and_values_are_named(settings, expected):

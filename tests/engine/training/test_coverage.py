@@ -48,8 +48,6 @@ def test_without_need_every_point_outside_becomes_an_anchor():
     model, cloud = scene()
     coverage = add_residual(model, cloud, TrainConfig(max_moving_points=2 * N))
     assert coverage == Coverage(2 * N, N, N, 0, 1.0, "all of them")
-    said = f"{N:,} of {2 * N:,} moving points (50 %) lie outside the inherited anchors; {N:,} resid"
-    assert coverage.text.startswith(said)
 
 
 def test_inherited_anchors_in_use_count_and_the_rest_is_left_to_anchors_beside_it():

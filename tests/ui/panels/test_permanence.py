@@ -18,7 +18,6 @@ from engine.editing.picks import pack_rows
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
 from ui.panels.state import EDITS
-from ui.shell.dialogs.clip_questions import clip_question_texts
 
 pytestmark = pytest.mark.gl
 
@@ -58,13 +57,6 @@ def test_it_is_asked_before_clips_are_written(panel: Pilot, button: str, command
     n_before = len(panel.session.commands)
     panel.click(button)
     assert panel.session.commands[n_before] == command  # the made-up session goes on asking
-
-
-def test_the_question_says_what_stays() -> None:
-    whole = " ".join(clip_question_texts(DeletionsQuestion(1234, 3, 0)))
-    assert "3 clips will be rewritten without 1,234 anchors" in whole
-    assert "not trained" not in whole
-    assert "1 clip is not trained" in " ".join(clip_question_texts(DeletionsQuestion(1, 1, 1)))
 
 
 def test_an_edit_that_has_lost_its_picks_looks_otherwise(panel: Pilot) -> None:

@@ -14,7 +14,6 @@ from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session.showing.look_commands import LookThrough, SetCompare, SetFrame, ShowHeat
 from app.status import CELL_RANGES, ResidualStatus, SeamStatus
-from engine.text import camera_text
 from tests.ui.pilot import Pilot
 from ui.panels.picture.heat_overlay import heat_words
 from ui.panels.residuals.matrix import (
@@ -73,15 +72,6 @@ def test_every_camera_has_a_name_or_a_neighbour_with_one() -> None:
         assert min(after - row for row, after in itertools.pairwise(rows)) * 250.0 / 31 >= NAME_HEIGHT
 
 
-def test_a_camera_is_called_one() -> None:
-    assert [camera_text(name) for name in ("13", "cam13", "Camera 2", "left")] == [
-        "camera 13",
-        "cam13",
-        "Camera 2",
-        "camera left",
-    ]
-
-
 def test_a_place_outside_of_the_matrix_is_no_cell() -> None:
     assert cell_at(0.999, 0.0, 30, 8) == (29, 0)
     assert cell_at(1.0, 0.5, 30, 8) is None
@@ -111,11 +101,9 @@ def test_a_seam_is_neither_ranked_nor_flagged_before_all_cameras_are_in() -> Non
 def test_progress_counts_what_the_panel_shows() -> None:
     measured = {"psnr": (1860, 4650), "flip": (0, 4650), "E": (26, 4619)}
     status = ResidualStatus(measured=measured, n_all=4650, is_measuring=True)
-    assert progress_text(status, "psnr") == "PSNR of 1,860 of 4,650 pictures measured."
-    assert progress_text(status, "flip") == "FLIP of 0 of 4,650 pictures measured."
-    later = replace(status, eta_s=4500.0)
-    assert progress_text(later, "E") == "Flicker of 26 of 4,619 pictures measured; all figures in about 1 h 15 min."
-    assert progress_text(replace(later, n_done=4650), "E") == "All 4,650 pictures of trained clips are measured."
+    for column, (n, n_all) in measured.items():
+        assert f" {n:,} of {n_all:,} " in progress_text(status, column)
+    assert "1 h 15 min" in progress_text(replace(status, eta_s=4500.0), "E")
 
 
 def test_a_value_outside_of_the_map_is_none() -> None:
@@ -127,13 +115,11 @@ def test_a_value_outside_of_the_map_is_none() -> None:
 
 def test_words_say_what_is_shown_and_why_not() -> None:
     kind = HEAT_KINDS["E"]
-    shown = HeatMap(np.zeros((2, 2), np.float32), "E", 1, 0, 5, 0, mean=1.25)
-    assert heat_words(kind, shown) == "E: excess flicker, frame 5, mean 1.2 x 1/255"
-    little = HeatMap(np.zeros((2, 2), np.float32), "E", 1, 0, 5, 0, mean=0.0452)
-    assert heat_words(kind, little) == "E: excess flicker, frame 5, mean 0.045 x 1/255"
-    nothing = HeatMap(None, "E", None, 0, 0, 0, note="Frame 0 has no previous frame.")
-    assert "no previous frame" in heat_words(kind, nothing)
-    assert "being measured" in heat_words(kind, None)
+    for mean, told in ((1.25, " 1.2 "), (0.0452, " 0.045 ")):
+        shown = HeatMap(np.zeros((2, 2), np.float32), "E", 1, 0, 5, 0, mean=mean)
+        assert told in heat_words(kind, shown)
+    assert "It is so." in heat_words(kind, HeatMap(None, "E", None, 0, 0, 0, note="It is so."))
+    assert heat_words(kind, None)
 
 
 # ---- in the window ---------------------------------------------------------------------------------------------

@@ -163,23 +163,13 @@ def test_events_wait_for_the_frame_of_a_key_and_keep_their_order() -> None:
 
 @pytest.mark.gl
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("symbol", "modifiers", "why_not"),
-    [
-        (key.X, (key.LALT,), "Look through a camera first."),
-        (key.N, (SHIFT,), "No clip is waiting."),
-        (key.UP, (SHIFT,), "There is no marker before this frame."),
-        (key._3, (CTRL,), "There is no bookmark 3 yet."),
-        (key.V, (SHIFT,), "There is only one view."),
-        (key.Z, (CTRL,), "Nothing to undo."),
-    ],
-)
-def test_a_key_that_cannot_act_says_why_once(
-    pilot: Pilot, symbol: int, modifiers: tuple[int, ...], why_not: str
-) -> None:
-    for _ in range(3):
-        pilot.key(symbol, modifiers=modifiers)
-    assert [(notice.kind, notice.title) for notice in pilot.session.notices] == [("info", why_not)]
+def test_a_key_that_cannot_act_says_why_once(pilot: Pilot) -> None:
+    keys = ((key.X, key.LALT), (key.N, SHIFT), (key.UP, SHIFT), (key._3, CTRL), (key.V, SHIFT), (key.Z, CTRL))
+    for n, (symbol, modifier) in enumerate(keys, 1):
+        for _ in range(3):
+            pilot.key(symbol, modifiers=(modifier,))
+        assert [notice.kind for notice in pilot.session.notices] == ["info"] * n
+    assert len({notice.title for notice in pilot.session.notices}) == len(keys)
 
 
 @pytest.mark.gl

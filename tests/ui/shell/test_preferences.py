@@ -234,8 +234,8 @@ def test_the_folder_of_projects_is_named_again_only_where_the_box_does_not_show_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delenv(VARIABLE, raising=False)
-    assert projects_words("").startswith("New projects go here. ")
-    assert projects_words("/films").startswith("New projects go here. ")
-    assert projects_words("films").startswith(f"New projects go to {Path('films').absolute()}. ")
+    assert projects_words("") == projects_words("/films")
+    assert str(Path("films").absolute()) in projects_words("films")
     monkeypatch.setenv(VARIABLE, "/named")
-    assert projects_words("/films").startswith(f"New projects go to /named. Set by {VARIABLE}. ")
+    assert "/named" in projects_words("/films")
+    assert VARIABLE in projects_words("/films")

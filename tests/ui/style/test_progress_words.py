@@ -14,17 +14,16 @@ def test_a_preparation_is_counted_in_stages_and_never_in_percent() -> None:
     training = TrainingStatus(
         state="preparing", clip_index=2, stage="Carving what moves", stage_number=4, n_stages=6, progress=1.0
     )
-    assert stage_words(training) == "stage 4 of 6, Carving what moves"
-    assert band_words(ClipStatus("preparing"), training, 2, "preparing") == "preparing, 4 of 6"
+    for words in (stage_words(training), band_words(ClipStatus("preparing"), training, 2, "preparing")):
+        assert ("4 of 6" in words, "%" in words) == (True, False)
     assert band_words(ClipStatus("queued"), training, 3, "waiting") == "waiting"
 
 
 def test_steps_are_counted_in_percent_once_there_are_any() -> None:
     training = TrainingStatus(state="running", clip_index=2, stage="Learning what is new")
-    assert stage_words(training) == "Learning what is new"
-    assert band_words(ClipStatus("training", 0.19), training, 2, "training") == "training 19 %"
-    assert band_words(ClipStatus("paused", 0.0), training, 2, "paused") == "paused"
-    assert band_words(ClipStatus("stopped", 0.5), training, 1, "stopped") == "stopped 50 %"
+    assert "19 %" in band_words(ClipStatus("training", 0.19), training, 2, "training")
+    assert "%" not in band_words(ClipStatus("paused", 0.0), training, 2, "paused")
+    assert "50 %" in band_words(ClipStatus("stopped", 0.5), training, 1, "stopped")
 
 
 def test_stages_are_counted_from_one_and_what_is_not_always_there_is_not_counted() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import numpy as np
@@ -108,11 +109,11 @@ def test_clips_that_are_not_trained_are_left_out(quick_charts):
 
 def test_early_and_late_clips_are_set_beside_each_other(quick_charts):
     few = [clip(i) for i in range(MIN_LATER_CLIPS)]
-    assert "are compared from" in section_of(*few)[0][-1]
+    assert "28.50" not in section_of(*few)[0][-1]
     said = section_of(*few, clip(MIN_LATER_CLIPS, memory_mb=None))[0][-1]
-    assert said.startswith("Means of the first 2 clips that inherit, then of the last 2: PSNR 28.50, then 24.50 dB;")
-    assert "time 15.5, then 19.5 s" in said
-    assert "memory 602, then 605 MB" in said, "over those clips whose memory is known"
+    numbers = re.findall(r"\d+(?:\.\d+)?", said)
+    for first, last in (("28.50", "24.50"), ("15.5", "19.5"), ("602", "605")):  # memory where it is known
+        assert numbers[numbers.index(first) + 1] == last
 
 
 def test_the_page_shows_the_memory_that_the_clip_files_keep(project):
