@@ -1,8 +1,8 @@
 """Applying deletions permanently: new versions of the clips, without the anchors that frames no longer show.
 
-First the document learns the new numbers of picked anchors, next to the old ones, so that it holds for clips of before
-and after. Then all clips are exchanged at once. At last the edits go that have nothing left to delete. Whenever the
-program is killed in between, edits and clips fit together. Deleted anchors come back with the versions of the clips.
+First the document gets the new numbers of picked anchors next to the old ones, so that it fits old and new clips. Then
+all clips are exchanged at once. Finally, edits with nothing left to delete are removed. If the program is killed in
+between, edits and clips still fit together. Restoring the former versions of the clips restores deleted anchors.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from engine.editing.edit import Edit
 from engine.errors import ProjectError
 
 NAME = "apply deletions permanently"
-"""Of the step in the history."""
+"""Name of the step in the history."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StagedClips:
-    """New clips that lie ready.
+    """New clips, ready to replace the old ones.
 
     Attributes:
         before: Edits of the document that they were made for.
-        during: Edits that hold for the clips of before and after.
+        during: Edits that fit old and new clips.
         after: Edits that are left once the clips are exchanged.
         clip_indices: Of the clips that change.
-        n_anchors: Anchors that go, counted in every clip that shows them.
+        n_anchors: Removed anchors, counted in every clip that shows them.
     """
 
     before: tuple[Edit, ...]
@@ -55,7 +55,7 @@ class StagedClips:
         return tuple(edit for edit in self.after if edit.is_on and isinstance(edit.action, Delete))
 
     def text(self) -> str:
-        """The outcome, and why something stays."""
+        """The outcome, with the edits that stay."""
         clips = "1 clip was" if len(self.clip_indices) == 1 else f"{len(self.clip_indices)} clips were"
         said = f"{clips} rewritten without {self.n_anchors:,} anchors."
         if self.kept:
@@ -89,7 +89,7 @@ def stage(project: Project, deletions: Deletions, report: Report = lambda n_done
     """Write the new clips next to the old ones. Nothing else changes yet.
 
     Raises:
-        ProjectError: No anchor goes, a clip is another one than before, or damaged.
+        ProjectError: No anchor can be removed, or a clip has changed or is damaged.
         DiskError: The disk refused; nothing is left behind.
     """
     if not deletions.n_anchors:
@@ -106,7 +106,7 @@ def stage(project: Project, deletions: Deletions, report: Report = lambda n_done
 
 
 def exchange_staged(project: Project, staged: StagedClips) -> None:
-    """Put new clips that lie ready in the places of the old ones, which become versions.
+    """Put the new clips in the places of the old ones, which become versions.
 
     Raises:
         DiskError: The disk refused; see app.project.clips.clip_exchange.
@@ -119,7 +119,7 @@ def exchange_staged(project: Project, staged: StagedClips) -> None:
 
 
 def edits_after(document: ProjectDocument, staged: StagedClips) -> ProjectDocument:
-    """A document without the edits that have nothing left to delete; what was changed meanwhile stays."""
+    """A document without the edits that have nothing left to delete; changes made meanwhile stay."""
     done = {edit.edit_id for edit in staged.during} - {edit.edit_id for edit in staged.after}
     return replace(document, edits=tuple(edit for edit in document.edits if edit.edit_id not in done))
 
@@ -178,7 +178,7 @@ def _new_state(state: ClipState, deletions: Deletions, clip_index: int, fingerpr
 
 
 def _described(state: ClipState, reference: ClipState | None) -> ClipHeader:
-    """The header of a clip that has lost anchors: how many are left, and no figures of the pictures of before."""
+    """The header of a clip that has lost anchors: the remaining number, and no figures of former pictures."""
     from engine.training.preparation.clip_field import n_alive
 
     model = loaded(state, None if state.is_reference else reference).model
@@ -201,7 +201,7 @@ def _renumbered(before: ClipState, now: ClipState, gone: Rows) -> dict:
 
 
 def _deleting(state: ClipState, reference: ClipState | None, edits: tuple[Edit, ...], known: set[int]) -> set[int]:
-    """Numbers of the edits that delete something of a clip. known: Those that need not be looked at."""
+    """Numbers of the edits that delete something of a clip. known: Edits to skip."""
     from engine.editing.permanent.deleted_anchors import deletes_something
 
     header = state.header

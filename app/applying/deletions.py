@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Rows = dict[str, np.ndarray]
 """Chosen rows of anchor sets, by role. [A] bool each"""
 Report = Callable[[int, int], None]
-"""Told how many clips are done, and of how many."""
+"""Receives the number of clips done, and of all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class ClipDeletions:
     """The anchors that one clip can lose.
 
     Attributes:
-        fingerprint: Of the clip that was looked at.
+        fingerprint: Of the clip.
         own: Rows of the sets that the clip itself stores.
         inherited: Rows of the reference clip's sets that this clip shows at present and need not show.
         needed: Rows of the reference clip's sets that it continues to show.
@@ -54,9 +54,9 @@ class Deletions:
     """The anchors that the clips of a project can lose.
 
     Attributes:
-        edits: Of the document that was looked at.
+        edits: Of the document.
         clips: The finished clips, by index.
-        untrained: Indices of the others: nobody knows what edits will delete there.
+        untrained: Indices of the others, whose deletions are unknown.
         reference_index: Of the clip that others inherit from; None where none does.
     """
 
@@ -96,7 +96,7 @@ def find_deletions(
     *,
     edits: tuple[Edit, ...] | None = None,
 ) -> Deletions:
-    """Look through all finished clips, one at a time; takes about a second each.
+    """Examine all finished clips, one at a time; takes about a second each.
 
     Args:
         clips: All of the capture.

@@ -4,9 +4,8 @@ A window starts it with Jobs (app.background.jobs):
 
     jobs.start("Calibrating", calibration_work(request), on_done, on_error)
 
-`on_done` gets a CalibrationOutcome, `on_error` what was raised; the job's status has the share that is done and, as its
-message, the stage with the time that is left. Job.context.cancel() ends the child process within a moment, and then
-nothing is written.
+`on_done` gets a CalibrationOutcome, `on_error` the exception; the job's status has the share done and, as its message,
+the stage with the time left. Job.context.cancel() ends the child process within a moment, and then nothing is written.
 """
 
 from __future__ import annotations
@@ -82,7 +81,7 @@ def run_calibration(
     Args:
         request: The request.
         report: Receives stage, share of the whole and detail.
-        alive: Called several times a second; what it raises ends the work.
+        alive: Called several times a second; an exception from it ends the work.
     Raises:
         CaptureError: Bad input. PreparationError: No cameras could be found. DiskError: It could not be written.
     """
@@ -95,7 +94,7 @@ def run_calibration(
 
 
 def written(calibration: Calibration, request: CalibrationRequest) -> CalibrationOutcome:
-    """The outcome of a calibration: a capture, unless it has failed and is not to be kept all the same.
+    """The outcome of a calibration: a capture, unless it has failed and doubtful results are not kept.
 
     Raises:
         DiskError: It could not be written.
@@ -137,7 +136,7 @@ class TimeLeft:
         self._started_s = clock()
 
     def text(self, done: float) -> str:
-        """As "0:40, about 2:00 left"; at the beginning and at the end only the time that was taken."""
+        """As "0:40, about 2:00 left"; at the beginning and at the end only the time taken."""
         spent_s = self._clock() - self._started_s
         if not MIN_SHARE <= done < 1.0:
             return duration_text(spent_s)
@@ -148,7 +147,7 @@ def check_target(out: Path, *, is_replacing: bool) -> None:
     """Refuse a folder that has a capture.json already, or cannot be one, before any work is done.
 
     Raises:
-        CaptureError: Says which.
+        CaptureError: One of both; states which.
     """
     if out.exists() and not out.is_dir():
         raise CaptureError("This is a file; a capture is a folder.", hint="Name another folder.", path=out)

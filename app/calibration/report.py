@@ -9,7 +9,7 @@ from engine.calibration.pair_lines import WHAT_TO_DO, pair_lines
 from engine.text import printable
 
 GOOD_ERROR_PX = 1.0
-"""Median reprojection error, at a width of 1,000 pixels, up to which nothing is to be done."""
+"""Median reprojection error, at a width of 1,000 pixels, up to which no remedy is needed."""
 WHAT_HELPS = (
     "What helps: a camera between it and its neighbour, or more overlap between the two; posters, boxes or other "
     "objects with fine, irregular patterns in both views; someone walking through the whole scene while all cameras "
@@ -18,7 +18,7 @@ WHAT_HELPS = (
 
 
 def report_lines(calibration: Calibration, *, keeps_doubtful: bool = False) -> list[str]:
-    """Everything that a user has to know, one sentence or camera per line.
+    """The report for the user, one sentence or camera per line.
 
     Args:
         calibration: The calibration's result.

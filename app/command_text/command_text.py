@@ -38,7 +38,7 @@ class CommandText:
 
     @property
     def python(self) -> str:
-        """Lines that do the same in a script. What trains starts processes, which need the guard."""
+        """Lines that do the same in a script. Training starts processes, which need the guard."""
         names = ", ".join(sorted({*self.names, "open_project"}, key=lambda name: (name.islower(), name)))
         options = ", read_only=True" if self.reads_only else ""
         return (

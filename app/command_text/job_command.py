@@ -29,7 +29,7 @@ def training_command(
         folder: Of the project.
         settings: Of the project.
         is_again: Whether it is trained, or damaged, and is to be trained again.
-        own: Settings that it alone is to have.
+        own: Settings for this clip alone.
     """
     folder, own = folder.absolute(), dict(own or {})
     # paths are absolute, so that none of them looks like an option

@@ -1,4 +1,4 @@
-"""Arguments as a shell takes them, whatever is in them: spaces, quotes, line breaks, percent signs."""
+"""Arguments quoted for a shell: spaces, quotes, line breaks, percent signs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from decimal import Decimal
 
 _PLAIN_IN_POWERSHELL = re.compile(r"[\w:./\\+=@-]+")
 END = "END_OF_INPUT"
-"""Ends standard input that is written along; what is written is JSON in one line, which is never this."""
+"""Ends the standard input in a command; the input is JSON in one line, which never equals this."""
 
 
 def can_be_argument(text: str) -> bool:

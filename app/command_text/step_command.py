@@ -110,7 +110,7 @@ def _plain(folder: Path, word: str, edit_id: int, statement: str) -> CommandText
 
 
 def _put(folder: Path, before: ProjectDocument, after: ProjectDocument) -> CommandText:
-    """Any step at all: the entries that differ, as a whole."""
+    """Any step: the entries that differ, in full."""
     old, new = plain_document(before), plain_document(after)
     entries = {name: value for name, value in new.items() if value != old[name]}
     arguments = ("edit", str(folder), "--put", "-")
@@ -125,10 +125,10 @@ def _fits(command: CommandText) -> bool:
 
 
 def _edit_arguments(edit: Edit, *, in_full: bool = False) -> tuple[tuple[str, ...], str]:
-    """Options of `clipgstream edit`, and what goes to standard input.
+    """Options of `clipgstream edit`, and its standard input.
 
     Args:
-        in_full: Say also what is usual, because something else may be there.
+        in_full: Also write defaults, because the edit may have other values.
     """
     target, stdin = _target_arguments(edit.target, in_full=in_full)
     arguments = [*_action_arguments(edit.action), *target]
@@ -155,7 +155,7 @@ def _target_arguments(target: Target, *, in_full: bool) -> tuple[tuple[str, ...]
 def _action_arguments(action: Action) -> list[str]:
     found: list[str] = []
     for flag, settings in action.flags().values():
-        if flag.read is None:  # else another one says the same
+        if flag.read is None:  # else another flag covers it
             found.append(flag.name)
             for one in settings:
                 value = getattr(action, one.name)

@@ -1,4 +1,4 @@
-"""What `clipgstream eval` does: every frame of the chosen clips against every camera, as one JSON-able document.
+"""The work of `clipgstream eval`: every frame of the chosen clips against every camera, as one JSON-able document.
 
 Figures are kept in the project (app.evaluation.kept_figures), so that an evaluation resumes where it was interrupted,
 and eval, report and ablate measure a version of a clip once.
@@ -33,7 +33,7 @@ KEPT_SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class EvaluationScope:
-    """What is measured of a project.
+    """The scope of an evaluation.
 
     Attributes:
         clips: Indices, rising; where one follows the other, the boundary between them is measured.
@@ -52,11 +52,11 @@ class EvaluationScope:
 
 
 Frames = dict[int, tuple[list[int], list[int]]]
-"""What of a clip is not measured yet, by camera: frames of rows, and later frames of pairs."""
+"""Missing figures of a clip, by camera: frames of rows, and later frames of pairs."""
 
 
 class Measuring(Protocol):
-    """Measures what is not known of a clip, in any order; ClipMeasuring, or what a test brings."""
+    """Measures missing figures of a clip, in any order; ClipMeasuring, or a test's substitute."""
 
     def __call__(
         self, opened: TrainedProject, scope: EvaluationScope, clip_index: int, unknown: Frames
@@ -74,25 +74,26 @@ def evaluate_project(
     say: Callable[[str], None] = logger.warning,
     measuring: Measuring | None = None,
 ) -> dict[str, Any]:
-    """Compare every frame of the clips with what every camera took; what was measured before is taken up.
+    """Compare every frame of the clips with every camera's picture; figures measured before are reused.
 
     Args:
         clip_indices: Rising; where one follows the other, the boundary between them is measured.
         cameras: Indices of the cameras to compare with; all of them when None.
         metrics, precision: See engine.metrics.pictures.picture.measure_picture.
-        on_progress: Gets rows done, rows in all, and the newest row; at first what was known before, with None.
-        say: Told of kept figures that are damaged, or that cannot be kept.
-        measuring: Measures what is not known of a clip; ClipMeasuring when None.
+        on_progress: Gets rows done, rows in all, and the newest row; at first the rows known before, with None.
+        say: Receives warnings of kept figures that are damaged or cannot be written.
+        measuring: Measures missing figures of a clip; ClipMeasuring when None.
     Returns:
         JSON-able: schema, project, capture, scale, holdout (names), clips, metrics and precision (as chosen), columns
         (engine.metrics.clips.summary.columns_of), rows (EvalRow.as_dict: one per clip, frame and camera), means with
         keys
         all, held_out, trained_on, clips (the same two per clip index), cameras, frames (curves over time) and worst,
-        and seams: rows (one per neighbouring frames and camera) and what engine.metrics.clips.seams.summarize returns.
+        and seams: rows (one per neighbouring frames and camera) and the result of
+        engine.metrics.clips.seams.summarize.
         A mean leaves out rows without the figure; it is null where no row has it, and columns counts those rows.
     Raises:
         ProjectError: A clip is not trained or does not fit.
-        KeyboardInterrupt: With what is kept, in a sentence.
+        KeyboardInterrupt: With the progress kept, in a sentence.
     """
     from engine.metrics.clips import seams, summary
     from engine.metrics.clips.summary import EvalRow
@@ -102,7 +103,7 @@ def evaluate_project(
     chosen_cameras = list(range(len(capture.rig)) if cameras is None else cameras)
     scope = EvaluationScope(list(clip_indices), chosen_cameras, metrics, precision)
     for clip_index in {*scope.clips} - {*opened.trained}:
-        opened.load(clip_index)  # says what is trained
+        opened.load(clip_index)  # raises where a clip is not trained
     kept = {i: kept_figures(opened, scope, i, say) for i in scope.clips}
     unknown = {i: _unknown(opened, scope, i, kept[i]) for i in scope.clips}
     if measuring is None:
@@ -158,7 +159,7 @@ def evaluate_project(
 def kept_figures(
     opened: TrainedProject, scope: EvaluationScope, clip_index: int, say: Callable[[str], None]
 ) -> KeptFigures:
-    """What is known of a clip.
+    """Known figures of a clip.
 
     Raises:
         ProjectError: The clip, or the one before it, is not trained or damaged.
@@ -195,7 +196,7 @@ def is_measured(opened: TrainedProject, scope: EvaluationScope) -> bool:
 
 
 class ClipMeasuring:
-    """Measures clips of one project and scope, cameras side by side on all cores; keeps their backgrounds in between.
+    """Measures clips of one project and scope, cameras in parallel on all cores; keeps their backgrounds in between.
 
     Each camera is measured with one thread, so that its figures do not depend on how many cores there are.
 
@@ -210,7 +211,7 @@ class ClipMeasuring:
     def __call__(
         self, opened: TrainedProject, scope: EvaluationScope, clip_index: int, unknown: Frames
     ) -> Iterator[EvalRow | PairRow]:
-        """Rows and pairs that are not known.
+        """Missing rows and pairs.
 
         Raises:
             ProjectError: A clip is not trained or damaged.
@@ -260,7 +261,7 @@ def _later_frames(opened: TrainedProject, scope: EvaluationScope, clip_index: in
 def _in_order(
     opened: TrainedProject, scope: EvaluationScope, kept: dict[int, KeptFigures]
 ) -> tuple[list[EvalRow], list[PairRow]]:
-    """Rows and pairs by clip, camera and frame. Which cameras are held out is the project's to say, not the file's."""
+    """Rows and pairs by clip, camera and frame. The project, not the file, decides which cameras are held out."""
     holdout, names = set(opened.project.settings.holdout), opened.capture.rig.names
     rows, pairs = [], []
     for clip_index in scope.clips:

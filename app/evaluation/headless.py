@@ -1,4 +1,4 @@
-"""The jobs without a window: train clips, open what was trained. Prints nothing."""
+"""Jobs without a window: train clips, open trained projects. Prints nothing."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
 TRAIN_SCHEMA = 1
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
-"""Failures of a worker that are the input's and not the program's."""
+"""Worker failures caused by the input, not by the program."""
 POLL_EVERY_S = 0.05
 STOP_TIMEOUT_S = 60.0
-"""A step that changes the phase can take some seconds, and so can writing; nothing is thrown away for impatience."""
+"""A step that changes the phase can take some seconds, and so can writing; neither is cut short."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class ClipOutcome:
         state: trained, skipped (it was trained before), stopped, failed, or damaged (its file cannot be read, or that
             of a clip which it needs; it is left as it is).
         step: Steps done.
-        held_out_psnr, held_out_whole: dB, and what it is over, see ClipRecord; None when not measured.
+        held_out_psnr, held_out_whole: dB, and its scope, see ClipRecord; None when not measured.
         seconds: Wall time of this run, preparation included.
         message, hint, kind: Of a failure or a damage.
     """
@@ -76,16 +76,16 @@ def train_clips(
     own: OwnSettings | None = None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> list[ClipOutcome]:
-    """Train clips, as many side by side as the service does; after a failure no other one begins. KeyboardInterrupt
-    stops, keeps and is raised again.
+    """Train clips, as many in parallel as the service allows; after a failure no other one starts. KeyboardInterrupt
+    stops the training, keeps progress and is raised again.
 
     Args:
         service: Queue and workers of the project.
         clip_indices: In order.
-        on_status, on_event, on_outcome: Told how it goes.
-        on_begin: Told the index of each clip before it is trained; not of those that are left as they are.
-        is_again: Train also clips that are trained or damaged; what they were becomes a version.
-        own: Settings that these clips alone are to have; their trainings then begin afresh.
+        on_status, on_event, on_outcome: Receive progress.
+        on_begin: Receives the index of each clip before it is trained; not of those left as they are.
+        is_again: Train also clips that are trained or damaged; their former state becomes a version.
+        own: Settings for these clips alone; their trainings then begin afresh.
         sleep: Waits some seconds between looks.
     Raises:
         ProjectError: A clip cannot be trained, for instance because its reference is not.
@@ -153,7 +153,7 @@ def _outcome(service: TrainingService, run: ClipRun, ending: Event, seconds: flo
 
 
 def _left_as_it_is(service: TrainingService, clip_index: int, *, is_again: bool) -> ClipOutcome | None:
-    """How a clip ends that is not trained now; None for one that is."""
+    """The outcome of a clip that is not trained now; None for one that is."""
     known = service.catalog[clip_index]
     if known.state == "trained" and not is_again:
         return ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr, held_out_whole=known.held_out_whole)
@@ -163,7 +163,7 @@ def _left_as_it_is(service: TrainingService, clip_index: int, *, is_again: bool)
 
 
 def _left_alone(service: TrainingService, clip_index: int) -> ClipOutcome:
-    """A damaged clip is not trained again unless somebody says so: the file may be worth a rescue."""
+    """A damaged clip is only trained again on request: its file may be recoverable."""
     record = service.catalog[clip_index]
     damaged = clip_index if record.state == "damaged" else record.blocked_by
     assert damaged is not None
@@ -194,12 +194,12 @@ class TrainedProject:
 
     @property
     def backend(self) -> Backend:
-        """What clips are decoded and drawn with: the back end of this process."""
+        """The back end of this process, which decodes and draws clips."""
         return process_backend()
 
     @property
     def measured(self) -> TrainedProject:
-        """The same with the capture as it is measured: without what the document excludes."""
+        """The same with the capture as it is measured: without the document's exclusions."""
         return replace(self, capture=self.capture.without(self.project.document.exclusions))
 
     @property
@@ -211,7 +211,7 @@ class TrainedProject:
 
     @property
     def up(self) -> np.ndarray:
-        """What is up in the scene: as the user has said, else what the cameras agree on. [3]"""
+        """The scene's up direction: the user's, else the one that the cameras agree on. [3]"""
         said = self.project.document.world.up
         return self.capture.rig.up_direction() if said is None else np.array(said)
 
@@ -265,7 +265,7 @@ class TrainedProject:
 
 
 def open_trained(project: Project, capture: Capture | None = None) -> TrainedProject:
-    """Open what a project was trained on.
+    """Open a trained project with its capture.
 
     Args:
         capture: Its capture where that is open already.
@@ -287,7 +287,7 @@ def open_trained(project: Project, capture: Capture | None = None) -> TrainedPro
 
 
 def train_document(project: Project, capture: Capture, outcomes: Sequence[ClipOutcome]) -> dict[str, Any]:
-    """What `train --json` prints: schema, project, capture, holdout, and per clip its index, state, steps, held-out
+    """The document of `train --json`: schema, project, capture, holdout, and per clip its index, state, steps, held-out
     PSNR (dB or null), whether that is over every frame of the held-out cameras, and seconds."""
     return {
         "schema": TRAIN_SCHEMA,

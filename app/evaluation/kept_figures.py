@@ -1,8 +1,8 @@
 """Figures of measured pictures, kept in the project they are of: nothing is measured twice, or lost by an interruption.
 
 PROJECT/evaluations holds one file per clip and choice of figures. Its first line names everything that the figures
-depend on; then each picture, and each pair of neighbouring frames, is a line of its own with a checksum, written when
-it is measured. A file of another version of the clip is replaced. What cannot be read counts as not measured.
+depend on; then each picture, and each pair of neighbouring frames, has its own line with a checksum, written when it is
+measured. A file of another version of the clip is replaced. Unreadable lines count as not measured.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ EVALUATIONS = "evaluations"
 MAX_BYTES = 512 << 20
 """About 300,000 pictures of one clip."""
 _FORMER_KEYS = {"holdout", "lpips"}
-"""What files of earlier versions name as well: they kept optical flow and LPIPS, which are passed over."""
+"""Further keys in files of earlier versions, which kept optical flow and LPIPS; these are skipped."""
 Key = tuple[str, int]
 """Name of the camera, and frame; of a pair, the later one."""
 
@@ -40,7 +40,7 @@ class KeptFigures:
         path: The file; need not exist.
         content: Everything the figures depend on, JSON-able.
         before: Fingerprint of the clip before, which pairs at the boundary depend on too; None without one.
-        say: Told what the user should know, in sentences.
+        say: Receives sentences for the user.
 
     Attributes:
         rows: By camera and frame.
@@ -58,7 +58,7 @@ class KeptFigures:
         self._read()
 
     def add(self, item: EvalRow | PairRow) -> None:
-        """Take up a figure, and write it while `writing`."""
+        """Add a figure, and write it while `writing`."""
         found: dict[str, Any] = {"before": self._before} if isinstance(item, PairRow) and item.is_boundary else {}
         if isinstance(item, EvalRow):
             self.rows[item.camera, item.frame_index] = item
@@ -77,7 +77,7 @@ class KeptFigures:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Write what is added inside the block. Where that fails, the reason is reported and the work continues."""
+        """Write figures added inside the block. If that fails, the reason is reported and the work continues."""
         with contextlib.ExitStack() as stack:
             try:
                 check_folder(self.path.parent)
@@ -97,7 +97,7 @@ class KeptFigures:
 
     @staticmethod
     def _end_last_line(file: BinaryIO) -> None:
-        """A line that a kill cut off must not spoil the one behind it."""
+        """A line cut off by a kill must not spoil the next one."""
         n_bytes = file.seek(0, 2)
         if n_bytes:
             file.seek(n_bytes - 1)

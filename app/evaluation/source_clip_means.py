@@ -1,4 +1,4 @@
-"""What the next clip takes and gives: means over the clips of a project that inherit from its reference."""
+"""Cost and quality of one more clip: means over the clips of a project that inherit from its reference."""
 
 from __future__ import annotations
 

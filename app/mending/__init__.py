@@ -1,1 +1,1 @@
-"""Mending as a job: a request, the process that carries it out, and what becomes of its result."""
+"""Mending as a job: a request, the process that carries it out, and the use of its result."""

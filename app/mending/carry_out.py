@@ -27,10 +27,10 @@ def mend(job: MendJob, report: ReportProgress) -> MendResult:
     """Mend, and leave the clips that changed as drafts.
 
     Args:
-        job: What is to be mended, and where drafts go.
-        report: Told how far it is; what it raises ends the work.
+        job: The request, and the folder for drafts.
+        report: Receives progress; an exception from it ends the work.
     Raises:
-        EngineError: It cannot be mended; says why.
+        EngineError: It cannot be mended; states why.
     """
     from engine.mending.measuring import Threads  # torch takes a second to import
     from engine.mending.mend import StretchMending
@@ -118,7 +118,7 @@ def _checked_reference(project: Project, reference: ClipState | None) -> ClipSta
 
 
 def _states(project: Project, clips: list[Clip], trained: list[int], stretch: Stretch) -> dict[int, ClipState]:
-    """Clips of the stretch, and those beside them that can be read."""
+    """Clips of the stretch, and their neighbours that can be read."""
     indices = stretch.clip_indices
     states = {}
     for index in range(indices[0] - 1, indices[-1] + 2):

@@ -1,9 +1,9 @@
-"""Mending a project: in a process of its own, and then its clips in their place. For a window and the command line.
+"""Mending a project in a separate process, then putting its clips in place. For a window and the command line.
 
     jobs.start("Mending", mend_work(project, request), on_done, on_error)
 
-The job's status has the share that is done and, as its message, the stage with the time that is left. Cancelling ends
-the process within a moment; all clips are as they were then, as after a crash at any moment.
+The job's status has the share done and, as its message, the stage with the time left. Cancelling ends the process
+within a moment; all clips are then unchanged, as after a crash at any moment.
 """
 
 from __future__ import annotations
@@ -61,13 +61,13 @@ def mend_project(
 
     Args:
         project: Open for writing.
-        request: What is to be mended.
-        report: Told how far it is.
-        alive: Called several times a second; what it raises ends the work.
-        n_threads: What to compute with; None for all cores.
+        request: The boundary or frames to mend.
+        report: Receives progress.
+        alive: Called several times a second; an exception from it ends the work.
+        n_threads: Threads to compute with; None for all cores.
         is_window_open: Leave the right of way to a window.
     Raises:
-        EngineError: It cannot be mended; says why. All clips are as they were.
+        EngineError: It cannot be mended; states why. All clips are unchanged.
     """
     project.check_writable()
     try:
@@ -93,7 +93,7 @@ def mend_project(
 
 
 def mend_work(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
-    """`mend_project` as the work of a Job, beside a window."""
+    """`mend_project` as the work of a Job, with a window open."""
 
     def work(context: JobContext) -> MendOutcome:
         def report(progress: Progress) -> None:

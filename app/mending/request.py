@@ -1,4 +1,4 @@
-"""MendRequest: what is to be mended, as it crosses to the process that does it; and what that gives back."""
+"""MendRequest: a boundary or frames to mend, as sent to the process that does it; and that process's result."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from engine.mending.stretch import Stretch, boundary_stretch, frames_stretch
 
 
 class MendRequest(msgspec.Struct, frozen=True):
-    """What is to be mended: a boundary, or a stretch of frames.
+    """A boundary or a stretch of frames to mend.
 
     Attributes:
         after: The clip that begins at the boundary; None for frames.
-        frames: First frame and the one behind the last; None for a boundary.
+        frames: First frame and the one after the last; None for a boundary.
         method: One of engine.mending.figures.METHODS, or "auto".
     """
 
@@ -28,7 +28,7 @@ class MendRequest(msgspec.Struct, frozen=True):
     method: str = "auto"
 
     def stretch(self, clips: Sequence[Clip]) -> Stretch:
-        """The frames it is about.
+        """The frames to mend.
 
         Raises:
             ProjectError: There are no such frames, or there is no such boundary or method.
@@ -43,15 +43,15 @@ class MendRequest(msgspec.Struct, frozen=True):
 
 
 class MendJob(msgspec.Struct, frozen=True):
-    """What the process is told.
+    """The job of the process.
 
     Attributes:
         project: Its folder.
-        request: What is to be mended.
+        request: The boundary or frames to mend.
         folder: Where drafts of clips go, on the disk of the project.
-        n_threads: What to compute with; None for all cores.
+        n_threads: Threads to compute with; None for all cores.
         is_window_open: Leave the right of way to a window.
-        backend: Name of what is computed with.
+        backend: Name of the back end.
     """
 
     project: str
@@ -63,7 +63,7 @@ class MendJob(msgspec.Struct, frozen=True):
 
 
 class MendResult(msgspec.Struct, frozen=True):
-    """What the process leaves.
+    """The result of the process.
 
     Attributes:
         record: The result.

@@ -1,7 +1,7 @@
 """Frames per second of a trained project, kept in it: measured once per machine and version of its clips.
 
-The file lies beside the figures (PROJECT/evaluations/frame_rates.json) and apart from them: figures are the same in
-every run, times are not.
+The file lies next to those of figures (PROJECT/evaluations/frame_rates.json), separate from them: figures are the same
+in every run, times are not.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class FrameRates:
     Attributes:
         camera: Name of the camera whose pictures were rendered.
         width, height: Of the pictures, px.
-        cpu: By the CPU rasterizer; None where its times could not be told.
+        cpu: By the CPU rasterizer; None where its times could not be measured.
         gl: By the window's OpenGL; None where there is none.
         why_no_gl: Why, in words; empty where there is one.
     """
@@ -55,7 +55,7 @@ class FrameRates:
 
     @property
     def size(self) -> str:
-        """Of the pictures, in words."""
+        """Size of the pictures, in words."""
         return f"{self.width} x {self.height}"
 
     def figures(self) -> dict[str, float | None]:
@@ -79,7 +79,7 @@ class FrameRates:
 
 FIGURES = ("fps_cpu", "fps_gl", "n_gaussians")
 RatesOf = Callable[[TrainedProject], FrameRates | None]
-"""Measures a project; None where nobody wants to know."""
+"""Measures a project; None where that is not wanted."""
 
 
 def frame_rates(
@@ -88,7 +88,7 @@ def frame_rates(
     clock: Callable[[], float] = time.perf_counter,
     draw: Callable[[Path], WindowLaps] = drawn_laps,
 ) -> FrameRates:
-    """Measure, or take up what was measured on this machine; some seconds. Without OpenGL that is tried again.
+    """Measure, or reuse rates measured on this machine; takes some seconds. Missing OpenGL rates are tried again.
 
     Args:
         clock: Seconds.
@@ -117,7 +117,7 @@ def frame_rates(
 
 
 def kept_rates(opened: TrainedProject) -> FrameRates | None:
-    """What was measured on this machine of these versions of the clips; None where nothing was.
+    """Rates measured on this machine of these versions of the clips; None without any.
 
     Raises:
         ProjectError: A clip is damaged.
@@ -157,7 +157,7 @@ def _read(opened: TrainedProject, key: dict[str, Any]) -> FrameRates | None:
 
 
 def rasterizing(n_threads: int) -> str:
-    """What draws, in words."""
+    """The renderer, in words."""
     return f"CPU rasterizer, {n_threads} thread{'' if n_threads == 1 else 's'}"
 
 

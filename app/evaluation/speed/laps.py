@@ -1,4 +1,4 @@
-"""Laps: which pictures are rendered to measure how fast, and what their times come to.
+"""Laps: pictures rendered to measure the speed, and the medians of their times.
 
 A lap is one picture of one frame, from nothing decoded to a picture in main memory. Pictures are those of one camera at
 the size of the capture, of frames spread over the first and the last trained clip; the first picture of a clip does not
@@ -17,9 +17,9 @@ import numpy as np
 from app.evaluation.headless import TrainedProject
 
 N_FRAMES = 5
-"""At most so many frames of a clip count."""
+"""Frames of a clip that count, at most."""
 ENOUGH_S, ENOUGH_LAPS = 4.0, 3
-"""After both, it is known well enough."""
+"""After both, the rate is accurate enough."""
 
 
 class Lap(NamedTuple):
@@ -45,7 +45,7 @@ class RenderRate:
         fps_drawing: The same of Gaussians that are decoded already, as the window keeps them.
         n_gaussians: Drawn in a picture.
         n_laps: Pictures that count.
-        drawn_by: What decoded and drew, such as "CPU rasterizer, 2 threads".
+        drawn_by: The renderer, such as "CPU rasterizer, 2 threads".
     """
 
     fps: float

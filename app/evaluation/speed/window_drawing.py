@@ -1,5 +1,5 @@
-"""Laps of the window's OpenGL, measured by a program of its own: a driver that crashes takes nothing along, and nothing
-here knows what a window is. Who starts the program's commands says which module draws.
+"""Laps of the window's OpenGL, measured in a separate process: a crashing driver does no other harm, and nothing here
+depends on a window. The start of the command line sets the module that draws.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _module = ""
 
 @dataclass(frozen=True, slots=True)
 class WindowLaps:
-    """What the other program said: laps and what drew them, or why there are none."""
+    """The other program's answer: laps and their renderer, or why there are none."""
 
     laps: list[Lap]
     renderer: str
@@ -67,7 +67,7 @@ def said_by(drawn: WindowLaps) -> str:
 
 
 def read_said(text: str) -> WindowLaps:
-    """What a program said; its last line counts, as drivers print too."""
+    """A program's answer: its last line, as drivers print too."""
     try:
         said = json.loads(text.strip().splitlines()[-1])
         laps = [Lap(float(decode), float(draw), int(n)) for decode, draw, n in said["laps"]]
