@@ -1,7 +1,7 @@
-"""Python's collector of garbage in cycles, kept from looking through what is imported once and stays for good.
+"""Python's cyclic garbage collector, kept from scanning modules, which are imported once and stay for good.
 
-A run of it looks at every object and holds the interpreter meanwhile. With torch and numba loaded those are hundreds of
-thousands, and every run takes a tenth of a second in which a window stands still.
+A collection scans every object and holds the interpreter meanwhile. With torch and numba loaded there are hundreds of
+thousands, and every collection stalls the window for a tenth of a second.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ _n_modules = 0
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """Load modules in this block: nothing is collected until the last such block of all threads ends, and what is there
-    then is never looked at again, unless nothing was loaded. Garbage among it stays, little compared with modules."""
+    """Load modules in this block. Nothing is collected until the last such block in any thread ends; objects alive then
+    are never scanned again, unless nothing was loaded. Garbage among them stays, little compared with modules."""
     global _n_loading, _n_modules, _was_enabled
     with _lock:
         if _n_loading == 0:

@@ -101,7 +101,7 @@ class Jobs:
     """The running jobs.
 
     Args:
-        on_fault: Told the name of a job and what taking up its result has raised; by default it is only logged.
+        on_fault: Called with a job's name and the exception raised by taking up its result; by default that is logged.
     """
 
     def __init__(self, on_fault: Callable[[str, Exception], None] | None = None) -> None:

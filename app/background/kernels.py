@@ -1,6 +1,6 @@
 """The compiled kernels, as the program uses them: compiling them where no window waits, and threads to run them on.
 
-Compiling holds the interpreter lock for seconds, so it happens in processes of its own
+Compiling holds the interpreter lock for seconds, so it happens in separate processes
 (`engine.kernels.compile_ahead`).
 """
 
@@ -30,8 +30,8 @@ def warm_cache() -> None:
 
 
 def warm_up_reporting(report: ReportProgress) -> None:
-    """Compile what is not in the cache yet, saying how far that is, and load what a training step of this process's
-    back end needs.
+    """Compile kernels missing from the cache, reporting progress, and load everything that a training step of this
+    process's back end needs.
 
     An exception of `report` ends the compiling processes and passes on.
     """

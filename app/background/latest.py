@@ -1,7 +1,7 @@
 """LatestWorker: one thread that always works on the newest request. Older requests that did not start are dropped.
 
 Requests come in lanes, one for each place where a result is shown: the newest of every lane is worked on, lanes in
-turn, the active one first. When nothing is asked, the thread works on what will probably be asked next.
+turn, the active one first. When nothing is requested, the thread works on the likely next requests.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MAX_FAILED = 64
 
 
 def nothing() -> None:
-    """For whoever need not be woken."""
+    """Wakes nobody."""
 
 
 class LatestWorker(Generic[Request, Result]):
@@ -49,7 +49,7 @@ class LatestWorker(Generic[Request, Result]):
         self._pending: dict[Hashable, Request] = {}  # at most one a lane, those asked first in front
         self._planned: list[Request] = []
         self._running: list[Request] = []  # zero or one
-        self._lane: Hashable = None  # of what runs; None where that was planned
+        self._lane: Hashable = None  # of the running request; None where that was planned
         self._finished: tuple[Request, Result] | None = None
         self._finished_in: dict[Hashable, tuple[Request, Result]] = {}
         self._error: tuple[Request, Exception] | None = None
@@ -84,8 +84,8 @@ class LatestWorker(Generic[Request, Result]):
     def plan(self, requests: Sequence[Request]) -> None:
         """Set the requests to work on, in this order, while none is pending; they replace those planned before.
 
-        Results are what `compute` keeps of them: they are not `newest`, and nobody is woken up. What fails is not tried
-        again before it is asked for.
+        Only `compute` can keep their results: they never become `newest`, and nobody is woken up. A failed one is not
+        tried again before it is requested.
         """
         with self._condition:
             self._planned = [] if self._is_closed else [one for one in requests if one not in self._failed_ahead]
@@ -121,11 +121,11 @@ class LatestWorker(Generic[Request, Result]):
 
     @property
     def is_still_wanted(self) -> bool:
-        """For `compute`: whether what it works on was not forgotten meanwhile, so that something may be kept of it."""
+        """For `compute`: whether its request was not forgotten meanwhile, so that the result may be kept."""
         return self._running_generation == self._generation
 
     def forget(self) -> None:
-        """Drop the last result, what waits or is planned, and what comes of the request that runs."""
+        """Drop the last result, waiting and planned requests, and the result of the running one."""
         with self._condition:
             self._generation += 1
             self._pending, self._failed, self._planned, self._failed_ahead = {}, {}, [], []
@@ -143,14 +143,14 @@ class LatestWorker(Generic[Request, Result]):
             return request in self._failed_ahead
 
     def take_error(self) -> tuple[Request, Exception] | None:
-        """The last failure of something asked for, once."""
+        """The last failure of a request, once."""
         with self._condition:
             error, self._error = self._error, None
             return error
 
     @property
     def is_busy(self) -> bool:
-        """Whether something that was asked for waits or runs."""
+        """Whether a request waits or runs."""
         with self._condition:
             return bool(self._pending or (self._running and self._lane is not None))
 
@@ -186,7 +186,7 @@ class LatestWorker(Generic[Request, Result]):
             return
         try:
             self._prepare()
-        except Exception:  # the edge of a job: requests will fail by themselves and say why
+        except Exception:  # the edge of a job: each request will fail and say why
             logger.warning("%s could not be prepared", self._name, exc_info=True)
 
     def _take(self) -> tuple[Hashable, Request]:

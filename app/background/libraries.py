@@ -32,7 +32,7 @@ _has_loaded = False
 
 
 def load_libraries() -> None:
-    """Open what torch, numba, scipy and av will need. Blocks the calling thread alone; a library that does not open
+    """Open the libraries of torch, numba, scipy and av. Blocks the calling thread alone; a library that does not open
     is left to the import, which says why. Does nothing the second time, nor on Windows."""
     global _has_loaded
     with _lock:

@@ -26,7 +26,7 @@ class LogLine:
     """One line.
 
     Attributes:
-        time: As logged; of the line before where a line has none of its own, as those of a traceback.
+        time: As logged; that of the line before where a line has none, as in a traceback.
         level: One of LEVELS; that of the line before likewise.
         source: "program", or "clip 3" for the training of a clip.
         text: The message, with its place in the program.

@@ -1,6 +1,6 @@
 """Logging set-up: one file for the program, shared by all its processes, and one plain file per worker.
 
-Nothing that happens to a log may reach the user: a record that cannot be written is lost without a word.
+Nothing that happens to a log may reach the user: a record that cannot be written is silently lost.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class PrintableFormatter(logging.Formatter):
 class SharedLogHandler(logging.Handler):
     """Appends each record to a file that other processes append to as well; moves it aside when it is large.
 
-    The file is opened for every record, so that whoever moves it aside disturbs nobody, and written to in one piece,
+    The file is opened for every record, so that moving it aside disturbs no other process, and written to in one piece,
     which the system keeps whole.
 
     Args:
@@ -45,7 +45,7 @@ class SharedLogHandler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record; one that cannot be formatted or written is lost."""
-        with suppress(Exception):  # the edge: whoever logs must not fail for it, nor hear of it
+        with suppress(Exception):  # the edge: logging must never fail its caller
             self.write((self.format(record) + "\n").encode("utf-8", "backslashreplace"))
 
     def write(self, data: bytes) -> None:

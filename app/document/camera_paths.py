@@ -1,4 +1,4 @@
-"""The camera paths of a document, for everything that films a project: how they are stored, and what can be kept."""
+"""The camera paths of a document, for everything that films a project: how they are stored and checked."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def camera_path_named(paths: Sequence[CameraPath], name: str, folder: Path) -> C
 
 
 def check_paths(paths: Sequence[CameraPath]) -> None:
-    """See that paths can be kept and distinguished: each has a name of its own, and there are not too many.
+    """Check that paths can be kept and distinguished: each has its own name, and there are not too many.
 
     Raises:
         ProjectError: They cannot; says why.

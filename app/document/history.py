@@ -18,8 +18,8 @@ class Changed:
     """The document was changed.
 
     Attributes:
-        name: What was done, as a word or two that can follow "Undo".
-        document: What it is now.
+        name: Of the change, a word or two that can follow "Undo".
+        document: After the change.
         merge: Changes in a row with the same one count as one step, such as those of a drag.
     """
 
@@ -58,7 +58,7 @@ class Step:
 
     Attributes:
         name: See Changed.
-        document: Of the past: what the document was before the step. Of the future: what it is after it.
+        document: Of a past step: the document before it. Of a future step: the document after it.
         merge: See Changed; None where the step is over.
     """
 
@@ -83,12 +83,12 @@ class DocumentHistory:
 
     @property
     def undo_name(self) -> str:
-        """What would be taken back; empty where there is nothing."""
+        """Name of the step to undo; empty without one."""
         return self.past[-1].name if self.past else ""
 
     @property
     def redo_name(self) -> str:
-        """What would be done again; empty where there is nothing."""
+        """Name of the step to redo; empty without one."""
         return self.future[-1].name if self.future else ""
 
     def after(self, event: Event) -> DocumentHistory:
@@ -134,7 +134,7 @@ class DocumentHistory:
 
 
 def _closed(steps: tuple[Step, ...]) -> tuple[Step, ...]:
-    """What is done from here on is a step of its own."""
+    """The same steps, where the next change is a new step."""
     if not steps or steps[-1].merge is None:
         return steps
     return (*steps[:-1], replace(steps[-1], merge=None))

@@ -33,7 +33,7 @@ class Label(Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         kind: "clip" or "camera".
         name: First frame of the clip as text, or the name of the camera in the capture.
-        text: What is shown beside it.
+        text: Shown next to it.
     """
 
     kind: Annotated[str, Meta(pattern=r"\A(clip|camera)\Z")]
@@ -45,8 +45,8 @@ class World(Struct, frozen=True, forbid_unknown_fields=True):
     """How the scene lies in the world.
 
     Attributes:
-        up: Direction that is up, in scene axes, of unit length; None for that which the cameras suggest.
-        meters_per_unit: Length of a scene unit, m; None where nobody has said.
+        up: Direction that is up, in scene axes, of unit length; None for the one that the cameras suggest.
+        meters_per_unit: Length of a scene unit, m; None where unknown.
 
     Raises:
         ValueError: The direction is not of unit length, or the length not positive.
@@ -67,16 +67,16 @@ AS_CAPTURED = World()
 
 @dataclass(frozen=True, slots=True)
 class ProjectDocument:
-    """What a project is made to be. Changed by making another one with dataclasses.replace.
+    """Everything that a user decides about a project. Change it with dataclasses.replace.
 
     Attributes:
-        settings: What all clips have in common.
+        settings: Shared by all clips.
         regions: Where the user overrules the gate; later ones overrule earlier ones.
         camera_paths: In the user's order.
         edits: The stack, bottom first.
         markers: On the timeline, by frame.
         labels: The user's own names.
-        exclusions: What training never sees.
+        exclusions: Cameras, pictures and painted parts that training never sees.
         world: Up and scale.
     """
 

@@ -1,4 +1,4 @@
-"""ProjectSettings: what every clip of a project has in common."""
+"""ProjectSettings: settings shared by all clips of a project."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from engine.training.config import TrainConfig, config_of
 
 @dataclass(frozen=True, slots=True)
 class ProjectSettings:
-    """What every clip of a project has in common. A value, part of the document.
+    """Settings shared by all clips of a project. A value, part of the document.
 
     Attributes:
         capture: Folder of the capture.
@@ -30,7 +30,7 @@ class ProjectSettings:
         follow_links: Whether the user allowed the capture's files to lie outside of its folder.
         frames: First frame of the capture that is worked on, and the one after the last; None for all.
         clip_bounds: Where clips were split or merged: the first frame of every clip, and at the end the number of
-            frames. None where every clip has clip_length frames, the last one what is left.
+            frames. None where every clip has clip_length frames, the last one the rest.
     """
 
     capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
@@ -69,7 +69,7 @@ class ProjectSettings:
 
 
 def check_bounds(clip_bounds: tuple[int, ...] | None) -> None:
-    """See that clips can be cut so.
+    """Check that clips can be cut so.
 
     Raises:
         ProjectError: They do not rise from 0.

@@ -1,4 +1,4 @@
-"""Ahead: what is decoded and drawn before it is asked for, and which frames are ready to be shown at once."""
+"""Ahead: decodes and draws frames before they are asked for, and knows which are ready to be shown at once."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from app.playback.render import PictureKey, Renderer, RenderRequest, RenderView
 from engine.capture.files.frame_runs import runs_of
 
 PLAYING_S = 1.5
-"""This much of what comes is made ready while it plays."""
+"""Playing time that is made ready ahead while it plays."""
 MAX_PLAYING, STANDING = 64, 8
 """At most so many frames while it plays; so many once the playhead stands."""
 SETTLED_S = 0.3
-"""The view, and the playhead unless it plays, have to stand still so long: until then cores are for what is shown."""
+"""The view, and the playhead unless it plays, have to stand still so long: until then cores are for the shown frame."""
 MOST_UNASKED = 30
 """After so many turns of the loop in which nobody asked for a picture, none are drawn ahead."""
 SPARE = 2
@@ -77,7 +77,7 @@ class Ahead:
     # ---------------------------------------------------------------- planning
 
     def plan(self, course: Course, request_of: RequestOf, *, is_busy: bool = False) -> None:
-        """Look at where the playhead is, and plan anew if something is other than before.
+        """Plan anew if the playhead or anything else has changed.
 
         Args:
             is_busy: Whether something else, such as a training, needs the cores while the playhead stands.
@@ -145,7 +145,7 @@ class Ahead:
                     if shown is not None and not (place == 0 and self._renderer.is_ready(request.key, asked.full)):
                         yield RenderRequest(request.key, asked.sizes[place], shown)
 
-    # ---------------------------------------------------------------- what is ready
+    # ---------------------------------------------------------------- ready frames
 
     def _is_ready(self, key: FrameKey) -> bool:
         """Whether a frame can be shown at once, as it is looked at now."""
@@ -179,6 +179,6 @@ def n_ahead(course: Course) -> int:
 
 
 def _picture_distance(key: PictureKey, course: Course, look_keys: set[Hashable]) -> float:
-    """Of other looks than those that are shown nothing is wanted soon."""
+    """Pictures in looks that are not shown come last."""
     gaussians_key, look = key
     return course.distance(gaussians_key[-1]) if look.key in look_keys else float("inf")

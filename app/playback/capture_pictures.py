@@ -19,7 +19,7 @@ from engine.images.exposure_curve import to_reference
 
 CACHE_BYTES = 96 << 20
 THUMBNAIL_WIDTH_PX = 200
-"""Requests up to this width are thumbnails: answered exactly or not at all, on a thread of their own."""
+"""Requests up to this width are thumbnails: answered exactly or not at all, on a separate thread."""
 
 
 Gain = tuple[float, float, float]
@@ -87,14 +87,14 @@ class CapturedPictures:
         """Decode these, in this order, while no picture is asked for: as many as can be kept."""
         missing = [request for request in requests if request not in self._cache]
         held = max((picture.image.nbytes for picture in self._last.values()), default=0)
-        n_that_fit = self._cache.max_bytes // (2 * held) if held else 1  # half is for what was shown
+        n_that_fit = self._cache.max_bytes // (2 * held) if held else 1  # half is for pictures shown before
         self.viewing.plan(missing[:n_that_fit])
 
     def _worker(self, request: PictureRequest) -> LatestWorker[PictureRequest, Picture]:
         return self.thumbnails if request.is_thumbnail else self.viewing
 
     def clear(self) -> None:
-        """Forget everything, as when another capture was opened; what is being decoded is dropped."""
+        """Forget everything, as when another capture was opened; pictures being decoded are dropped."""
         self.viewing.forget()
         self.thumbnails.forget()
         self._cache.clear()

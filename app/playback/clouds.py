@@ -1,4 +1,4 @@
-"""Clouds: what is shown where nothing is trained. The still part of the reference clip; before that a rough first
+"""Clouds: shown where nothing is trained. The still part of the reference clip; before that a rough first
 cloud; before that pictures placed in space. Read or made on one thread; the newest request wins.
 """
 

@@ -2,7 +2,7 @@
 key.
 
 A key is (generation, path, clip_index, revision, effects, shown_as, frame_index). The generation goes up when another
-project is opened: what the thread finishes for the one before is dropped. A new revision of a live clip makes its older
+project is opened: results for the previous one are dropped. A new revision of a live clip makes its older
 frames worthless. Effects are those of the edits that hold at the frame: another edit makes only its own frames anew.
 """
 
@@ -43,7 +43,7 @@ MAX_MODELS = 6
 ModelKey = tuple[int, str, int, str]
 """generation, path, clip_index, revision"""
 FrameKey = tuple[int, str, int, str, str, ShownAs, int]
-"""the same, digest of the effects of edits, what is decoded of the frame, and frame_index"""
+"""the same, digest of the effects of edits, the decoded contents, and frame_index"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class FrameRequest:
 
 @dataclass(frozen=True, slots=True)
 class LoadedClip:
-    """A model in memory and what is shown of it.
+    """A model in memory and its parts.
 
     Attributes:
         colors: The cameras' rendition of the scene's colours; None where the files do not say.
@@ -166,7 +166,7 @@ class FrameDecoder:
     def frame(self, request: FrameRequest) -> ShownFrame | None:
         """The frame if it is ready; otherwise it is asked for and the newest finished one is returned.
 
-        What comes back says itself which frame of which clip it is.
+        The result states its frame and clip.
         """
         known = self._cache.get(request.key)
         if known is not None:
@@ -247,7 +247,7 @@ class FrameDecoder:
 
     def clear(self) -> None:
         """Forget everything, as when another capture was opened."""
-        self.worker.forget()  # first: from here on the thread keeps nothing of what it is working on
+        self.worker.forget()  # first: from here on the thread keeps nothing of its present work
         self._cache.clear()
         self._models = OrderedDict()
         self._files = ClipFiles()

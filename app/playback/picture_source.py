@@ -20,7 +20,7 @@ class PictureSource:
         is_still: Whether that state holds nothing that changes over time, as a reference clip before its motion is
             learned.
         camera_index: The capture camera that took it, or that it is looked at through; None for a free view.
-        look: From where and through which lens, whatever the size; see OrbitView.look_key.
+        look: Viewpoint and lens, regardless of size; see OrbitView.look_key.
         has_scene_colors: Whether a captured picture was brought into the scene's colours.
         shown_as: The meaning of its colours, and which part of the clip it shows.
     """

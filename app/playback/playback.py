@@ -1,4 +1,4 @@
-"""Playback: everything that prepares what is shown of the open project. Frames of clips as arrays, clouds where nothing
+"""Playback: prepares everything that is shown of the open project. Frames of clips as arrays, clouds where nothing
 is trained, captured pictures, and pictures drawn on the processor.
 """
 
@@ -188,7 +188,7 @@ class Playback:
             return None
         look = RenderView.of(view, width, height, shown_as=shown_as)
         full = look if full_size is None else look.in_size(view, *full_size)
-        if state_of is None:  # others are not what playing shows next
+        if state_of is None:  # playing does not show others next
             self.ahead.note(view_id, AskedLook(look, full))
         shown: ShownFrame | None = None
         picture = self._known_picture(request.key, (full, look), view_id)
@@ -222,7 +222,7 @@ class Playback:
         self.renderer.worker.active_lane = view_id
 
     def work_ahead(self, timeline: Timeline, *, is_busy: bool = False) -> None:
-        """Make ready what comes next while nothing is asked for. Called in every turn of the loop.
+        """Prepare the next frames while nothing is asked for. Called in every turn of the loop.
 
         Args:
             is_busy: Whether a training needs the cores while nothing plays.
@@ -398,7 +398,7 @@ class Playback:
         return *results, self._n_ahead()
 
     def _n_ahead(self) -> int:
-        """How much was made ahead up to the last pause: each of it alone is not worth drawing the window anew."""
+        """Results made ahead up to the last pause: a single one is not worth drawing the window anew."""
         workers = (self.decoder.worker, self.renderer.worker)
         if all(worker.is_idle for worker in workers):
             self._n_ahead_seen = sum(worker.n_ahead for worker in workers)

@@ -20,9 +20,9 @@ class Course:
         direction: 1 or -1.
         first, last: The frames that are played, ends included.
         is_looping: Whether it continues at the other end.
-        is_playing: Whether it moves by itself.
+        is_playing: Whether it moves automatically.
         frames_per_s: How fast, while it does.
-        is_loaded_first: Whether all of what is played is made ready, because no frame of it may be left out.
+        is_loaded_first: Whether all played frames are made ready first, because none may be left out.
     """
 
     frame_index: int = 0
@@ -64,7 +64,7 @@ class Course:
         return list(range(start + step, end + step, step))[: max(n, 0)]
 
     def distance(self, frame_index: int) -> float:
-        """How far off it is that a frame is shown, in frames. While it plays, what was passed comes last."""
+        """How far off it is that a frame is shown, in frames. While it plays, passed frames come last."""
         steps = (frame_index - self.frame_index) * self.direction
         is_within = self.first <= frame_index <= self.last and self.first <= self.frame_index <= self.last
         if steps >= 0:

@@ -1,7 +1,7 @@
 """A capture before anything is trained: a hint at once, a first rough cloud after some seconds.
 
 The hint places every camera's picture in space. The cloud is made by the same reconstruction as the real one, from
-small pictures of a single moment, in a short process of its own: compiling and computing must not hold up a window.
+small pictures of a single moment, in a short separate process: compiling and computing must not hold up a window.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Renderer: the rasterizer's pictures of Gaussians from views, made on a thread of its own. The newest request of each
+"""Renderer: the rasterizer's pictures of Gaussians from views, made on a separate thread. The newest request of each
 view wins, pictures are kept up to a number of bytes, and some are made ahead.
 """
 
@@ -32,13 +32,13 @@ CACHE_BYTES = 256 << 20
 
 @dataclass(frozen=True, slots=True)
 class RenderView:
-    """From where, through which lens, how large and how something is drawn, whatever it is of.
+    """Viewpoint, lens, size and mode of a picture, regardless of its contents.
 
     Attributes:
-        key: Of the view, whatever the size; see OrbitView.look_key.
+        key: Of the view, regardless of size; see OrbitView.look_key.
         shown_as: The meaning of its colours, and the part of the clip.
         value_range: Of the numbers that its colours stand for.
-        near: Nothing nearer than this is drawn, whatever the scene says; see OrbitView.near.
+        near: Nothing nearer than this is drawn, regardless of the scene; see OrbitView.near.
         set_back: How much farther away the camera stands than it seems to; see OrbitView.set_back.
     """
 
@@ -63,7 +63,7 @@ class RenderView:
         )
 
     def in_size(self, view: OrbitView, width: int, height: int) -> RenderView:
-        """The same in another size; view is that which it was made of."""
+        """The same in another size; view is the one it was made of."""
         if (width, height) == (self.width, self.height):
             return self
         return replace(self, width=width, height=height, K=view.K(width, height))
@@ -142,7 +142,7 @@ class Renderer:
         return (frame_key, look) in self._cache
 
     def ready_keys(self) -> list[FrameKey]:
-        """Frames of which there is a picture, whatever it looks like."""
+        """Frames with a picture in any look."""
         return list({frame_key for frame_key, _ in self._cache.keys()})  # noqa: SIM118 - a cache, not a dict
 
     @property

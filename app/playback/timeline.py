@@ -30,7 +30,7 @@ class Timeline:
         direction: 1 plays forward, -1 backward.
         speed: Multiple of the capture's own speed, one of SPEEDS.
         in_frame, out_frame: Where playing begins and ends; None where the capture does. in_frame <= out_frame.
-        around: Frames that are played over and over for the moment, whatever in_frame and out_frame say; None else.
+        around: Frames that are played over and over for the moment, regardless of in_frame and out_frame; else None.
         is_following: Whether the playhead goes along with the training. Ends when the user moves it.
         markers: Frames that the user wants to find again; put here by who owns the document.
     """
@@ -91,7 +91,7 @@ class Timeline:
             target %= self.n_frames
         self.seek(target)
 
-    # ---------------------------------------------------------------- what is played
+    # ---------------------------------------------------------------- the played range
 
     @property
     def play_range(self) -> tuple[int, int]:
@@ -140,7 +140,7 @@ class Timeline:
         self._start(1)
 
     def toggle_around(self) -> None:
-        """Play around the nearest seam; where that is done already, no more."""
+        """Play around the nearest seam; stop if that is done already."""
         if self.around is not None:
             self.around = None
             self.is_playing = False
@@ -202,7 +202,7 @@ class Timeline:
             self.frame_index = start
 
     def tick(self, dt_s: float, *, is_shown: bool = True) -> bool:
-        """Let time pass while playing; what is left over from whole frames is carried on, so that nothing adds up.
+        """Let time pass while playing; the rest below a whole frame is carried over, so that no error adds up.
 
         Args:
             dt_s: Seconds since the last tick; negative or non-finite values count as none.

@@ -23,7 +23,7 @@ class SessionPart:
         """The same project is open, with other settings."""
 
     def check_idle(self) -> None:
-        """See that it writes no clips, so that they may be cut otherwise or copied. Raises ProjectError."""
+        """Check that it writes no clips, so that they may be cut otherwise or copied. Raises ProjectError."""
 
     def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """See whether one document may take the place of another. Raises ProjectError."""

@@ -1,5 +1,5 @@
-"""What can be done to the edits of a document: functions from a document to another one. The window, the command line
-and scripts use the same ones.
+"""Changes to the edits of a document: functions from one document to another, shared by the window, the command line
+and scripts.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ def add_edit(
     """Put a new edit on top of the stack, with a number that no other has; it is the last of the document's edits.
 
     Args:
-        target: What it acts on; None for everything.
-        is_inverted: Whether it acts on everything but that.
+        target: None for everything.
+        is_inverted: Whether it acts on everything but the target.
         name: For people; an empty one is put into words where the edit is shown.
     Raises:
         ProjectError: A value is out of range, or there are too many edits.
@@ -75,7 +75,7 @@ def change_edit(document: ProjectDocument, edit: Edit) -> ProjectDocument:
 
 
 def remove_edit(document: ProjectDocument, edit_id: int) -> ProjectDocument:
-    """Take an edit out of the stack: what it did is undone, what others did stays.
+    """Remove an edit from the stack: its effect is undone, that of others stays.
 
     Raises:
         ProjectError: There is no such edit.
@@ -98,7 +98,7 @@ def move_edit(document: ProjectDocument, edit_id: int, position: int) -> Project
 
 
 def toggle_edit(document: ProjectDocument, edit_id: int, is_on: bool | None = None) -> ProjectDocument:
-    """Let an edit count or not. is_on: None turns what it is.
+    """Let an edit count or not. is_on: None toggles it.
 
     Raises:
         ProjectError: There is no such edit.
@@ -145,7 +145,7 @@ def _check_room(document: ProjectDocument) -> None:
 
 
 def _checked(edit: Edit) -> Edit:
-    """The edit as it will be read again: what a file may not hold is refused now."""
+    """The edit as it will be read again; values that a file cannot hold are refused now."""
     checked_text(edit.name)
     try:
         read = to_type(to_builtins(edit), Edit)

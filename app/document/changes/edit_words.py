@@ -1,4 +1,4 @@
-"""Edits in words: what they act on, what they do, and where in time."""
+"""Edits in words: target, effect and frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from engine.editing.picks import n_rows
 
 
 def target_text(target: Target, *, is_inverted: bool = False) -> str:
-    """What an edit acts on: "1,240 Gaussians of clip 2", "box 0.8 x 0.5 x 1.2"."""
+    """The target of an edit: "1,240 Gaussians of clip 2", "box 0.8 x 0.5 x 1.2"."""
     text = _shape_text(target)
     return f"all but {text}" if is_inverted else text
 
@@ -29,12 +29,12 @@ def scope_text(scope: Scope, clips: Sequence[Clip] = ()) -> str:
 
 
 def edit_title(edit: Edit) -> str:
-    """The user's name for an edit, else what it does to what."""
+    """The user's name for an edit, else its effect and target."""
     return edit.name or what_text(edit.action, edit.target, is_inverted=edit.is_inverted)
 
 
 def what_text(action: Action, target: Target, *, is_inverted: bool = False) -> str:
-    """What is done to what, as it can follow "Undo": "delete 1,240 Gaussians of clip 2", "crop to box 1 x 1 x 1"."""
+    """Effect and target, as they can follow "Undo": "delete 1,240 Gaussians of clip 2", "crop to box 1 x 1 x 1"."""
     if is_inverted and action.opposite:
         return f"{action.opposite if isinstance(target, Picked) else 'crop to'} {target_text(target)}"
     before, after = action.words

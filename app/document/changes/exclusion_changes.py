@@ -1,4 +1,4 @@
-"""What training never sees, changed: cameras, pictures and painted parts of pictures. Documents in, documents out."""
+"""Changes to the exclusions: cameras, pictures and painted parts of pictures. Documents in, documents out."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def with_frames_excluded(
 
     Args:
         first, stop: Frames [first, stop).
-        camera: Of this camera; None for all. What all cameras leave out, one of them cannot take up again.
+        camera: Of this camera; None for all. Frames that all cameras leave out cannot take part again for one.
         camera_names, n_frames: Of the whole capture.
     Raises:
         ProjectError: There is no such camera or frame.
@@ -144,7 +144,7 @@ def _joined(spans: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
 
 
 def _cut(span: tuple[int, int], taken: tuple[int, int]) -> list[tuple[int, int]]:
-    """What is left of a span."""
+    """The remaining parts of a span."""
     parts = [(span[0], min(span[1], taken[0])), (max(span[0], taken[1]), span[1])]
     return [part for part in dict.fromkeys(parts) if part[0] < part[1]]
 

@@ -1,4 +1,4 @@
-"""What can be done to the markers and labels of a document: functions from a document to another one."""
+"""Changes to the markers and labels of a document: functions from one document to another."""
 
 from __future__ import annotations
 

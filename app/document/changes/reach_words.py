@@ -1,6 +1,4 @@
-"""Where an edit acts, in words, and edits that can act nowhere, which are refused. The window, the command line and
-scripts say it with these.
-"""
+"""Where an edit acts, in words, and the check that it acts at all. For the window, the command line and scripts."""
 
 from __future__ import annotations
 
@@ -17,10 +15,10 @@ MAX_RUNS = 3
 
 
 def check_acts(reach: Reach, scope: Scope) -> None:
-    """See that a new edit can act somewhere.
+    """Check that a new edit can act somewhere.
 
     Raises:
-        ProjectError: What it acts on exists in no frame in which it is to hold.
+        ProjectError: Its target exists in none of its frames.
     """
     if reach.is_nowhere:
         hint = "Choose other frames for the edit, or select in a frame where it should act."
@@ -28,7 +26,7 @@ def check_acts(reach: Reach, scope: Scope) -> None:
 
 
 def reach_note(reach: Reach, scope: Scope) -> str:
-    """What is unexpected about where an edit acts, before it is made and afterwards; empty where nothing is."""
+    """A note on an edit that acts in unexpected places, before it is made and afterwards; empty for others."""
     if reach.is_nowhere:
         return _nowhere_text(reach, scope)
     if reach.empty:

@@ -1,5 +1,5 @@
-"""What can be done to up and scale of a document: functions from a document to another one, and how three points or two
-say what they are.
+"""Changes to the up direction and scale of a document: functions from one document to another. Three points give the
+direction, two points the scale.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ MIN_SINE = 1e-3
 
 
 def set_up(document: ProjectDocument, direction: Sequence[float] | None) -> ProjectDocument:
-    """Say which direction is up.
+    """Set the up direction.
 
     Args:
-        direction: In scene axes, of any length; None for that which the cameras suggest.
+        direction: In scene axes, of any length; None for the one that the cameras suggest.
     Raises:
         ProjectError: It is not a direction.
     """
@@ -37,7 +37,7 @@ def set_up(document: ProjectDocument, direction: Sequence[float] | None) -> Proj
 
 
 def set_scale(document: ProjectDocument, meters_per_unit: float | None) -> ProjectDocument:
-    """Say how long a scene unit is. meters_per_unit: m; None takes it back.
+    """Set the length of a scene unit. meters_per_unit: m; None removes it.
 
     Raises:
         ProjectError: The length is out of range.
@@ -72,7 +72,7 @@ def up_of_ground(points: Sequence[Sequence[float]], toward: Sequence[float]) -> 
 
 
 def scale_of_length(a: Sequence[float], b: Sequence[float], length_m: float) -> float:
-    """How long a scene unit is, m, where two points are known to be so far apart. a, b: Scene units.
+    """The length of a scene unit, m, from two points at a known distance. a, b: Scene units.
 
     Raises:
         ProjectError: The points are the same, or the length is not one.

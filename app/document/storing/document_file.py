@@ -22,12 +22,12 @@ from engine.storage.typed_json import EntryError, to_type
 
 SCHEMA = 2
 PROJECT_FILE, BACKUP_FILE = "project.json", "project.backup.json"
-"""The document, and what it was before it was written last."""
+"""The document, and the one before the last write."""
 GATE_FILE, CAMERA_PATHS_FILE = "gate.json", "camera_paths.json"
 """Of schema 1: regions and camera paths, which are part of the document now."""
 MAX_DOCUMENT_BYTES = 256 << 20
 RESTORE = "Restore it from a backup."
-"""Where it is not known yet what else is left of the project."""
+"""Hint where the rest of the project has not been looked at."""
 _REMOVE = "Correct or remove the file."
 
 
@@ -37,7 +37,7 @@ class DamagedDocument(ProjectError):
 
 @dataclass(frozen=True, slots=True)
 class StoredDocument:
-    """What a project.json holds.
+    """The contents of a project.json.
 
     Attributes:
         document: With the place of the capture as it was written.
@@ -58,7 +58,7 @@ def read_document(folder: Path) -> ProjectDocument:
 
 
 def read_stored(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
-    """Read project.json, or its backup, and of schema 1 what lay beside it.
+    """Read project.json, or its backup, and for schema 1 the files next to it.
 
     Raises:
         DamagedDocument: It is damaged.
@@ -116,17 +116,17 @@ def document_text(document: ProjectDocument, step: int = 0) -> KeptText:
 
 
 def write_document(folder: Path, document: ProjectDocument) -> None:
-    """Write project.json of a document that nothing has happened to. Raises what the two functions around it raise."""
+    """Write project.json of a document without history. Raises what `document_text` and `write_document_text` raise."""
     write_document_text(folder, document_text(document))
 
 
 def write_document_text(folder: Path, text: KeptText, *, is_backup_kept: bool = True) -> None:
-    """Write project.json, keep the one before as its backup, and remove what lay beside that of schema 1.
+    """Write project.json, keep the one before as its backup, and remove the files that schema 1 has next to it.
 
     Args:
         is_backup_kept: Whether the one before is sound, so that it may become the backup.
     Raises:
-        DiskError: The disk refused; what was there stands.
+        DiskError: The disk refused; the files before stay.
     """
     path = folder / PROJECT_FILE
     old = [folder / name for name in (GATE_FILE, CAMERA_PATHS_FILE) if (folder / name).exists()]

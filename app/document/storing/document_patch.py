@@ -1,7 +1,7 @@
 """Patches between two documents: per entry, and per item where an entry is a list.
 
-Only items that are not the same objects are looked at, so that a step costs what it changes, however many edits the
-document holds; and what did not change is shared between all documents of a history.
+Only items that are not the same objects are compared, so that the cost of a step follows from its changes, however many
+edits the document holds. Unchanged items are shared between all documents of a history.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def document_difference(before: ProjectDocument, after: ProjectDocument) -> dict
     """The patch of each entry that differs.
 
     Raises:
-        ProjectError: What is new in `after` cannot be kept.
+        ProjectError: A new value in `after` cannot be kept.
     """
     found: dict[str, Patch] = {}
     for name, codec in CODECS.items():
@@ -58,7 +58,7 @@ def _of_items(codec: Codec, before: Sequence[Any], after: Sequence[Any]) -> Patc
 
 
 def document_with(before: ProjectDocument, patch: Any) -> ProjectDocument:
-    """What a patch makes of a document.
+    """A document with a patch applied.
 
     Raises:
         PatchError: It is not a patch, or one for another document.
@@ -98,7 +98,7 @@ def _items_with(codec: Codec, before: tuple[Any, ...], patch: Any) -> tuple[Any,
 
 
 def _check(document: ProjectDocument, changed: dict[str, Any]) -> None:
-    """See that items can be distinguished, where they have changed. Raises ProjectError."""
+    """Check that items can be distinguished, where they have changed. Raises ProjectError."""
     if "camera_paths" in changed:
         check_paths(document.camera_paths)
     if "edits" in changed:

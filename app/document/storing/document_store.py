@@ -1,9 +1,9 @@
 """DocumentStore: the document of a project folder and its history, on disk.
 
 Every event is added to the journal, for good, before it counts. Now and then a new file of the journal begins, and
-project.json and history.json are written anew: on a thread, so that no event waits for it. The file before and the
-project.json before stay until the next time, so that nothing is lost where the system does not keep what it has said to
-be kept. A clock is asked for nothing.
+project.json and history.json are written anew: on a thread, so that no event waits for it. The previous file
+and project.json stay until the next time, so that nothing is lost where the system loses a write that it confirmed.
+No clock is used.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class DocumentStore:
         self.n_replayed = 0
         self.notes: tuple[str, ...] = ()
         self._known: Replayed | None = None
-        """What the files hold; None where they have to be read first."""
+        """Contents of the files; None where they have to be read first."""
         self._session: int | None = None
         self._stored_step = 0
         """Of project.json."""
@@ -61,7 +61,7 @@ class DocumentStore:
     # ---------------------------------------------------------------- reading
 
     def read(self) -> DocumentHistory:
-        """What the project holds.
+        """The contents of the project.
 
         Raises:
             JournalDamage, DamagedDocument: Something is damaged; app.document.storing.recovery says what is left.
@@ -112,14 +112,14 @@ class DocumentStore:
             self._begin(Replayed(history.each(self._stored), step), is_backup_kept=is_backup_kept)
 
     def write(self, events: Sequence[Event], history: DocumentHistory) -> None:
-        """Keep what has happened, for good.
+        """Keep events for good.
 
         Args:
-            events: What happened since the last call, in order.
-            history: What has come of it; the files come to the same by the same rules.
+            events: Since the last call, in order.
+            history: After the events; the files lead to the same one by the same rules.
         Raises:
             ProjectError: The document cannot be kept.
-            DiskError: The disk refused; what was kept before stands.
+            DiskError: The disk refused; events kept before stay.
         """
         if events:
             with self._lock:
@@ -132,7 +132,7 @@ class DocumentStore:
         assert known is not None
         if self._session is None:
             self._session = known.step
-        self._known = None  # whatever goes wrong, the files have to be read again
+        self._known = None  # after any failure the files have to be read again
         kept, rows, step = known.history, [], known.step
         for event in map(self._to_store, coalesced(events)):
             step += 1
@@ -182,7 +182,7 @@ class DocumentStore:
                 return event
 
     def _begin(self, known: Replayed, *, is_backup_kept: bool = True) -> None:
-        """Write the document and its history, then begin a file of the journal; what was before stays beside it."""
+        """Write the document and its history, then begin a file of the journal; the files before stay."""
         folder, step = self.folder, known.step
         before = known.journal
         try:

@@ -1,8 +1,8 @@
 """history.json: the way back and forth from the document of project.json, as chains of patches.
 
-Steps of the past begin with the last one: each holds what makes the document before it of the one after it. Steps that
-were taken back likewise, beginning with the one that would be done again next. Whatever is wrong with the file costs
-the way back, and nothing else.
+Steps of the past begin with the last one: each holds the patch from the document after it to the one before it. Steps
+that were taken back likewise, beginning with the one that would be done again next. A damaged file costs the way back,
+and nothing else.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class _StoredStep(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StoredHistory(Struct, frozen=True, forbid_unknown_fields=True):
-    """What the file holds.
+    """The contents of the file.
 
     Attributes:
         step, document: Number of the step and checksum of the project.json that it belongs to.
@@ -78,7 +78,7 @@ def _chain(present: ProjectDocument, steps: Sequence[Step]) -> list[dict[str, An
 
 
 def read_history(folder: Path) -> StoredHistory | None:
-    """What the file holds; None where there is none.
+    """The contents of the file; None where there is none.
 
     Raises:
         ProjectError: It is damaged.

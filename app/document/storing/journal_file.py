@@ -1,4 +1,4 @@
-"""A file of the journal: what has happened to the document since a step, one line for each event.
+"""A file of the journal: the events since a step of the document, one line each.
 
     {"journal": 2, "step": 123, "document": checksum or null, "after": checksum, "checksum": ...}   its start
     {"kept": 126             , "checksum": ...}                                                     its last step
@@ -7,11 +7,11 @@
     {"step": 126, "do": "place", "capture": ..., "follow_links": ..., "after": ..., "checksum": ...}
     {"end": 126, "after": ..., "checksum": ...}
 
-Each line holds the checksum of the line before it as "after", and one of its own over all of it, so that no line can be
-changed, left out or moved without being noticed. The last line says that nothing is missing; the next event is written
-in its place, with a new last line, in one go. A program that is killed while it writes leaves a file without a last
-line, which costs that event alone. The second line, of a fixed length and not part of the chain, names the last step
-that was kept, so that a file that is cut off later can tell how many are missing. Files of format 1 have no such line.
+Each line holds the checksum of the line before it as "after", and its own checksum over all of it, so that no line can
+be changed, left out or moved without being noticed. The last line says that nothing is missing; the next event is
+written in its place, with a new last line, in one go. A program that is killed while it writes leaves a file without a
+last line, which costs that event alone. The second line, of a fixed length and not part of the chain, names the last
+step that was kept, so that a file that is cut off later shows how many are missing. Files of format 1 have none.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class JournalFile:
         start: Step that it continues from.
         document: Checksum of project.json at that step; empty where that was not known.
         after: Checksum of the last line before it, in the file before; empty where there is none.
-        rows: Its events, without what chains them.
+        rows: Its events, without the checksums that chain them.
         links: The checksum of the first line, and then of each event.
         ends: Where each of these lines ends, in bytes.
         is_whole: Whether the last line is there.
@@ -94,7 +94,7 @@ def read_journal(path: Path) -> tuple[JournalFile, JournalDamage | None]:
     """Read a file up to its end, or up to where it is damaged.
 
     Returns:
-        What could be read, and what is wrong with the rest. A file that breaks off within a line is not damaged, but
+        The readable part, and the damage in the rest. A file that breaks off within a line is not damaged, but
         not whole either.
     Raises:
         JournalDamage: Not even its first line can be read.
@@ -205,7 +205,7 @@ def append_rows(file: JournalFile, rows: list[Row]) -> JournalFile:
 
     Raises:
         ProjectError: They hold something that cannot be kept.
-        OSError: The disk refused; the file holds what it held, or breaks off after it.
+        OSError: The disk refused; the file is as it was, or breaks off after its last event.
     """
     data, link = b"", file.links[-1]
     links, ends = list(file.links), list(file.ends)
@@ -218,7 +218,7 @@ def append_rows(file: JournalFile, rows: list[Row]) -> JournalFile:
     try:
         _write_end(file, data + _last(stop, link), stop)
     except OSError:
-        with suppress(OSError):  # what had its place before has it again, and needs no room
+        with suppress(OSError):  # the last line from before returns to its place, which needs no room
             _write_end(file, _last(file.stop, file.links[-1]), file.stop)
         raise
     return replace(
@@ -268,7 +268,7 @@ def _last(step: int, link: str, *, is_left: bool = False) -> bytes:
 
 
 def _line(row: Row) -> tuple[bytes, str]:
-    """A line and its checksum. Raises ProjectError for what JSON cannot hold."""
+    """A line and its checksum. Raises ProjectError for values that JSON cannot hold."""
     try:
         link = checksum_of(row)
         text = json.dumps({**row, CHECKSUM: link}, allow_nan=False, ensure_ascii=False)

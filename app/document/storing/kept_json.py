@@ -1,4 +1,4 @@
-"""What the JSON files of a project have in common: a checksum, an upper size, and words for what goes wrong."""
+"""Common parts of a project's JSON files: a checksum, an upper size, and error messages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def read_kept(path: Path, what: str, *, hint: str, max_bytes: int = MAX_BYTES) -
 
     Args:
         what: Names it at the beginning of a sentence.
-        hint: What to do where it is damaged.
+        hint: The remedy where it is damaged.
     Raises:
         ProjectError: It cannot be read or is damaged.
     """
@@ -51,17 +51,17 @@ def kept_object(path: Path, what: str, *, hint: str, max_bytes: int) -> tuple[di
 
 @dataclass(frozen=True, slots=True)
 class KeptText:
-    """What is to be written, and the checksum in it."""
+    """The text to write, and the checksum in it."""
 
     data: bytes
     checksum: str
 
 
 def kept_text(content: dict[str, Any], *, max_bytes: int = MAX_BYTES, is_for_people: bool = True) -> KeptText:
-    """A file of a project as it is written. max_bytes: What is read again. is_for_people: See `checked_text`.
+    """A file of a project as it is written. max_bytes: The limit for reading it. is_for_people: See `checked_text`.
 
     Raises:
-        ProjectError: It would be too large, or holds what JSON cannot.
+        ProjectError: It would be too large, or holds values that JSON cannot hold.
     """
     try:
         text, checksum = checked_text(content, is_for_people=is_for_people)

@@ -1,4 +1,4 @@
-"""Patches between two values of plain JSON data: what differs, and nothing else.
+"""Patches between two values of plain JSON data: the differences, and nothing else.
 
 A patch is plain data, too:
 
@@ -17,7 +17,7 @@ Patch = dict[str, Any]
 
 
 class PatchError(ValueError):
-    """A patch does not fit what it is for. The text fits into brackets."""
+    """A patch does not fit its value. The text fits into brackets."""
 
 
 def difference(before: Any, after: Any) -> Patch | None:
@@ -71,7 +71,7 @@ def _is_same(before: Any, after: Any) -> bool:
 
 
 def patched(before: Any, patch: Any) -> Any:
-    """What the patch makes of a value.
+    """The value with the patch applied.
 
     Raises:
         PatchError: It is not a patch, or one for another value.

@@ -1,6 +1,6 @@
 """Recovery: what is left of a project whose document or journal is damaged, and how to continue with it.
 
-Nothing is thrown away: what is damaged is kept aside in a folder whose name says so.
+Nothing is thrown away: damaged files are kept aside in a folder whose name says so.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from engine.errors import ProjectError
 from engine.storage.files import atomic_folder, disk_error
 
 DAMAGED_FOLDER = "damaged"
-"""Begins the names of folders with what was damaged."""
+"""Prefix of the names of folders with damaged files."""
 
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """What is left.
+    """How a damaged project can be continued.
 
     Attributes:
         folder: Of the project.
-        problem: What is damaged.
+        problem: The damage, in words.
         step: The last step that can be kept; None where nothing can be read.
-        step_name: What that step did; empty where it is not known.
+        step_name: Of that step; empty where unknown.
         is_from_backup: Whether the document comes from the backup of project.json.
         n_replayed: Steps that follow from the journal.
         plain_step: The step of the file that can be opened as it is, read-only; None where there is none.
@@ -54,20 +54,20 @@ class Recovery:
 
 
 class DamagedProject(ProjectError):
-    """A project whose document or journal is damaged. recovery: What is left of it; None where nobody has looked."""
+    """A project whose document or journal is damaged. recovery: How to continue it; None where nobody has looked."""
 
     recovery: Recovery | None = None
 
 
 def damaged_project(folder: Path, error: ProjectError) -> DamagedProject:
-    """The same error with what is left of the project."""
+    """The same error with the project's recovery."""
     found = DamagedProject(error.message, hint=error.hint, path=error.path)
     found.recovery = look_for_recovery(folder)
     return found
 
 
 def look_for_recovery(folder: Path) -> Recovery | None:
-    """What is left of a project; None where nothing is damaged. Changes nothing.
+    """The recovery of a project; None where nothing is damaged. Changes nothing.
 
     Raises:
         ProjectError: The folder is not a project, or one of a newer version.
@@ -121,10 +121,10 @@ def plain_history(folder: Path) -> DocumentHistory:
 
 
 def recover(folder: Path) -> Path:
-    """Continue with the steps before the damage. Only for who has the project's lock.
+    """Continue with the steps before the damage. Only for the holder of the project's lock.
 
     Returns:
-        The folder with what was damaged.
+        The folder with the damaged files.
     Raises:
         ProjectError: Nothing can be read.
         DiskError: The disk refused; the project is as damaged as it was.
@@ -148,7 +148,7 @@ def recover(folder: Path) -> Path:
 
 
 def _keep_aside(folder: Path) -> Path:
-    """Copy the document's files into a new folder; what is not a file is moved there. Raises OSError."""
+    """Copy the document's files into a new folder; anything that is not a file is moved there. Raises OSError."""
     number = 1
     while os.path.lexists(folder / f"{DAMAGED_FOLDER}-{number}"):
         number += 1

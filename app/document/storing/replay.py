@@ -26,7 +26,7 @@ _SUFFIX = ".jsonl"
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What a project holds.
+    """The contents of a project.
 
     Attributes:
         history: The document and the way back; the capture as the files say it.
@@ -34,8 +34,8 @@ class Replayed:
         n_replayed: Steps that were taken from the journal.
         journal: The file that the next event belongs into; None where a new one has to begin.
         schema: Of project.json.
-        notes: What was missing and does no more harm, as sentences.
-        damage: What is wrong with what follows; None where nothing is.
+        notes: Missing parts that do no more harm, as sentences.
+        damage: In the rest; None without any.
     """
 
     history: DocumentHistory
@@ -222,15 +222,15 @@ def _missing(n: int | None) -> str:
 
 
 def row_of(event: Event, before: DocumentHistory, step: int) -> Row:
-    """An event as a line of the journal. What undo and redo come to is written, too, so that the document never
-    depends on the file of the way back.
+    """An event as a line of the journal. The results of undo and redo are written, too, so that the document never
+    depends on the history file.
 
     Args:
         event: Its merge key is a text.
         before: The document before it.
         step: Its number.
     Raises:
-        ProjectError: What it changes cannot be kept.
+        ProjectError: A changed value cannot be kept.
     """
     after = before.after(event).present
     match event:
@@ -247,7 +247,7 @@ def row_of(event: Event, before: DocumentHistory, step: int) -> Row:
 
 
 def history_after(history: DocumentHistory, row: Row) -> DocumentHistory:
-    """The history after what a line holds.
+    """The history after the event of a line.
 
     Raises:
         PatchError: The line holds something else.

@@ -25,7 +25,7 @@ _sound: set[bytes] = set()
 
 
 class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
-    """What is declared; regions are parsed by their own reader."""
+    """The declared entries; regions are parsed by their own reader."""
 
     settings: ProjectSettings
     regions: tuple[dict[str, Any], ...]
@@ -66,7 +66,7 @@ class Codec:
         is_list: Whether the entry is a list of items.
         plain: An item as plain data, which `value` takes again. Raises ProjectError for one that cannot be kept.
         value: The item that plain data holds. Raises EntryError or ProjectError.
-        key: Tells items apart while they change; None for those that only have their place.
+        key: Identifies items while they change; None for those that only have their place.
     """
 
     is_list: bool
@@ -155,7 +155,7 @@ def document_of(content: Any) -> ProjectDocument:
 
 
 def check_numbers(edits: Sequence[Edit]) -> None:
-    """See that edits can be distinguished.
+    """Check that edits can be distinguished.
 
     Raises:
         ProjectError: They cannot.
@@ -165,7 +165,7 @@ def check_numbers(edits: Sequence[Edit]) -> None:
 
 
 def check_picks(edit: Edit) -> None:
-    """See that what an edit picked can be read.
+    """Check that the picks of an edit can be read.
 
     Raises:
         ProjectError: It cannot.

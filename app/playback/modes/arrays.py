@@ -122,7 +122,7 @@ class Picture:
     Attributes:
         image: [H, W, 3] uint8 RGB.
         key: The identity of its contents; equal keys mean equal pictures.
-        is_stale: It is not what was asked for now, but the newest there is.
+        is_stale: Whether it is not the requested picture, but the newest there is.
         duration_s: How long it took to make; 0 when unknown.
         source: Its source.
         values: The numbers that its colours stand for, NaN where nothing is; None where they stand for none. [H, W]

@@ -56,7 +56,7 @@ def part_of(model: ClipModel, content: str) -> ClipModel:
 
 
 class EditedParts:
-    """Parts of one loaded clip with the edits that hold, and what is known of their Gaussians.
+    """Parts of one loaded clip with the edits that hold, and facts about their Gaussians.
 
     Args:
         model: The clip.
@@ -85,7 +85,7 @@ class EditedParts:
         return self._parts[content]
 
     def apart(self, content: str) -> EditedClip:
-        """A part with caches of its own, to be decoded on another thread; not of the whole clip."""
+        """A part with separate caches, to be decoded on another thread; not of the whole clip."""
         from engine.editing.edited_clip import EditedClip
 
         return EditedClip(part_of(self._model, content), self._clip, self.named)
@@ -117,7 +117,7 @@ class EditedParts:
         return LEARNED_ON if role in ("adapted", "replacing") else BORN_HERE
 
     def changes(self, gaussians: Gaussians, rows: GaussianRows) -> np.ndarray:
-        """How far each Gaussian is from what its anchor holds without time in the reference clip, edits included.
+        """How far each Gaussian is from its counterpart in the reference clip without time, edits included.
 
         The largest of three: of the differences of its colour's channels, that of its opacity, and the way between its
         centres in spacings of static anchors.

@@ -29,5 +29,5 @@ ROLE_HUES = {
     "adapted": GREEN,
     "replacing": VERMILLION,
 }
-"""Anchors by what they are (engine.clip_files.roles). Adapted and replacing ones are moving and promoted ones of one
+"""Anchors by role (engine.clip_files.roles). Adapted and replacing ones are moving and promoted ones of one
 clip."""

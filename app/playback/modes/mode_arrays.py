@@ -25,9 +25,9 @@ MAX_KEPT = 8
 
 
 def drawn_arrays(shown: ShownFrame, mode: str) -> GaussianArrays:
-    """The Gaussians that are drawn of a frame in a mode; they say themselves in which.
+    """The Gaussians drawn of a frame in a mode, which they state.
 
-    Those of the frame where they are the same, and where the mode needs what was not decoded with them.
+    Those of the frame where they are the same, and where the mode needs values that were not decoded with them.
     """
     gaussians = shown.gaussians
     if mode not in _MADE or (mode == "changed" and gaussians.changes is None):
@@ -37,7 +37,7 @@ def drawn_arrays(shown: ShownFrame, mode: str) -> GaussianArrays:
 
 
 class ModeArrays:
-    """Keeps the newest frames in a mode, so that what is drawn again has the same arrays."""
+    """Keeps the newest frames in a mode, so that drawing them again takes the same arrays."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[object, GaussianArrays] = OrderedDict()

@@ -82,7 +82,7 @@ def _depth_and_opacity(
 
     from engine.model.host_array import host_array
 
-    if set_back > 0.0:  # depths from so far away are too coarse in float32: what is left of them is drawn as colours
+    if set_back > 0.0:  # depths from so far away are too coarse in float32: the rest of them is drawn as colours
         depths = gaussians.means.numpy() @ view.rotation[2] + (view.translation[2] - set_back)
         colors = torch.from_numpy(np.repeat(depths[:, None], 3, axis=1).astype(np.float32))
         gaussians = replace(gaussians, colors=colors)

@@ -1,4 +1,4 @@
-"""Trails: the ways that Gaussians took over the last frames of a clip. Decoded on a thread of their own."""
+"""Trails: the ways that Gaussians took over the last frames of a clip. Decoded on a separate thread."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ class Bookmarks:
         """Keep a view under a name, with the lowest number that is free. A name that is taken means the new view.
 
         Returns:
-            What was kept; None where there is no room for more.
+            The bookmark; None where there is no room for more.
         """
         name = name.strip()[:MAX_NAME_CHARACTERS]
         same = next((item for item in self.items if item.name == name), None)
@@ -85,7 +85,7 @@ class Bookmarks:
         return f"View {wanted}"
 
     def values(self) -> list[dict[str, Any]]:
-        """Everything as values that JSON knows."""
+        """All bookmarks as values for JSON."""
         return [
             {"name": item.name, "number": item.number, "frame_index": item.frame_index, **item.place.values()}
             for item in self.items
@@ -93,7 +93,7 @@ class Bookmarks:
 
 
 def read_bookmarks(values: Any) -> Bookmarks:
-    """Bookmarks from what `Bookmarks.values` has made; entries that are not valid are left out."""
+    """Bookmarks from the result of `Bookmarks.values`; entries that are not valid are left out."""
     items: list[Bookmark] = []
     for value in values if isinstance(values, list) else []:
         place = ViewPlace.read(value) if isinstance(value, dict) else None

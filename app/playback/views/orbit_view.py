@@ -1,7 +1,7 @@
 """OrbitView: where the user looks from. numpy only; OpenCV axes (x right, y down, z forward), scene units.
 
-A free view orbits a pivot; looking through a capture camera takes its pose and intrinsics instead. What is set is where
-the view is going; what is shown may be on the way there (app.playback.views.view_motion).
+A free view orbits a pivot; looking through a capture camera takes its pose and intrinsics instead. The set pose is the
+target of a move; the shown pose may be on the way there (app.playback.views.view_motion).
 
 An orthographic view is drawn from very far away through a very long lens, because rasterizers know pinhole cameras
 only: see FLAT_SHARE.
@@ -28,7 +28,7 @@ HOME_DISTANCE_SHARE = 0.9
 """Cameras of a dome can sit on the scene's own surface; the home view keeps a little inside of them."""
 MIN_FOV_Y, MAX_FOV_Y = math.radians(5.0), math.radians(140.0)
 FLAT_SHARE = 10_000.0
-"""An orthographic view stands this many scene radii away. At the corner of a 1280 x 720 picture what lies one radius
+"""An orthographic view stands this many scene radii away. At the corner of a 1280 x 720 picture a point one radius
 before or behind the pivot is then 0.08 px from where it belongs. Depths are float32 in the rasterizers and come in
 steps of a thousandth of a radius: enough to draw, not to sort, so renderers sort by depth within the scene."""
 FLAT_REACH = 0.9
@@ -49,7 +49,7 @@ class OrbitView:
         is_orthographic: Whether parallel lines stay parallel in the free view.
         up_axis: One of UP_AXES.
         up: Unit vector. [3]
-        scene_up: The scene's upward direction, where the user has said so, instead of what the cameras agree on. [3]
+        scene_up: The scene's upward direction as set by the user, instead of the one that the cameras agree on. [3]
         look_through: Index of a capture camera, or None.
         is_eased: Whether jumps are shown as short moves.
         radius: Of the scene, scene units.
@@ -75,7 +75,7 @@ class OrbitView:
         if rig is not None:
             self.home()
 
-    # ---------------------------------------------------------------- what it looks like
+    # ---------------------------------------------------------------- pose and lens
 
     @property
     def rotation(self) -> np.ndarray:
@@ -142,7 +142,7 @@ class OrbitView:
 
     @property
     def look_key(self) -> Hashable:
-        """Identity of where from and through which lens, whatever the size of the picture."""
+        """Identity of the viewpoint and lens, regardless of the size of the picture."""
         return self.look_through, self._shown_K(1000, 1000).tobytes(), self.world_to_camera().tobytes()
 
     def advance(self, dt_s: float) -> bool:
@@ -230,7 +230,7 @@ class OrbitView:
             self.fov_y = min(max(fov_y, MIN_FOV_Y), MAX_FOV_Y)
 
     def take_pivot(self, point: np.ndarray) -> None:
-        """Turn and move about what lies as far away as a point. Nothing that is seen changes. Scene units, [3]"""
+        """Turn and move about a pivot as far away as a point. The picture does not change. Scene units, [3]"""
         if not np.isfinite(point).all():
             return
         self.stop()
@@ -352,8 +352,8 @@ class OrbitView:
             self.roll = 0.0
 
     def set_scene_up(self, up: Sequence[float] | None) -> None:
-        """Say what is up in the scene; None for what the cameras agree on. A view that stands as the scene does
-        follows."""
+        """Set the scene's up direction; None for the one that the cameras agree on. A view that stands as the scene
+        does follows."""
         known = None if self.scene_up is None else self.scene_up.tolist()
         if known == (None if up is None else list(up)):
             return
@@ -388,7 +388,7 @@ class OrbitView:
         return np.array([[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]])
 
     def _leave(self) -> None:
-        """Go on freely from where the camera stands that is looked through, as it is turned."""
+        """Continue freely from the pose of the camera that is looked through."""
         if self.look_through is not None and self.rig is not None:
             self._stay(camera_pose(self.rig, self.look_through, otherwise=self.distance))
             self.is_orthographic = False

@@ -26,7 +26,7 @@ def fitted_K(rig: CameraRig, camera: int, width: int, height: int) -> np.ndarray
 
 
 def camera_pose(rig: CameraRig, camera: int, *, otherwise: float) -> Pose:
-    """A camera as a pose about what lies ahead of it as far away as the scene.
+    """A camera as a pose about a pivot ahead of it, as far away as the scene.
 
     Args:
         otherwise: Distance of the pivot where the scene does not lie ahead, scene units.
@@ -35,7 +35,7 @@ def camera_pose(rig: CameraRig, camera: int, *, otherwise: float) -> Pose:
 
 
 def free_pose(rig: CameraRig | None, world_to_camera: np.ndarray, fov_y: float, *, otherwise: float) -> Pose:
-    """Any camera as a pose about what lies ahead of it as far away as the rig's focus. See `camera_pose`."""
+    """Any camera as a pose about a pivot ahead of it, as far away as the rig's focus. See `camera_pose`."""
     eye, rotation = camera_center(world_to_camera), world_to_camera[:3, :3]
     focus = eye if rig is None or not len(rig) else rig.focus_point()
     ahead = float((focus - eye) @ rotation[2])

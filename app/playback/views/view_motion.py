@@ -12,12 +12,12 @@ from engine.camera.rotations import matrices_of, quats_of, quats_of_turns, turns
 EASE_S = 0.2
 """Duration of a move."""
 LONGEST_STEP_S = 0.1
-"""A frame that took longer moves no farther than this: what one does not see helps nobody."""
+"""A frame that took longer moves no farther than this: unseen motion helps nobody."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """A camera by what it looks at.
+    """A camera described by its pivot.
 
     Attributes:
         rotation: Its right, down and forward directions as rows, orthonormal. [3, 3]

@@ -1,4 +1,4 @@
-"""ViewPlace: from where and through which lens one looks, as plain values that can be kept and gone back to."""
+"""ViewPlace: viewpoint and lens of a view, as plain values that can be kept and gone back to."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class ViewPlace:
 
     @classmethod
     def read(cls, values: dict[str, Any]) -> Self | None:
-        """A place from what `values` has made; None where that is not valid. What older versions did not know of
-        may be missing."""
+        """A place from the result of `values`; None where that is not valid. Entries newer than the file may be
+        missing."""
         pivot = values.get("pivot")
         place = _numbers([(value, -1e6, 1e6) for value in pivot] if isinstance(pivot, list | tuple) else [])
         angles = _numbers([(values.get(name, 0.0), *limits) for name, limits in _RANGES.items()])
@@ -68,7 +68,7 @@ class ViewPlace:
         )
 
     def values(self) -> dict[str, Any]:
-        """Everything as values that JSON knows."""
+        """Everything as values for JSON."""
         return {name: getattr(self, name) for name in self.__slots__} | {"pivot": list(self.pivot)}
 
     def show(self, view: OrbitView) -> None:

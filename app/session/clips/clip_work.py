@@ -83,11 +83,11 @@ class ClipWork(SessionPart):
         self.open(opened)
 
     def check_idle(self) -> None:
-        """See that no clip is written again, so that clips may be cut otherwise. Raises ProjectError."""
+        """Check that no clip is written again, so that clips may be cut otherwise. Raises ProjectError."""
         self._permanence.check_idle()
 
     def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
-        """See that no clip is written again where clips are cut otherwise. Raises ProjectError."""
+        """Check that no clip is written again where clips are cut otherwise. Raises ProjectError."""
         if is_other_cut(before.settings, after.settings):
             self.check_idle()
 

@@ -68,7 +68,7 @@ class Permanence:
         self._jobs.start("Rewriting clips", work, staged, self._failed)
 
     def check_idle(self) -> None:
-        """See that nothing is applied at the moment.
+        """Check that nothing is applied at the moment.
 
         Raises:
             ProjectError: Something is.

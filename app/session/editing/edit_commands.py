@@ -110,7 +110,7 @@ class SetLabel:
 
 @dataclass(frozen=True, slots=True)
 class SetUp:
-    """Say which direction of the scene is up; None for that which the cameras suggest."""
+    """Say which direction of the scene is up; None for the one that the cameras suggest."""
 
     direction: Vector | None
 

@@ -77,7 +77,7 @@ class ProjectMending(SessionPart):
         return self.page is not None and self.page.state == "running"
 
     def check_idle(self) -> None:
-        """See that nothing is mended, so that clips may be cut otherwise.
+        """Check that nothing is mended, so that clips may be cut otherwise.
 
         Raises:
             ProjectError: Something is.
@@ -86,7 +86,7 @@ class ProjectMending(SessionPart):
             raise ProjectError("Clips are being mended.", hint="Wait for it, or stop it first.")
 
     def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
-        """See that nothing is mended where clips are cut otherwise. Raises ProjectError."""
+        """Check that nothing is mended where clips are cut otherwise. Raises ProjectError."""
         if is_other_cut(before.settings, after.settings):
             self.check_idle()
 

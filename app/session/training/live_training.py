@@ -142,7 +142,7 @@ class LiveTraining(SessionPart):
         return self.service is not None and self.service.is_busy
 
     def check_not_training(self) -> None:
-        """See that nothing trains or waits to be trained, so that clips may be cut otherwise.
+        """Check that nothing trains or waits to be trained, so that clips may be cut otherwise.
 
         Raises:
             ProjectError: Something does.
@@ -154,7 +154,7 @@ class LiveTraining(SessionPart):
             )
 
     def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
-        """See that no clip is finished with settings that change. Raises ProjectError."""
+        """Check that no clip is finished with settings that change. Raises ProjectError."""
         if is_other_cut(before.settings, after.settings):
             self.check_not_training()
         if self._opened is not None:
