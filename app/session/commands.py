@@ -1,5 +1,5 @@
 """Commands: what a user can ask of a Session, as frozen dataclasses in the imperative. Plain data, no behaviour. They
-stand beside the part of the session that carries them out.
+are next to the part of the session that carries them out.
 
 Orbiting, hovering and panel widths are not commands; they change the view or a widget directly.
 """
@@ -33,7 +33,7 @@ class CancelJob:
 
 @dataclass(frozen=True, slots=True)
 class CloseQuestion:
-    """Do nothing of what was asked."""
+    """Withdraw the question; nothing is done."""
 
 
 @dataclass(frozen=True, slots=True)

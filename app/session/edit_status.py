@@ -1,4 +1,4 @@
-"""What the window shows of edits: values only."""
+"""Edits as the window shows them: values only."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class HistoryStatus:
     """Steps that can be undone and redone.
 
     Attributes:
-        undo, redo: What that would be, as a word or two; empty where there is nothing.
+        undo, redo: Name of the step, a word or two; empty without one.
         past: Names of the steps that led here, the oldest first.
         future: Names of the steps that were taken back, the one that would be done again next first.
     """
@@ -30,17 +30,17 @@ class HistoryStatus:
 
 @dataclass(frozen=True, slots=True)
 class EditsStatus:
-    """Edits of the open project, and what else the user has said of it.
+    """Edits of the open project, and the user's names, up direction and scale.
 
     Attributes:
         edits: The stack, bottom first.
         labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
         world: Up and scale.
-        lost: Which of them have lost what was picked, because a clip was trained anew.
+        lost: Those that have lost their picks because a clip was trained anew.
         clips: Which anchors each clip has; none while that is not known.
         reaches: Where each edit acts, by its number.
         can_edit: Whether anything can be changed now.
-        why_not: The reason if not, and what to do.
+        why_not: Cause and remedy if not.
     """
 
     edits: tuple[Edit, ...] = ()
@@ -75,7 +75,7 @@ class PathsStatus:
         chosen_key: Number of the key of that path that stands out; None without one.
         along: Index of the view that goes along the chosen path with the playhead; None while none does.
         can_edit: Whether paths can be changed now.
-        why_not: The reason if they cannot, and what to do.
+        why_not: Cause and remedy if they cannot.
     """
 
     paths: tuple[CameraPath, ...] = ()

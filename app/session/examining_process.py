@@ -1,4 +1,4 @@
-"""Examines a capture in a process of its own, so that the window keeps its interpreter to itself."""
+"""Examines a capture in a separate process, so that the window keeps its interpreter to itself."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from engine.children.process import run_child
 from engine.errors import CaptureError
 from engine.progress import Progress, ReportProgress
 
-if TYPE_CHECKING:  # loading what examines takes a second: that is left to the process
+if TYPE_CHECKING:  # loading the doctor takes a second: that is left to the process
     from engine.doctor.doctor import Diagnosis
 
 
@@ -40,9 +40,9 @@ def examine_apart(capture: Capture, report: ReportProgress) -> Diagnosis:
     """Have a process examine a capture, and wait for it.
 
     Args:
-        report: Called several times a second; what it raises ends the process.
+        report: Called several times a second; an exception of it ends the process.
     Raises:
-        EngineError: What the process raised, or that it died.
+        EngineError: The process raised it, or died.
     """
     seen = Progress("Capture doctor", 0.0, "starting")
 

@@ -1,4 +1,4 @@
-"""Commands about what leaves the project for other programs."""
+"""Commands that export for other programs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from app.export.export_choices import ExportChoices
 
 @dataclass(frozen=True, slots=True)
 class AskExport:
-    """Ask what of the open project is to be exported, and where."""
+    """Ask what to export from the open project, and where to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class StartExport:
 
 @dataclass(frozen=True, slots=True)
 class CancelExport:
-    """End an export; what it began to write disappears."""
+    """End an export; its unfinished files disappear."""
 
     export_id: int
 
@@ -43,19 +43,19 @@ class MoveExport:
 
 @dataclass(frozen=True, slots=True)
 class RemoveExport:
-    """Take an export that does not run out of the list; what it has written stays."""
+    """Take an export that does not run out of the list; its files stay."""
 
     export_id: int
 
 
 @dataclass(frozen=True, slots=True)
 class ClearExports:
-    """Take all exports that have ended out of the list; what they have written stays."""
+    """Take all exports that have ended out of the list; their files stay."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShowExport:
-    """Show what an export has written in the system's file manager."""
+    """Show the files of an export in the system's file manager."""
 
     export_id: int
 

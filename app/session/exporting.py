@@ -1,4 +1,4 @@
-"""Exporting: what is asked for in the export dialog, what would be written, and the queue of exports."""
+"""Exporting: the export dialog, the estimated export, and the queue of exports."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ExportPage:
-    """What the dialog shows.
+    """Contents of the dialog.
 
     Attributes:
         context: Of the open project, when the dialog was opened.
-        choices: What it begins with; the place is asked for with `Exporting.suggest`.
+        choices: At the beginning; the place is asked for with `Exporting.suggest`.
     """
 
     context: ExportContext
@@ -58,8 +58,8 @@ class _Wish(NamedTuple):
     """Of the workers; equal ones are looked at once.
 
     Attributes:
-        n_asked: Number of the page; whatever may have changed since the one before is looked at again.
-        taken: What exports that run or wait will write.
+        n_asked: Number of the page; a new page looks at everything again.
+        taken: Paths that running and waiting exports will write.
         folder: Of the export before; empty for none.
     """
 
@@ -75,11 +75,11 @@ class Exporting(SessionPart):
     """For one thread, which does not wait.
 
     Attributes:
-        page: What is asked; None while nothing is.
+        page: Shown now; None for none.
 
     Args:
-        notices: Told what failed.
-        settings: Keeps what was chosen last.
+        notices: Receive failures.
+        settings: Keep the last choices.
         launch: Starts an export; a process by default.
         show: Shows a file in the system's file manager; called on a thread.
         is_training: Whether cores are for a training now.
@@ -111,7 +111,7 @@ class Exporting(SessionPart):
 
     @property
     def statuses(self) -> tuple[ExportStatus, ...]:
-        """The queue: what runs, what waits, and what has ended of the open project."""
+        """The queue: exports that run or wait, and those of the open project that have ended."""
         return tuple(one for one in self._queue.statuses if not one.is_over or one.project == self._project)
 
     @property
@@ -125,7 +125,7 @@ class Exporting(SessionPart):
         return self._revision, self._queue.revision, self._planner.newest, self._namer.newest
 
     def open(self, opened: OpenedProject) -> None:
-        """Another project is open: what has ended of others is not listed. What runs continues."""
+        """Another project is open: ended exports of others are not listed. Running ones continue."""
         self._project = opened.project.folder.absolute()
         self._revision += 1
 
@@ -146,7 +146,7 @@ class Exporting(SessionPart):
             trained: Indices of the clips that are finished.
             paths: Names of the camera paths.
             settle: Waits until the camera paths are on the disk, where exports read them; called on a thread before
-                what would be written is looked at, and so before an export can begin.
+                the estimate, and so before an export can begin.
         Raises:
             ProjectError: Nothing is trained yet.
         """
@@ -164,7 +164,7 @@ class Exporting(SessionPart):
         self._revision += 1
 
     def suggest(self, choices: ExportChoices) -> str | None:
-        """A place for an export, beside the one before; None until one was looked for."""
+        """A place for an export, next to the last one; None until one was looked for."""
         last, wish = self._settings.last_export.out, self._wish(choices.changed(out=""))
         if wish is None:
             return None
@@ -224,7 +224,7 @@ class Exporting(SessionPart):
                 self.show(export_id)
 
     def start(self, choices: ExportChoices) -> None:
-        """Put an export into the queue, and remember what was chosen.
+        """Put an export into the queue, and keep the choices.
 
         Raises:
             ProjectError: Another export that runs or waits writes to the same place.
@@ -269,7 +269,7 @@ class Exporting(SessionPart):
         self._queue.retry(export_id)
 
     def show(self, export_id: int) -> None:
-        """Show what was written in the system's file manager, which is opened on a thread."""
+        """Show the written files in the system's file manager, which is opened on a thread."""
         status = next((one for one in self.statuses if one.export_id == export_id), None)
         if status is None or status.result is None:
             return
@@ -284,7 +284,7 @@ class Exporting(SessionPart):
         self._jobs.start("Show in folder", work, lambda _: None, fail)
 
     def poll(self) -> bool:
-        """Take in what was finished, and begin what is next. Whether anything changed."""
+        """Take in finished work, and begin the next. Whether anything changed."""
         has_news = self._jobs.poll()
         ended = self._queue.poll(n_threads=1 if self._is_training() else None)
         for status in ended:
@@ -293,7 +293,7 @@ class Exporting(SessionPart):
         return bool(ended) or has_news
 
     def close(self) -> None:
-        """End what runs; what it began to write disappears."""
+        """End the running export; its unfinished files disappear."""
         self._queue.close()
         self._jobs.close()
         self._planner.close(timeout_s=0.5)

@@ -18,7 +18,7 @@ STARTED = ("preparing", "training", "paused", "stopped", "trained")
 
 
 def after_marking(regions: Sequence[GateRegion], marks: Sequence[GateRegion]) -> tuple[GateRegion, ...]:
-    """The list with new marks, which overrule what was marked before."""
+    """The list with new marks, which overrule earlier ones."""
     return (*regions, *marks)
 
 

@@ -1,4 +1,4 @@
-"""Notices: what the user has to know, until it is dismissed. Draws nothing."""
+"""Notices: messages to the user, until they are dismissed. Draws nothing."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ MAX_NOTICES = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Notice:
-    """One message. Compared by identity: the same text may be told twice.
+    """One message. Compared by identity: the same text may come twice.
 
     Attributes:
         kind: "info", "warn" or "error".
         title: One short sentence.
         detail: Cause with numbers; may be empty.
-        hint: What the user can do; may be empty.
+        hint: The remedy; may be empty.
     """
 
     kind: str

@@ -1,7 +1,7 @@
 """SessionPart: one of the things that a session is composed of. SessionParts: all of them, in the order in which they
 were added.
 
-Whoever adds a part says so once: opening, settings, polling and closing reach it from then on.
+A part is added once: opening, settings, polling and closing reach it from then on.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from app.project.opening.opened_project import OpenedProject
 
 
 class SessionPart:
-    """Overrides what concerns it. For one thread, and nothing here waits."""
+    """Overrides the methods that concern it. For one thread, and nothing here waits."""
 
     def open(self, opened: OpenedProject) -> None:
         """Another project is open."""
@@ -29,13 +29,13 @@ class SessionPart:
         """See whether one document may take the place of another. Raises ProjectError."""
 
     def follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
-        """The document has changed: show what follows from it."""
+        """The document has changed: show the consequences."""
 
     def close_page(self) -> None:
         """Ask no more."""
 
     def poll(self) -> bool:
-        """Take in what was finished. Whether anything visible changed."""
+        """Take in finished work. Whether anything visible changed."""
         return False
 
     @property
@@ -44,7 +44,7 @@ class SessionPart:
         return None
 
     def take_failures(self) -> Iterable[tuple[str, Exception]]:
-        """What has failed since the last call: a title for the user, and why."""
+        """Failures since the last call: a title for the user, and the error."""
         return ()
 
     def close(self) -> None:
@@ -61,7 +61,7 @@ class SessionParts(SessionPart):
         self._parts: list[SessionPart] = []
 
     def add(self, part: PartT) -> PartT:
-        """Tell this one, too; after those that were added before."""
+        """Add a part; its turn comes after those added before."""
         self._parts.append(part)
         return part
 
@@ -90,7 +90,7 @@ class SessionParts(SessionPart):
             part.close_page()
 
     def poll(self) -> bool:
-        return any([part.poll() for part in self._parts])  # each of them, whatever the others say
+        return any([part.poll() for part in self._parts])  # each of them, regardless of the others
 
     @property
     def finished(self) -> object:

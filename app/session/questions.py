@@ -22,16 +22,16 @@ class RetrainQuestion:
     Attributes:
         clip_index: The clip.
         is_damaged: Its file cannot be read, and is replaced for good.
-        reason: What is wrong with it; empty for a good one.
-        held_out_psnr, held_out_whole: Of the finished clip, dB, and what it is over, see ClipRecord; None where not
-            measured or damaged.
+        reason: The damage; empty for a good one.
+        held_out_psnr, held_out_whole: Of the finished clip, dB, and its basis, see ClipRecord; None where
+            not measured or damaged.
         outdated: Clips that are good now and will be out of date with another result of this one.
-        seconds: What training it again is expected to take: as long as the last time, or as clips took on average;
-            None where nothing was recorded.
+        seconds: Expected for training it again: those of the last time, or the average of the clips; None where nothing
+            was recorded.
         is_average: Whether that is an average.
         outdated_seconds: Likewise for training all of `outdated` again.
         resume_step: The step of an earlier try that it continues from; None when it starts from the beginning.
-        settings: Of its own, with which it is to be trained; see commands.TrainClip.
+        settings: For this clip alone; see commands.TrainClip.
     """
 
     clip_index: int
@@ -72,7 +72,7 @@ class LeaveQuestion:
 
     Attributes:
         name: Of the other project.
-        clip_index: What trains.
+        clip_index: The clip that trains.
         step, n_steps: How far it is; zeros before its first step.
         n_waiting: Clips that wait.
     """
@@ -90,7 +90,7 @@ class StartOverQuestion:
 
     Attributes:
         project: Its folder.
-        discards: What goes, as "2 trained clips (4:10 of training), 3.1 MB"; empty for nothing.
+        discards: In words, as "2 trained clips (4:10 of training), 3.1 MB"; empty for nothing.
         presets: Names to choose from.
         preset: The one that the settings begin with now.
         is_working: It is being done.
@@ -105,12 +105,12 @@ class StartOverQuestion:
 
 @dataclass(frozen=True, slots=True)
 class SettingsQuestion:
-    """With which settings of its own is a clip to be trained?
+    """Which settings is a clip to be trained with, instead of the project's?
 
     Attributes:
         clip_index: The clip.
         settings: Those that may be others in this clip, as they are now.
-        retrain: What has to be known before a finished clip is trained again; None where it is not finished.
+        retrain: The question before a finished clip is trained again; None where it is not finished.
         has_progress: Whether progress from before a stop is given up by it.
     """
 
@@ -125,9 +125,9 @@ class OwnSetting:
     """A setting as it is offered for one clip.
 
     Attributes:
-        value: What it is, or is derived to be.
-        choices: What it may be, where these are words.
-        help_text: What it does and what it may be.
+        value: Set or derived.
+        choices: Allowed values, where these are words.
+        help_text: Effect and allowed values.
     """
 
     name: str
@@ -143,10 +143,10 @@ class CorrectionQuestion:
 
     Attributes:
         capture: Folder of the capture, which gets a capture.json.
-        words: What is corrected, as "Exclude cam07".
+        words: The corrections, as "Exclude cam07".
         corrections: The same for the file.
         project: Folder of the project that is open.
-        has_progress: Whether something was learned in it.
+        has_progress: Whether the project has progress.
     """
 
     capture: str
@@ -158,11 +158,11 @@ class CorrectionQuestion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpeningPage:
-    """A capture without a project, and what the user is asked about it.
+    """A capture without a project, and the questions about it.
 
     Attributes:
-        report: What it is.
-        answers: What is offered.
+        report: On the capture.
+        answers: Offered ones.
         is_new_project: Whether there are projects of it already, and another one was asked for.
         follow_links: Whether its files may lie outside of its folder.
         folder: Where the project would be made.
@@ -188,7 +188,7 @@ Question = (
 
 
 def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:
-    """What somebody has to know who trains a finished or damaged clip again."""
+    """The question before a finished or damaged clip is trained again."""
     record, outdated = catalog[clip_index], catalog.outdated_by(clip_index)
     known = [seconds for index in range(len(catalog)) if (seconds := catalog[index].seconds) is not None]
     average = sum(known) / len(known) if known else None
@@ -221,11 +221,11 @@ class Asked:
         self.question: Question | None = None
 
     def put(self, question: Question | None) -> None:
-        """Ask this and nothing else; None withdraws what is asked."""
+        """Ask this and nothing else; None withdraws the question."""
         self.question = question
 
     def put_if_free(self, question: Question) -> None:
-        """Ask something that came up by itself: what is asked already comes first."""
+        """Ask something that no command asked for: a question that is up already comes first."""
         if self.question is None:
             self.question = question
 

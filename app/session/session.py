@@ -2,7 +2,7 @@
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
 It is composed of parts (see part.py), each of which carries out its own commands: a part is made and added here, once,
-and its commands have a line in `_obey`. What is open is one immutable value that each part is handed.
+and its commands have a line in `_obey`. The open project is one immutable value that each part is handed.
 """
 
 from __future__ import annotations
@@ -78,28 +78,28 @@ class Session(SessionFace):
         training, queue, clip_states, plan, regions, paths, edits, selection, history, usage, project_status: Status
             values, remade by `poll` and `dispatch`. The plan is that of the next clip; None while something trains or
             nothing is left to train.
-        projects: What is open, and what was opened lately.
-        showing: What the user looks at, and what prepares it.
-        live_training, versions: The training, and what clips were before they were trained again.
-        document: What is edited, and the way back.
-        log: What program and training have said.
-        opening: What is asked about a capture that has no project yet.
+        projects: The open project, and those opened lately.
+        showing: The shown picture, and everything that prepares it.
+        live_training, versions: The training, and earlier versions of clips.
+        document: The edited document, and the way back.
+        log: Lines of program and training.
+        opening: The questions about a capture that has no project yet.
         calibrating: Plain videos on their way to a capture.
         synchronising: How far the cameras of the open capture are ahead of each other.
         mending: A seam, or a stretch with flicker, that is mended.
-        exporting: What leaves the project for other programs: what is asked, and the queue.
-        doctor: What is wrong with the open capture, and what helps.
-        command_texts: What was done, or could be, as commands to copy.
-        notices: What the user has to know.
+        exporting: The export dialog, and the queue of exports.
+        doctor: Faults of the open capture, and remedies.
+        command_texts: Steps, done or possible, as commands to copy.
+        notices: Messages to the user.
 
     Args:
         project_dir: Folder for the project of the next capture; one in the folder of projects when None.
         launch: Starts a training worker; a process by default.
         settings: Preferences; the user's own when None.
         opener: Opens captures; tests bring their own.
-        is_preloading: Build a first cloud of a new capture, and load what draws right away. Loading takes a second or
-            two and holds the window up a little, which nobody notices at the start but everybody would in the middle
-            of a drag. Off in most tests.
+        is_preloading: Build a first cloud of a new capture, and load the drawing code at once. Loading takes a second
+            or two and holds the window up a little, unnoticed at the start but not in the middle of a drag. Off in
+            most tests.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class Session(SessionFace):
         self._jobs = jobs = Jobs(self._fail)
         settings = Settings() if settings is None else settings
 
-        # Parts are opened, polled and closed in this order: what was edited is kept first, and a part comes after those
+        # Parts are opened, polled and closed in this order: edits are kept first, and a part comes after those
         # that it reads.
         self._parts = parts = SessionParts()
         self.document = parts.add(KeptDocument(guard=parts.check_change, on_change=parts.follow_change))
@@ -136,7 +136,7 @@ class Session(SessionFace):
         )
         self.showing = showing = Showing(live, jobs, is_training=self._is_training, is_preloading=is_preloading)
         self.opening = CaptureOpening(can_measure=is_preloading)
-        self.projects = parts.add(  # before what it shows: with other settings, that is made anew
+        self.projects = parts.add(  # before the parts that it shows: other settings make them anew
             Projects(
                 parts,
                 jobs,
@@ -183,7 +183,7 @@ class Session(SessionFace):
     # ---------------------------------------------------------------- commands
 
     def dispatch(self, command: Command) -> None:
-        """Carry out a command. What the user could have known better becomes a notice.
+        """Carry out a command. One that is refused becomes a notice.
 
         Raises:
             TypeError: The object is not a command.
@@ -262,7 +262,7 @@ class Session(SessionFace):
     # ---------------------------------------------------------------- letting finished work in
 
     def poll(self) -> bool:
-        """Take in what threads and workers finished. Whether something visible changed."""
+        """Take in finished work of threads and workers. Whether something visible changed."""
         has_changed = self._jobs.poll()
         has_changed |= self._parts.poll()
         has_changed |= self.lead_view()
@@ -281,7 +281,7 @@ class Session(SessionFace):
         return self.live_training.is_busy and self.training.state != "paused"
 
     def _news_key(self) -> tuple[object, ...]:
-        """Differs whenever a thread has finished something, or there is something else to tell."""
+        """Differs whenever a thread has finished something, or there is other news."""
         jobs = tuple((job.name, job.done, job.message) for job in self.jobs)
         log = None if self.log.worker.newest is None else self.log.worker.newest[0]
         return self._parts.finished, log, jobs, self.notices.revision

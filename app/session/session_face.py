@@ -1,4 +1,4 @@
-"""SessionFace: what a session shows, and changes nothing by: what is open, files of its clips, pictures and arrays."""
+"""SessionFace: the reading half of a session: the open project, files of its clips, pictures and arrays."""
 
 from __future__ import annotations
 
@@ -69,11 +69,11 @@ class SessionFace:
     asked: Asked
     _jobs: Jobs
 
-    # ---------------------------------------------------------------- what is open
+    # ---------------------------------------------------------------- the open project
 
     @property
     def opened(self) -> OpenedProject | None:
-        """What is open; None before."""
+        """The open project; None before."""
         return self.projects.opened
 
     @property
@@ -108,15 +108,15 @@ class SessionFace:
 
     @property
     def recent(self) -> RecentProjects:
-        """What was opened lately."""
+        """Projects opened lately."""
         return self.projects.recent
 
     @property
     def question(self) -> Question | None:
-        """What the user has to answer; None while there is nothing to ask."""
+        """The question to the user; None while there is none."""
         return self.asked.question
 
-    # ---------------------------------------------------------------- what is looked at
+    # ---------------------------------------------------------------- the shown picture
 
     @property
     def timeline(self) -> Timeline:
@@ -140,22 +140,22 @@ class SessionFace:
 
     @property
     def overlays(self) -> Overlays:
-        """What the current view shows."""
+        """Overlays of the current view."""
         return self.showing.overlays
 
     @property
     def playback(self) -> Playback:
-        """Prepares what is shown."""
+        """Prepares the shown pictures."""
         return self.showing.playback
 
     @property
     def residuals(self) -> Residuals:
-        """Compares with what the cameras took."""
+        """Compares with the captured pictures."""
         return self.showing.residuals
 
     @property
     def exclusions(self) -> Exclusions:
-        """What of the open capture training never sees."""
+        """Parts of the open capture that training never sees."""
         content = self.document.content
         return NOTHING_EXCLUDED if content is None else content.exclusions
 
@@ -166,7 +166,7 @@ class SessionFace:
 
     @property
     def doctor_status(self) -> DoctorStatus:
-        """What the capture doctor found, or how far it is."""
+        """Findings of the capture doctor, or how far it is."""
         return self.doctor.status
 
     @property
@@ -182,15 +182,15 @@ class SessionFace:
         return None if curves is None else (curves.loss, curves.psnr)
 
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
-        """What a clip was before it was trained again, newest first; none until that was read."""
+        """Earlier versions of a clip, newest first; none until they were read."""
         return self.versions.statuses(clip_index)
 
     def clip_dependencies(self, clip_index: int) -> DependencyStatus:
-        """What a clip depends on, and what depends on it."""
+        """The clips that a clip depends on, and those that depend on it."""
         return self.clip_work.dependencies(clip_index)
 
     def disk_use(self) -> DiskUse | None:
-        """What the project takes on the disk; None until that was looked up."""
+        """The project's use of the disk; None until that was looked up."""
         return self.clip_work.disk_use()
 
     def version_state(self, clip_index: int, version: int) -> ShownState | None:
@@ -198,7 +198,7 @@ class SessionFace:
         return self.versions.state(clip_index, version)
 
     def log_lines(self) -> Sequence[LogLine]:
-        """What the program said, and the training of the clip that trains or is looked at; in the order of time."""
+        """Lines of the program, and of the training of the clip that trains or is looked at; in the order of time."""
         clip, project = self.timeline.clip, self.project
         trains = self.training.state not in ("idle", "failed")
         clip_index = self.training.clip_index if trains or clip is None else clip.clip_index
@@ -209,7 +209,7 @@ class SessionFace:
     # ---------------------------------------------------------------- pictures and arrays
 
     def wanted_frame(self) -> WantedFrame | None:
-        """What ought to be on screen; None without a capture. What is there says itself what it is."""
+        """The frame that ought to be on screen; None without a capture. The shown one states its source."""
         return self.playback.wanted(self.timeline, self.view, self.showing.shown_as, view_id=self.views.current_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
@@ -236,11 +236,11 @@ class SessionFace:
         return None if shown is None else shown.anchors
 
     def shown_coverage(self) -> CoveredSpace | None:
-        """What inherited anchors cover; see Playback.coverage."""
+        """The space covered by inherited anchors; see Playback.coverage."""
         return self.playback.coverage(self.timeline)
 
     def shown_trails(self) -> Trails | None:
-        """The ways of what moves; see Playback.trails."""
+        """The ways of moving Gaussians; see Playback.trails."""
         return self.playback.trails(self.timeline)
 
     def shown_points(self) -> PointArrays | None:
@@ -295,7 +295,7 @@ class SessionFace:
         return self.playback.captured_picture(camera_index, frame_index, max_width)
 
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
-        """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
+        """A camera's picture at the playhead, to compare with the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
 
     def anchor_heat(self, column: str) -> AnchorHeat | None:

@@ -1,5 +1,5 @@
-"""SessionView: all that a window reads of a session; `Session` has it, and tests bring a made-up one. What a member
-means stands where it is made: at `Session`, `SessionFace` and the types of the values.
+"""SessionView: all that a window reads of a session; `Session` has it, and tests bring a made-up one. Members are
+documented where they are made: at `Session`, `SessionFace` and the types of the values.
 """
 
 from __future__ import annotations
@@ -136,9 +136,9 @@ class RecentView(Protocol):
 
 
 class SessionView(Protocol):
-    """The project that is open, what is shown of it, what runs, and what is asked."""
+    """The open project, its display, running work, and questions."""
 
-    # ---- what is open
+    # ---- the open project
     @property
     def capture(self) -> CaptureFacts | None: ...
     @property
@@ -158,7 +158,7 @@ class SessionView(Protocol):
     @property
     def doctor_status(self) -> DoctorStatus: ...
 
-    # ---- what is looked at; the window changes these directly
+    # ---- the shown picture; the window changes these directly
     @property
     def timeline(self) -> Timeline: ...
     @property
@@ -170,7 +170,7 @@ class SessionView(Protocol):
     @property
     def bookmarks(self) -> Bookmarks: ...
 
-    # ---- what was edited
+    # ---- edits
     @property
     def regions(self) -> RegionsStatus: ...
     @property
@@ -184,7 +184,7 @@ class SessionView(Protocol):
     @property
     def command_texts(self) -> CommandTexts: ...
 
-    # ---- what runs
+    # ---- running work
     @property
     def training(self) -> TrainingStatus: ...
     @property
@@ -202,7 +202,7 @@ class SessionView(Protocol):
     @property
     def loading(self) -> tuple[int, int] | None: ...
 
-    # ---- what is asked and told
+    # ---- questions and notices
     @property
     def question(self) -> Question | None: ...
     @property
@@ -249,7 +249,7 @@ class SessionView(Protocol):
 
 
 class WindowSession(SessionView, Protocol):
-    """A session, and what moves it: for the window's loop. Panels see a SessionView, and send commands."""
+    """A session, and the calls that drive it: for the window's loop. Panels see a SessionView, and send commands."""
 
     def dispatch(self, command: Command) -> None: ...
     def poll(self) -> bool: ...

@@ -1,1 +1,1 @@
-"""What happens to a capture before training: opening, calibration, synchronisation, the doctor."""
+"""Steps before training a capture: opening, calibration, synchronisation, the doctor."""

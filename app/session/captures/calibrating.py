@@ -1,4 +1,4 @@
-"""Calibrating: a folder of plain videos on its way to a capture: what is in it, the job that runs, what came of it."""
+"""Calibrating: a folder of plain videos on its way to a capture: its contents, the running job, the result."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Calibrating(SessionPart):
     """For one thread, which does not wait. Only the newest page is worked on.
 
     Attributes:
-        page: What is shown; None while nothing is.
+        page: Shown now; None for none.
         revision: Goes up when the page is another.
     """
 
@@ -39,9 +39,7 @@ class Calibrating(SessionPart):
         self.revision = 0
         self._jobs = Jobs()
         self._job: BackgroundJob | None = None
-        self._failed: tuple[CalibrationRequest, Calibration] | None = (
-            None  # what came of it last, if nothing was written
-        )
+        self._failed: tuple[CalibrationRequest, Calibration] | None = None  # the last result, if nothing was written
 
     @property
     def progress(self) -> JobStatus | None:
@@ -111,14 +109,14 @@ class Calibrating(SessionPart):
             self._show(replace(self.page, state="asking"))
 
     def close_page(self) -> None:
-        """End what runs, and show nothing."""
+        """End the running job, and show nothing."""
         if self.page is not None:
             self._cancel()
             self._failed = None
             self._show(None)
 
     def poll(self) -> bool:
-        """Take in what was finished. Whether anything was."""
+        """Take in finished work. Whether there was any."""
         return self._jobs.poll()
 
     @property

@@ -1,4 +1,4 @@
-"""CalibrationPage: what the window shows of a folder of plain videos that is to be calibrated. Values only."""
+"""CalibrationPage: a folder of plain videos to calibrate, as the window shows it. Values only."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class CalibrationResult:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationPage:
-    """What the dialog shows.
+    """Contents of the dialog.
 
     Attributes:
         folder: Of the videos.
@@ -54,7 +54,7 @@ class CalibrationPage:
         cameras: In natural order; none before it was looked at.
         has_capture_json: Whether the folder has one already, which would be replaced.
         failure: Why it cannot be calibrated, or why it was not; None where nothing failed.
-        result: What came of it; None before.
+        result: None before the end.
     """
 
     folder: Path

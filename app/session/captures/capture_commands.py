@@ -16,7 +16,7 @@ class ExamineCapture:
 
 @dataclass(frozen=True, slots=True)
 class StopExamining:
-    """Let it stop."""
+    """Stop the examination."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class CorrectCapture:
     """Write corrections into the capture's capture.json and open it as a new project.
 
     Attributes:
-        corrections: What to change.
+        corrections: For capture.json.
         words: The same for the question that is asked before, as "Exclude cam07".
         is_confirmed: It was asked and answered.
     """

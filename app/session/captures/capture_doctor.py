@@ -1,6 +1,6 @@
-"""CaptureDoctor: has the open capture examined in a process, keeps what was found, and writes corrections.
+"""CaptureDoctor: has the open capture examined in a process, keeps the findings, and writes corrections.
 
-The process opens the capture once more, so that what the window decodes while somebody scrubs is not in its way.
+The process opens the capture once more, so that it does not compete with the window's decoding while somebody scrubs.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from engine.capture.writers.capture_json import Corrections, write_corrections
 from engine.doctor.finding import Finding
 from engine.progress import ReportProgress
 
-if TYPE_CHECKING:  # loading what examines takes a second: that is left to the thread
+if TYPE_CHECKING:  # loading the doctor takes a second: that is left to the thread
     from engine.doctor.doctor import Diagnosis
 
 NAME = "Capture doctor"
@@ -82,7 +82,7 @@ class CaptureDoctor(SessionPart):
         self._quick.request(self._n_opened)
 
     def _look_quickly(self, n_opened: int) -> tuple[tuple[Finding, ...], int]:
-        """What numbers alone tell, and how much memory examining takes."""
+        """Findings in the numbers alone, and the memory that examining takes."""
         from engine.doctor.memory import memory_bytes
         from engine.doctor.quick import quick_findings
 
@@ -95,7 +95,7 @@ class CaptureDoctor(SessionPart):
         self._quick.close()
 
     def obey(self, command: DoctorCommand) -> CorrectionQuestion | None:
-        """Carry out a command. Returns what has to be answered first, if anything."""
+        """Carry out a command. Returns the question to answer first, if any."""
         match command:
             case ExamineCapture():
                 self.examine()
@@ -132,13 +132,13 @@ class CaptureDoctor(SessionPart):
         job = self._job = self._jobs.start(NAME, work, done, failed)
 
     def stop(self) -> None:
-        """Give up what runs; what was known before stays."""
+        """Give up the running examination; earlier findings stay."""
         if self._job is not None:
             self._job.context.cancel()
             self._job = None
 
     def question(self, corrections: Corrections, words: str) -> CorrectionQuestion | None:
-        """What has to be known before corrections are written; None where nothing is open."""
+        """The question before corrections are written; None where nothing is open."""
         if self._opened is None:
             return None
         project = self._opened.project

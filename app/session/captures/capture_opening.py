@@ -1,4 +1,4 @@
-"""CaptureOpening: what the window shows of a folder before a project is made of it: report, pictures, forecast."""
+"""CaptureOpening: a folder before a project is made of it, as the window shows it: report, pictures, forecast."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ AGAIN_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class _Forecast:
-    """What a forecast depends on."""
+    """Everything that a forecast depends on."""
 
     page: int
     answers: OpeningAnswers
@@ -44,10 +44,10 @@ class CaptureOpening(SessionPart):
     """For one thread, which does not wait.
 
     Attributes:
-        page: What is asked; None while nothing is.
+        page: The questions; None while there are none.
         refused: The folder that does not open, and why; None while there is none.
         pictures: Small ones of first frames, by camera.
-        findings: What the capture doctor sees in the numbers alone, the worst first; None until that is known.
+        findings: Of the capture doctor, in the numbers alone, the worst first; None until known.
         revision: Goes up when any of these is another.
 
     Args:
@@ -68,7 +68,7 @@ class CaptureOpening(SessionPart):
         self._worker.active_lane = QUICK
         self._last: OpeningForecast | None = None
 
-    # ---- what is asked
+    # ---- the page
 
     def ask(self, capture: Capture, last: LastAnswers, *, is_new_project: bool, folder: Path = Path()) -> None:
         """Show a capture. It belongs to this object until it is taken or the page is closed.
@@ -96,7 +96,7 @@ class CaptureOpening(SessionPart):
                     context.report(camera / len(small.rig))
                     image = downsized(small.frame(camera, 0), PICTURE_WIDTH_PX)
                     pictures[camera] = Picture(image, ("opening", page, camera))
-            except EngineError as error:  # said again when it is trained; the report stands without pictures
+            except EngineError as error:  # training reports it again; the page needs no pictures
                 raise JobCancelled from error
             finally:
                 small.close()
@@ -133,9 +133,9 @@ class CaptureOpening(SessionPart):
     # ---- the forecast
 
     def forecast(self, answers: OpeningAnswers) -> tuple[OpeningForecast | None, bool]:
-        """What training with these answers takes, and whether that is all that will be known. Asks for it if needed.
+        """The time and memory that training with these answers takes, and whether it is final. Requests it if needed.
 
-        Until it is there: that of the answers before, or None.
+        Until then: the forecast of earlier answers, or None.
         """
         if self._capture is None:
             return self._last, False
@@ -156,7 +156,7 @@ class CaptureOpening(SessionPart):
         return self._last, is_final
 
     def problem(self, answers: OpeningAnswers) -> str:
-        """What keeps these answers from making a project; empty where nothing does."""
+        """The reason why these answers cannot make a project; empty where they can."""
         if self.page is None:
             return ""
         n_cameras = len(self.page.report.cameras)
@@ -167,7 +167,7 @@ class CaptureOpening(SessionPart):
         return ""
 
     def poll(self) -> bool:
-        """Take in what was finished. Whether anything was."""
+        """Take in finished work. Whether there was any."""
         return self._jobs.poll()
 
     @property

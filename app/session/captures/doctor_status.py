@@ -1,4 +1,4 @@
-"""What the window shows of the capture doctor: a plain value, remade when something changes."""
+"""The capture doctor as the window shows it: a plain value, remade when something changes."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 from app.status import JobStatus
 from engine.doctor.finding import Finding
 
-if TYPE_CHECKING:  # loading what examines takes a second: that is left to the thread
+if TYPE_CHECKING:  # loading the doctor takes a second: that is left to the thread
     from engine.doctor.doctor import Diagnosis
 
 
 @dataclass(frozen=True, eq=False)
 class DoctorStatus:
-    """What the window shows of it.
+    """State and findings of the doctor.
 
     Attributes:
         state: "idle", "running" or "done".
-        findings: What is known so far: of numbers alone before a capture was examined.
-        diagnosis: What was found; None before.
+        findings: So far; from the numbers alone before a capture was examined.
+        diagnosis: None before the end.
         progress: Of the job that runs; None while none does.
         revision: Another one whenever findings are others.
-        memory_bytes: What examining takes; 0 until that is known.
+        memory_bytes: That examining takes; 0 until known.
     """
 
     state: str = "idle"

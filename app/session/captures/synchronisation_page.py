@@ -1,4 +1,4 @@
-"""SynchronisationPage: what the window shows of how far cameras are ahead of each other. Values only."""
+"""SynchronisationPage: how far cameras are ahead of each other, as the window shows it. Values only."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class OffsetRow:
         offset_frames: Its own frame = common frame + this; None where nothing is known.
         sigma_frames: How uncertain that is.
         confidence: 0 to 1: how likely it is right to half a frame.
-        source: By what it was found; empty where nothing is known.
+        source: Of the measurement; empty where nothing is known.
         is_sure: Whether it is certain enough to be applied without a further look.
     """
 
@@ -30,14 +30,14 @@ class OffsetRow:
 
 @dataclass(frozen=True, slots=True)
 class SynchronisationPage:
-    """What the dialog shows.
+    """Contents of the dialog.
 
     Attributes:
         capture: Its folder.
         state: "running", "done", or "written".
         rows: In the order of the rig; none before it was measured.
-        notes: How each source was measured, or why it says nothing.
-        disagreements: Where sources say different things.
+        notes: How each source was measured, or why it gives no result.
+        disagreements: Where sources differ.
         is_in_step: Whether no camera needs a shift, as far as is known.
         fps: Frames per second.
         failure: Why it could not be measured or written; empty where it could.

@@ -27,7 +27,7 @@ class Synchronising(SessionPart):
     """For one thread, which does not wait.
 
     Attributes:
-        page: What is shown; None while nothing is.
+        page: Shown now; None for none.
         revision: Goes up when the page is another.
     """
 
@@ -78,7 +78,7 @@ class Synchronising(SessionPart):
         self.close_page()
         capture = self._capture = opened.capture.resized(opened.capture.scale)
         target = capture.path
-        if opened.project.has_progress:  # what was trained belongs to the capture as it is
+        if opened.project.has_progress:  # the progress belongs to the capture as it is
             target = target.with_name(f"{target.name}-synchronised")
         self._show(SynchronisationPage(capture.path, fps=capture.fps, target=target))
 
@@ -113,7 +113,7 @@ class Synchronising(SessionPart):
         self._start(work, take)
 
     def close_page(self) -> None:
-        """End what runs, and show nothing."""
+        """End the running job, and show nothing."""
         if self.page is None:
             return
         if self._job is not None:
@@ -124,7 +124,7 @@ class Synchronising(SessionPart):
         self._show(None)
 
     def poll(self) -> bool:
-        """Take in what was finished. Whether anything was."""
+        """Take in finished work. Whether there was any."""
         return self._jobs.poll()
 
     @property

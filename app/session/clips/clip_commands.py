@@ -1,4 +1,4 @@
-"""Commands about clips: where they are cut, what they inherit from, what is out of date, and room on the disk."""
+"""Commands about clips: cuts, reference clip, damage, and room on the disk."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class CompareVersion:
-    """Put an earlier version of a clip beside what it is now, at the same frame and from the same view. The playhead
+    """Show an earlier version of a clip next to the present one, at the same frame and from the same view. The playhead
     goes into the clip where it is not in it. version: None ends that."""
 
     clip_index: int
@@ -16,7 +16,7 @@ class CompareVersion:
 
 @dataclass(frozen=True, slots=True)
 class SplitClip:
-    """Let a clip begin at this frame. What is trained of the clip that held it is out of use; asks first."""
+    """Let a clip begin at this frame. The trained clip that held it is out of use; asks first."""
 
     frame_index: int
     is_confirmed: bool = False
@@ -24,7 +24,7 @@ class SplitClip:
 
 @dataclass(frozen=True, slots=True)
 class MergeClips:
-    """Make a clip and the one after it one clip. What is trained of both is out of use; asks first."""
+    """Make a clip and the one after it one clip. Both are out of use if trained; asks first."""
 
     clip_index: int
     is_confirmed: bool = False
@@ -56,14 +56,14 @@ class FreeSpace:
 
 @dataclass(frozen=True, slots=True)
 class AskAboutDamage:
-    """Ask what is to become of a damaged clip."""
+    """Ask how to continue with a damaged clip."""
 
     clip_index: int
 
 
 @dataclass(frozen=True, slots=True)
 class ApplyDeletions:
-    """Write clips again without what the edits delete everywhere; the clips of before become versions. Asks first."""
+    """Write clips again without everything that edits delete everywhere; the old clips become versions. Asks first."""
 
     is_confirmed: bool = False
 

@@ -12,11 +12,11 @@ class CutQuestion:
     """Are clips to be cut otherwise, or another one made the reference, although something was trained?
 
     Attributes:
-        command: What was asked for.
+        command: That cuts or changes the reference.
         words: The same, as "Split clip 3 at frame 35".
         n_unused: Trained clips that are out of use then; their files stay, and are there again after undo.
         outdated: Trained clips that are out of date then.
-        seconds: What training all of it again is expected to take; None where nobody can know.
+        seconds: Expected for training all of it again; None where unknown.
     """
 
     command: CutCommand
@@ -32,9 +32,9 @@ class RoomQuestion:
 
     Attributes:
         what, clip_index: See clip_commands.FreeSpace.
-        words: What it is, in the middle of a sentence.
+        words: For these files, in the middle of a sentence.
         n_clips: How many versions or clips that is.
-        n_bytes: What it frees.
+        n_bytes: That it frees.
     """
 
     what: str
@@ -49,12 +49,12 @@ class DamagedQuestion:
     """How to continue with a clip whose file is damaged?
 
     Attributes:
-        reason: What is wrong with it.
+        reason: The damage.
         version: The version that could come back; None without one.
         version_text: When that was trained, and how good it is; empty without one.
         why_no_version: Why none can come back; empty where one can.
         outdated: Trained clips that are out of date without the damaged one, whatever is done.
-        seconds: What training it again is expected to take; None where nobody can know.
+        seconds: Expected for training it again; None where unknown.
     """
 
     clip_index: int

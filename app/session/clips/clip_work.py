@@ -1,4 +1,4 @@
-"""ClipWork: what is done about the clips of the open project beside training them, and what has to be asked before."""
+"""ClipWork: everything but training that is done to the clips of the open project, and the questions before it."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class ClipWork(SessionPart):
     # ---------------------------------------------------------------- commands
 
     def obey(self, command: ClipCommand) -> ClipQuestion | None:
-        """Carry out a command. Returns what has to be answered first, if that is known at once.
+        """Carry out a command. Returns the question to answer first, if that is known at once.
 
         Raises:
             ProjectError: It cannot be done; says why.
@@ -131,7 +131,7 @@ class ClipWork(SessionPart):
     # ---------------------------------------------------------------- room on the disk
 
     def disk_use(self) -> DiskUse | None:
-        """What the project takes on the disk; None until that was looked up."""
+        """The project's use of the disk; None until that was looked up."""
         opened, service = self._opened, self._live.service
         if opened is None or service is None:
             return None
@@ -236,7 +236,7 @@ class ClipWork(SessionPart):
     # ---------------------------------------------------------------- dependencies
 
     def dependencies(self, clip_index: int) -> DependencyStatus:
-        """What a clip depends on and what depends on it."""
+        """The clips that a clip depends on, and those that depend on it."""
         opened, service = self._opened, self._live.service
         if opened is None or service is None or not 0 <= clip_index < len(opened.clips):
             return DependencyStatus()
@@ -314,7 +314,7 @@ def cut_words(command: CutCommand, clips: Sequence[Clip]) -> str:
 def cut_question(
     command: CutCommand, catalog: ClipCatalog, before: Sequence[Clip], after: Sequence[Clip], opened: OpenedProject
 ) -> CutQuestion:
-    """What somebody has to know who cuts clips otherwise.
+    """The question before clips are cut otherwise.
 
     Args:
         before, after: The clips.
@@ -340,7 +340,7 @@ def cut_question(
 
 
 def recoverable(project: Project, clip_index: int) -> tuple[int | None, str, str]:
-    """The version with which a damaged clip could be replaced: its number, what it is, and why there is none."""
+    """The version with which a damaged clip could be replaced: its number, a description, and why there is none."""
     version = best_version(project, clip_index)
     if version is None or version.header is None:
         found = list_versions(project, clip_index)

@@ -1,4 +1,4 @@
-"""Comparing a clip with what it was before it was trained again."""
+"""Comparing a clip with an earlier version of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What training clips is expected to take, from what the clips of the project took."""
+"""Expected times for training clips, from those of the project's trained clips."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""DiskReader: what the open project takes on the disk, read on a thread when somebody looks."""
+"""DiskReader: the open project's use of the disk, read on a thread when somebody looks."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class DiskReader:
         self._n_changes = 0
 
     def use(self, project: Project, n_clips: int, basis: tuple[int, ...]) -> DiskUse | None:
-        """What it takes; as it was a moment ago while that is looked up anew, None before it was looked up at all.
+        """The use; the earlier one while it is looked up anew, None before the first.
 
         Args:
             basis: Generation of the project, and the revision of its catalog.

@@ -36,7 +36,7 @@ class Permanence:
         self._n_done = 0
 
     def obey(self, command: ApplyDeletions, opened: OpenedProject, service: TrainingService) -> None:
-        """Look what can be applied and ask, or do it.
+        """Look up what can be applied and ask, or do it.
 
         Raises:
             ProjectError: Something trains, or the project cannot be changed.

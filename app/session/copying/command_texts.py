@@ -1,4 +1,4 @@
-"""CommandTexts: what was done in the window, or could be done, as a command line and as Python."""
+"""CommandTexts: steps in the window, done or possible, as a command line and as Python."""
 
 from __future__ import annotations
 
@@ -46,25 +46,25 @@ class CommandTexts:
         return found
 
     def edit(self, edit_id: int) -> CommandText:
-        """What puts such an edit on top of the stack. Raises ProjectError where there is none."""
+        """Puts such an edit on top of the stack. Raises ProjectError where there is none."""
         project = self._project()
         return edit_command(project.folder, edit_with(project.document, edit_id))
 
     def training(self, clip_index: int) -> CommandText:
-        """What trains a clip, or trains it again. Raises ProjectError where nothing is open."""
+        """Trains a clip, or trains it again. Raises ProjectError where nothing is open."""
         project = self._project()
         return training_command(project.folder, project.settings, clip_index, is_again=self._is_finished(clip_index))
 
     def version(self, clip_index: int, number: int) -> CommandText:
-        """What brings back an earlier version of a clip. Raises ProjectError where nothing is open."""
+        """Brings back an earlier version of a clip. Raises ProjectError where nothing is open."""
         return version_command(self._project().folder, clip_index, number)
 
     def mend(self, request: MendRequest, method: str) -> CommandText:
-        """What mends a boundary or a stretch of frames. Raises ProjectError where nothing is open."""
+        """Mends a boundary or a stretch of frames. Raises ProjectError where nothing is open."""
         return mend_command(self._project().folder, after=request.after, frames=request.frames, method=method)
 
     def export(self, context: ExportContext, choices: ExportChoices) -> CommandText:
-        """What exports what was chosen in the dialog. Raises ProjectError where nothing is open."""
+        """Exports the choices of the dialog. Raises ProjectError where nothing is open."""
         return export_command(self._project().folder, Answers(context, choices).make_job())
 
     def _project(self) -> Project:

@@ -1,1 +1,1 @@
-"""Editing in the window: what is selected, and what becomes of it."""
+"""Editing in the window: the selection, and edits of it."""

@@ -103,8 +103,8 @@ def values_of(name: str, gaussians: GaussianArrays, anchors: AnchorValues | None
 
 
 def _of_anchors(gaussians: GaussianArrays, anchors: AnchorValues) -> np.ndarray:
-    """Each Gaussian has what its anchor has. Anchors follow each other as Gaussians do; where some were left out,
-    that of the nearest one."""
+    """The value of each Gaussian's anchor. Anchors are in the order of their Gaussians; where some were left out, the
+    nearest one counts."""
     n_each, n_left = divmod(len(gaussians), len(anchors.values))
     if n_left == 0:
         return np.repeat(anchors.values, n_each)

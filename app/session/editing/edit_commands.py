@@ -1,7 +1,7 @@
 """Commands that change the edits, markers, labels and the world of a project, as frozen dataclasses in the imperative.
 
 A gesture is the number of a drag, or of presses of a key that belong together: changes with the same one are taken
-back at once. 0 stands for a change of its own.
+back at once. 0 stands for a separate change.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class AddEdit:
 
     action: Action
     target: Target | None = None
-    """None for what is selected, which is not selected any more where it disappears."""
+    """None for the selection, which is cleared where it disappears."""
     scope: Scope = EVERYWHERE
     is_inverted: bool = False
     """Whether it acts on everything but the target."""
@@ -33,7 +33,7 @@ class ChangeEdit:
     edit: Edit
     gesture: int = 0
     verb: str = "change"
-    """What is done to it, for the history."""
+    """Begins the name of the step in the history."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class ToggleEdit:
 
 @dataclass(frozen=True, slots=True)
 class RenameEdit:
-    """Give an edit another name; an empty one lets what it does stand for it."""
+    """Give an edit another name; an empty one stands for its effect."""
 
     edit_id: int
     name: str
@@ -110,14 +110,14 @@ class SetLabel:
 
 @dataclass(frozen=True, slots=True)
 class SetUp:
-    """Say which direction of the scene is up; None for the one that the cameras suggest."""
+    """Set the direction of the scene that is up; None for the one that the cameras suggest."""
 
     direction: Vector | None
 
 
 @dataclass(frozen=True, slots=True)
 class SetUpByGround:
-    """Let what stands upright on the ground be up. points: Three of the ground, scene units."""
+    """Set the up direction upright on the ground. points: Three of the ground, scene units."""
 
     points: tuple[Vector, Vector, Vector]
     toward: Vector
@@ -135,7 +135,7 @@ class SetScaleByLength:
 
 @dataclass(frozen=True, slots=True)
 class SetScale:
-    """Say how long a scene unit is, m; None takes it back."""
+    """Set the length of a scene unit, m; None removes it."""
 
     meters_per_unit: float | None
 
@@ -152,7 +152,7 @@ class Undo:
 
 @dataclass(frozen=True, slots=True)
 class Redo:
-    """Do again what Undo took back last; another change ends that."""
+    """Do the last undone step again; another change ends that."""
 
     @property
     def n_steps(self) -> int:
@@ -184,7 +184,7 @@ EditCommand = (
     | SetScale
     | SetScaleByLength
 )
-"""What changes edits, markers, labels and the world, and can be taken back."""
+"""Commands that change edits, markers, labels and the world, and can be taken back."""
 
 HistoryCommand = Undo | Redo | GoToStep
 """Commands that go along the history."""

@@ -23,7 +23,7 @@ from engine.errors import ProjectError
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What a command makes of the document. name, merge: See app.document.history.Changed."""
+    """The document after a command. name, merge: See app.document.history.Changed."""
 
     document: ProjectDocument
     name: str
@@ -31,7 +31,7 @@ class Change:
 
 
 class Selects(Protocol):
-    """Knows what is selected."""
+    """Knows the selection."""
 
     @property
     def selection(self) -> Selection: ...
@@ -46,8 +46,8 @@ class Edits:
 
     Args:
         document: Holds and keeps them.
-        selecting: What is selected becomes the target of edits.
-        lost: Knows which edits have lost what was picked.
+        selecting: Its selection becomes the target of edits.
+        lost: Knows which edits have lost their picks.
         reaches: Knows where edits act.
     """
 
@@ -109,13 +109,13 @@ class Edits:
 
 
 def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
-    """What a window shows of a document. why_not: Why nothing can be changed now; empty when it can."""
+    """The edits of a document as a window shows them. why_not: Why nothing can be changed now; empty when it can."""
     labels = {(label.kind, label.name): label.text for label in document.labels}
     return EditsStatus(document.edits, labels, document.world, can_edit=not why_not, why_not=why_not)
 
 
 def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
-    """What a command makes of a document. Raises ProjectError where it is not valid."""
+    """The change that a command makes to a document. Raises ProjectError where it is not valid."""
     match command:
         case c.AddEdit(action=action, target=target, scope=scope, is_inverted=is_inverted, name=name):
             added = edit_changes.add_edit(document, action, target, scope=scope, is_inverted=is_inverted, name=name)

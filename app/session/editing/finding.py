@@ -1,4 +1,4 @@
-"""What a command means in one frame: which of its Gaussians are found. Pure; runs on a thread."""
+"""The Gaussians of a frame that a command finds. Pure; runs on a thread."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from engine.editing.selection.volumes import in_volume
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """What a command acts on.
+    """The frame that a command acts on.
 
     Attributes:
         gaussians: Of the frame, with their rows.
@@ -56,12 +56,12 @@ class Ground:
 
 
 def found_by(command: SelectionCommand, ground: Ground) -> np.ndarray:
-    """Gaussians of the frame that a command means; of one that changes the selection by itself, those that are selected
+    """Gaussians of the frame that a command means; of one that changes the selection itself, those that are selected
     afterwards. [N] bool
 
     Raises:
         ValueError: The command is not valid: an attribute that does not exist.
-        TypeError: It finds nothing by itself.
+        TypeError: The command finds nothing.
     """
     gaussians, selected = ground.gaussians, ground.selected
     means = gaussians.means
@@ -93,11 +93,11 @@ def found_by(command: SelectionCommand, ground: Ground) -> np.ndarray:
 
 
 def selection_after(selection: Selection, command: SelectionCommand, ground: Ground, found: np.ndarray) -> Selection:
-    """What is selected once a command has found something.
+    """The selection once a command has found something.
 
     Args:
-        selection: What was selected.
-        ground: What the command acted on, with rows.
+        selection: Before the command.
+        ground: That the command acted on, with rows.
         found: See `found_by`. [N] bool
     """
     rows = ground.gaussians.rows
@@ -109,7 +109,7 @@ def selection_after(selection: Selection, command: SelectionCommand, ground: Gro
 
 
 def _how(command: SelectionCommand) -> tuple[How, bool]:
-    """What becomes of the selection, and whether what does not exist in the frame stays in it."""
+    """How the selection changes, and whether Gaussians that do not exist in the frame stay in it."""
     match command:
         case GrowSelection() | ShrinkSelection():
             return How(), True

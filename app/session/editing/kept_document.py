@@ -33,7 +33,7 @@ Guard = Callable[[ProjectDocument, ProjectDocument], None]
 
 @dataclass(frozen=True, slots=True)
 class DocumentRequest:
-    """Keep what has happened, or read what the project holds.
+    """Keep new events, or read the project.
 
     Attributes:
         number: Of the request; a later one is another request.
@@ -51,7 +51,7 @@ class KeptDocument(SessionPart):
 
     Args:
         guard: Asked before every change, undo and redo.
-        on_change: Told the documents before and after each of them.
+        on_change: Called with the documents before and after each of them.
     """
 
     def __init__(self, *, guard: Guard, on_change: Callable[[ProjectDocument, ProjectDocument], None]) -> None:
@@ -93,7 +93,7 @@ class KeptDocument(SessionPart):
         self.hold(opened.project)
 
     def hold(self, project: Project) -> None:
-        """Take another project, with what it holds."""
+        """Take another project, with its document."""
         self.leave()
         self._project = project
 
@@ -101,7 +101,7 @@ class KeptDocument(SessionPart):
         """Let go of the project once everything is kept."""
         self._settle_for_good()
         self._files.forget()
-        with self._lock:  # what the disk still works on belongs to nobody any more
+        with self._lock:  # nobody needs the writing still in progress any more
             self._project = None
             self._pending, self._last = [], None
         self._awaited, self._problem, self._retry_at_s = None, "", None
@@ -126,7 +126,7 @@ class KeptDocument(SessionPart):
             self._happen(Undone())
 
     def redo(self) -> None:
-        """Do again what was taken back last; nothing happens when nothing was, or something else was done since.
+        """Do the last undone step again; nothing happens without one, or when something else was done since.
 
         Raises:
             ProjectError: It cannot be done now; the step stays.
@@ -198,8 +198,8 @@ class KeptDocument(SessionPart):
         return history
 
     def take_error(self) -> Exception | None:
-        """The last failure, once. What the disk refused is tried again after a while, and with the next change; where
-        something else has gone wrong while writing, what the project holds is read again."""
+        """The last failure, once. A write that the disk refused is tried again after a while, and with the next
+        change; after any other failure of a write, the project is read again."""
         found = self._files.take_error()
         if found is None or self._project is None or found[0].project is not self._project:
             return None
@@ -215,7 +215,7 @@ class KeptDocument(SessionPart):
         return error
 
     def poll(self) -> bool:
-        """Take in what was read. Whether there was something."""
+        """Take in the document that was read. Whether there was one."""
         if self._project is not None and self._retry_at_s is not None and time.monotonic() >= self._retry_at_s:
             self._retry_at_s = None
             self._request(self._project, is_reading=False)
@@ -233,14 +233,13 @@ class KeptDocument(SessionPart):
         return () if error is None else (("Edits could not be read or saved", error),)
 
     def settle(self) -> bool:
-        """Wait until what was changed is on disk; longer than a moment only where the disk is at fault. Whether it is
-        there."""
+        """Wait until changes are on disk; longer than a moment only where the disk is at fault. Whether they are."""
         is_idle = self._files.wait_idle(SETTLE_S)
         last = self._last
         return is_idle and not self._pending and not (last is not None and self._files.has_failed(last))
 
     def close(self) -> None:
-        """Keep what was changed, end the thread."""
+        """Keep all changes, end the thread."""
         self._settle_for_good()
         self._files.close()
 

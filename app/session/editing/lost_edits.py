@@ -1,4 +1,4 @@
-"""LostEdits: which edits of the open project have lost what was picked, looked up again when clips or edits change."""
+"""LostEdits: which edits of the open project have lost their picks, looked up again when clips or edits change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where in time a new edit is to hold, as the user chooses it, and what that comes to."""
+"""The frames of a new edit, as the user chooses them, and how many clips and frames that is."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def extent_of(scope: Scope, timeline: Timeline) -> tuple[int, int]:
 
 
 def extent_text(scope: Scope, timeline: Timeline) -> str:
-    """What a new edit of this scope touches."""
+    """Clips and frames of a new edit of this scope, in words."""
     n_clips, n_frames = extent_of(scope, timeline)
     return f"{_counted(n_frames, 'frame')} in {_counted(n_clips, 'clip')}"
 

@@ -1,4 +1,4 @@
-"""Selecting: what is selected in the open project, and the thread that finds it. For one thread; nothing here waits.
+"""Selecting: the selection of the open project, and the thread that finds it. For one thread; nothing here waits.
 
 Commands are carried out one after the other, each on the frame that was shown when it was given.
 """
@@ -42,7 +42,7 @@ FIND, SPREAD, SHARE = "find", "spread", "share"
 
 
 class Shown(Protocol):
-    """What is shown, as a session knows it when a command comes."""
+    """The shown frame, as a session knows it when a command comes."""
 
     def selectable(self) -> GaussianArrays | None:
         """Gaussians of the shown frame in their own colours; None where nothing is trained."""
@@ -59,7 +59,7 @@ class Shown(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Find:
-    """Work for the thread: what a command means."""
+    """Work for the thread: the Gaussians that a command finds."""
 
     number: int
     command: SelectionCommand = field(compare=False)
@@ -103,10 +103,10 @@ class ProjectSelecting(SessionPart):
     """The selection of the open project.
 
     Args:
-        shown: Where commands find what they act on.
+        shown: The frame that commands act on.
 
     Attributes:
-        selection: What is selected.
+        selection: Present one.
         on_found: Called on the thread when something was found, to wake somebody up.
     """
 
@@ -128,7 +128,7 @@ class ProjectSelecting(SessionPart):
         self._worker.active_lane = FIND
 
     def open(self, opened: OpenedProject) -> None:
-        """Another project is open: what was selected belongs to the one before."""
+        """Another project is open: the selection belonged to the one before."""
         self.forget()
 
     def forget(self) -> None:
@@ -146,7 +146,7 @@ class ProjectSelecting(SessionPart):
     # ---------------------------------------------------------------- commands
 
     def apply(self, command: SelectionCommand) -> None:
-        """Carry out a command; what takes long is found by a thread and taken up in `poll`.
+        """Carry out a command; a thread does long work, and `poll` takes up its result.
 
         Raises:
             ProjectError: There is nothing to select, or the command is not valid.
@@ -168,7 +168,7 @@ class ProjectSelecting(SessionPart):
         self._go_on()
 
     def select(self, selection: Selection) -> None:
-        """Select this and nothing else, for instance what an edit acts on."""
+        """Select this and nothing else, for instance the target of an edit."""
         self._take(selection)
 
     @property
@@ -176,7 +176,7 @@ class ProjectSelecting(SessionPart):
         return self._running is not None or bool(self._waiting)
 
     def _go_on(self) -> None:
-        """Carry out what waits, up to the first that the thread has to look for."""
+        """Carry out waiting commands, up to the first that needs the thread."""
         while self._running is None and self._waiting:
             command, gaussians, anchors = self._waiting.popleft()
             if isinstance(command, ClearSelection | Reselect):
@@ -205,7 +205,7 @@ class ProjectSelecting(SessionPart):
             self._revision += 1
 
     def poll(self) -> bool:
-        """Take up what was found. Whether anything changed. Failures are kept for `take_error`."""
+        """Take up results. Whether anything changed. Failures are kept for `take_error`."""
         running, newest = self._running, self._worker.newest_in(FIND)
         if running is None:
             return False
@@ -235,7 +235,7 @@ class ProjectSelecting(SessionPart):
         newest = [self._worker.newest_in(lane) for lane in (FIND, SPREAD, *self._share_lanes)]
         return (self._revision, *(None if found is None else found[0] for found in newest))
 
-    # ---------------------------------------------------------------- what is shown of it
+    # ---------------------------------------------------------------- for display
 
     @property
     def revision(self) -> int:

@@ -15,7 +15,7 @@ from engine.editing.picks import pack_rows, unpack_rows
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Selection:
-    """What is selected.
+    """The selected Gaussians.
 
     Attributes:
         parts: Numbers of Gaussians by anchor set, rising, each once; no set without any. [n] int64 each
@@ -42,7 +42,7 @@ class Selection:
 
     @property
     def clip_indices(self) -> tuple[int, ...]:
-        """Clips that have trained what is selected."""
+        """Clips that trained the selected Gaussians."""
         return tuple(sorted({row_set.clip_index for row_set, _ in self.parts}))
 
     @property
@@ -65,7 +65,7 @@ class Selection:
 
         Args:
             mask: [N] bool
-            keeps_others: Whether what is selected and does not exist in this frame stays selected.
+            keeps_others: Whether selected Gaussians that do not exist in this frame stay selected.
         """
         parts = dict(self.parts) if keeps_others else {}
         for place, row_set in enumerate(rows.sets):
@@ -88,7 +88,7 @@ class Selection:
 
     @classmethod
     def of_target(cls, target: Picked) -> Selection:
-        """What an edit acts on, selected.
+        """The target of an edit as a selection.
 
         Raises:
             ValueError: The numbers are damaged.

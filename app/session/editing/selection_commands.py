@@ -1,6 +1,6 @@
 """Commands that select, as frozen dataclasses in the imperative. See app.session.commands.
 
-They act on the frame that is shown. What is selected is not part of the document: undo does not touch it, `Reselect`
+They act on the frame that is shown. The selection is not part of the document: undo does not touch it, `Reselect`
 brings the selection before back.
 """
 
@@ -44,7 +44,7 @@ Shape = Rectangle | Lasso | Brush
 
 @dataclass(frozen=True, slots=True)
 class How:
-    """What becomes of what was selected before, and of anchors that are found in part.
+    """How the selection before and anchors that are found in part are treated.
 
     Attributes:
         mode: See engine.editing.selection.set_algebra.
@@ -57,20 +57,20 @@ class How:
 
 @dataclass(frozen=True, slots=True)
 class SelectInPicture:
-    """Select what lies under a shape in the picture of a view."""
+    """Select Gaussians under a shape in the picture of a view."""
 
     shape: Shape
     view: SeenFrom
     how: How = field(default_factory=How)
     is_visible_only: bool = False
-    """Only what is not hidden behind something else."""
+    """Only Gaussians that are not hidden."""
     is_by_extent: bool = False
     """As far as a Gaussian is seen, and not by its centre alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class SelectVolume:
-    """Select what lies in a box or a sphere."""
+    """Select Gaussians in a box or a sphere."""
 
     volume: Box | Sphere
     how: How = field(default_factory=How)
@@ -79,7 +79,7 @@ class SelectVolume:
 
 @dataclass(frozen=True, slots=True)
 class SelectFlood:
-    """Select what hangs together with the Gaussian nearest to a place, over neighbours of like colour."""
+    """Select the Gaussian nearest to a place, and all that are connected with it over neighbours of like colour."""
 
     place: Vector
     distance: float
@@ -110,21 +110,21 @@ class SelectAnchor:
 
 @dataclass(frozen=True, slots=True)
 class GrowSelection:
-    """Select what lies within a distance of what is selected, too. Scene units"""
+    """Also select Gaussians within a distance of selected ones. Scene units"""
 
     distance: float
 
 
 @dataclass(frozen=True, slots=True)
 class ShrinkSelection:
-    """Leave out what lies within a distance of what is not selected. Scene units"""
+    """Leave out Gaussians within a distance of others that are not selected. Scene units"""
 
     distance: float
 
 
 @dataclass(frozen=True, slots=True)
 class InvertSelection:
-    """Select what is shown and not selected, and nothing else."""
+    """Select shown Gaussians that are not selected, and nothing else."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class ClearSelection:
 
 @dataclass(frozen=True, slots=True)
 class Reselect:
-    """Bring back what was selected before; again brings back what is selected now."""
+    """Bring back the previous selection; again brings back the present one."""
 
 
 SelectionCommand = (
@@ -155,4 +155,4 @@ SelectionCommand = (
     | ClearSelection
     | Reselect
 )
-"""What is selected."""
+"""Commands on the selection."""

@@ -1,4 +1,4 @@
-"""What a window shows of the selection: a value, which the window can know without loading what finds things."""
+"""The selection as a window shows it: a value that the window knows without loading the code that finds things."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from engine.editing.gaussian_rows import RowSet
 
 @dataclass(frozen=True, slots=True)
 class SelectionStatus:
-    """What the window shows of the selection.
+    """Size and state of the selection.
 
     Attributes:
         words: "1,240 Gaussians, 96 anchors, 3 clips"; empty where nothing is selected.

@@ -1,4 +1,4 @@
-"""What commands that select act on: the frame that the session shows, its anchors and their residuals."""
+"""The frame that selecting commands act on: the one that the session shows, its anchors and their residuals."""
 
 from __future__ import annotations
 

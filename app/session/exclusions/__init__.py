@@ -1,1 +1,1 @@
-"""What of the capture training never sees, as a user deals with it."""
+"""Parts of the capture that training never sees, as a user deals with them."""

@@ -1,4 +1,4 @@
-"""Excluding: carries out commands about what training never sees, on the document of the open project."""
+"""Excluding: carries out commands that exclude parts of the capture, on the document of the open project."""
 
 from __future__ import annotations
 

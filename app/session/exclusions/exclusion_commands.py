@@ -1,4 +1,4 @@
-"""Commands about what training never sees."""
+"""Commands that exclude parts of the capture from training."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ExcludeFrames:
 
 @dataclass(frozen=True, slots=True)
 class PaintMask:
-    """Paint over, or erase from, what training does not look at in pictures of a camera.
+    """Paint, or erase, areas that training does not look at in pictures of a camera.
 
     Attributes:
         first, stop: Frames [first, stop) that it is for.
@@ -53,4 +53,4 @@ class RemoveMasks:
 
 
 ExclusionCommand = ExcludeCameras | ExcludeFrames | PaintMask | RemoveMasks
-"""What changes the exclusions, and can be taken back."""
+"""Commands that change the exclusions, and can be taken back."""

@@ -13,7 +13,7 @@ class RecoveryQuestion:
     """How to continue with a project whose document or journal is damaged?
 
     Attributes:
-        recovery: What is damaged, and what is left.
+        recovery: The damage, and how to continue.
     """
 
     recovery: Recovery
@@ -41,7 +41,7 @@ class SaveAsQuestion:
     Attributes:
         project: Its folder.
         suggestion: A folder that is not there yet.
-        n_bytes: What a copy takes at most.
+        n_bytes: Most that a copy takes.
     """
 
     project: Path

@@ -35,7 +35,7 @@ class ProjectFiles:
         jobs, notices: Of the session.
         ask: Puts a question to the user, or withdraws it.
         open_project: Opens a project.
-        settle: Waits a moment until what was edited is on disk.
+        settle: Waits a moment until edits are on disk.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class ProjectFiles:
         self._saving: BackgroundJob | None = None
 
     def ask_about(self, asked: OpenCapture, error: Exception) -> bool:
-        """A project does not open. Whether the user is asked what to do about it."""
+        """A project does not open. Whether the user is asked how to continue."""
         if isinstance(error, DamagedProject) and error.recovery is not None:
             self._ask(RecoveryQuestion(error.recovery))
         elif isinstance(error, LostCapture) and error.project is not None and error.path is not None:
@@ -122,7 +122,7 @@ def _checked(project: Project | None, *, is_training: bool) -> Project:
 
 
 def _free_name(folder: Path) -> Path:
-    """A name beside a folder that nothing has."""
+    """A free name next to a folder."""
     number = 2
     while (found := folder.absolute().with_name(f"{folder.name}-{number}")).exists():
         number += 1

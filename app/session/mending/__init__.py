@@ -1,1 +1,1 @@
-"""Mending seams in the window: what is asked, the job that runs, and what came of it."""
+"""Mending seams in the window: the question, the running job, and the result."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class AskMend:
-    """Show what mending a boundary, or some frames, would do, and what is known of it.
+    """Show what mending a boundary, or some frames, would do.
 
     Attributes:
         after: The clip that begins at the boundary; None for frames.
@@ -20,7 +20,7 @@ class AskMend:
 
 @dataclass(frozen=True, slots=True)
 class StartMend:
-    """Mend what is shown. method: "auto", or a name of engine.mending.figures.METHODS."""
+    """Begin the mending that is shown. method: "auto", or a name of engine.mending.figures.METHODS."""
 
     method: str = "auto"
 
@@ -32,18 +32,18 @@ class StopMend:
 
 @dataclass(frozen=True, slots=True)
 class CompareMended:
-    """Put what a mended clip was beside what it is now, or no more."""
+    """Show an earlier version of a mended clip next to the present one, or stop that."""
 
 
 @dataclass(frozen=True, slots=True)
 class RevertMend:
-    """Bring back what the clips were before they were mended."""
+    """Bring back the clips from before the mending."""
 
 
 @dataclass(frozen=True, slots=True)
 class CloseMend:
-    """Keep what is, and show nothing of it any more. A mending that runs is ended."""
+    """Keep the result and close the page. A mending that runs is ended."""
 
 
 MendCommand = AskMend | StartMend | StopMend | CompareMended | RevertMend | CloseMend
-"""What is done about a seam or a stretch with flicker."""
+"""Commands about a seam or a stretch with flicker."""

@@ -1,4 +1,4 @@
-"""MendPage: what the window shows of a seam that is mended. Values only."""
+"""MendPage: a mending as the window shows it. Values only."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from app.project.mends.record import MendRecord
 
 @dataclass(frozen=True, slots=True)
 class MendPage:
-    """What the panel shows.
+    """Contents of the panel.
 
     Attributes:
-        request: What is to be mended.
+        request: The boundary or frames to mend.
         words: The same, as "the seam at frame 20".
         frame: Where to look: the boundary, or the first of the frames.
         state: "asking" before it begins, "running", "done", "reverted".
         clip_indices: Clips that may change.
         why_not: Why it cannot be mended; empty where it can.
-        estimate_s: What it is expected to take; None where that is not known.
-        record: What came of it; None before.
+        estimate_s: Expected time; None where unknown.
+        record: The result; None before.
         number: Of the record in the project; None where nothing changed.
-        compared: Clip whose earlier version stands beside it; None for none.
-        failure, hint: Why it came to nothing.
+        compared: Clip that is compared with its earlier version; None for none.
+        failure, hint: Why it failed.
     """
 
     request: MendRequest

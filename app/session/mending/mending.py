@@ -1,4 +1,4 @@
-"""Mending: a seam, or a stretch with flicker, on its way to being mended: what is asked, the job, what came of it."""
+"""Mending: a seam, or a stretch with flicker, on its way to being mended: the question, the job, the result."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class ProjectMending(SessionPart):
     """For one thread, which does not wait.
 
     Args:
-        live: Of the session: what trains, and what lies on disk of the clips.
+        live: Of the session: the training, and the clips on disk.
         overlays: Gives those of the view in use, where an earlier version is compared with.
 
     Attributes:
-        page: What is shown; None while nothing is.
+        page: Shown now; None for none.
         revision: Goes up when the page is another.
     """
 
@@ -58,7 +58,7 @@ class ProjectMending(SessionPart):
         if self._opened is None or self._opened.generation != opened.generation:
             self._close_page()
         elif self._opened.clips != opened.clips and self.page is not None and self.page.state == "asking":
-            self._close_page()  # what it asks about is numbered otherwise now
+            self._close_page()  # its clips are numbered otherwise now
         self._opened = opened
 
     def reopen(self, opened: OpenedProject) -> None:
@@ -174,7 +174,7 @@ class ProjectMending(SessionPart):
             self._cancel()
             self._show(replace(page, state="asking"))
 
-    # ---------------------------------------------------------------- what came of it
+    # ---------------------------------------------------------------- the result
 
     def _compare(self, timeline: Timeline) -> None:
         page, opened = self.page, self._checked()
@@ -219,7 +219,7 @@ class ProjectMending(SessionPart):
     # ---------------------------------------------------------------- the page and its job
 
     def poll(self) -> bool:
-        """Take in what was finished. Whether anything was."""
+        """Take in finished work. Whether there was any."""
         has_ended = self._jobs.poll()
         if has_ended and self._stopped:  # it may have been too late
             for clip_index in self._stopped:

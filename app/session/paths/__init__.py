@@ -1,1 +1,1 @@
-"""Camera paths: commands, and what they make of the paths."""
+"""Camera paths: commands and their results."""

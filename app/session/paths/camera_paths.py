@@ -30,7 +30,7 @@ class CameraPaths(SessionPart):
         self._chosen: int | None = None
         self._key: int | None = None
         self._along: tuple[int, OrbitView] | None = None  # the view that goes along, and its index
-        self._led: tuple[ViewPlace, Any] | None = None  # where it was put, and for what
+        self._led: tuple[ViewPlace, Any] | None = None  # where it was put, and for which frame and path
 
     @property
     def _paths(self) -> tuple[CameraPath, ...]:
@@ -87,7 +87,7 @@ class CameraPaths(SessionPart):
 
     @contextmanager
     def showing_change(self) -> Iterator[None]:
-        """What is taken back in here, or done again, is chosen, so that one sees it."""
+        """Choose the path that an undo or redo in this block changes, so that one sees it."""
         before = self._paths
         yield
         after = self._paths

@@ -88,8 +88,7 @@ class CloseCameraPath:
 
 @dataclass(frozen=True, slots=True)
 class MakeTurntable:
-    """Begin a path that goes round what the current view looks at, from where it stands, while the played frames go
-    by."""
+    """Begin a path that circles the pivot of the current view, from where it stands, while the played frames go by."""
 
     n_turns: float = 1.0
     """Seen from above, positive ones go counterclockwise."""

@@ -1,4 +1,4 @@
-"""What each command makes of the camera paths. Pure: from values to values."""
+"""Camera paths changed by commands. Pure: from values to values."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Edited:
 
     Attributes:
         paths, chosen, chosen_key: As of PathsStatus.
-        name: What was done, for the history.
+        name: Of the step, for the history.
         merge: See app.document.history.Changed.
     """
 
@@ -41,7 +41,7 @@ def edited(status: PathsStatus, command: c.PathEdit, view: OrbitView, timeline: 
     """Carry out a command.
 
     Args:
-        status: What there is.
+        status: Before the command.
         view: The current one.
         timeline: Its playhead is where keys go, and its played frames are those of presets.
 
@@ -98,7 +98,7 @@ def edited(status: PathsStatus, command: c.PathEdit, view: OrbitView, timeline: 
 
 
 def view_key(view: OrbitView, frame: float) -> CameraKey:
-    """A key that sees what a view sees where it is going; of an orthographic one, from where it seems to stand."""
+    """A key with the picture that a view is moving to; of an orthographic one, from where it seems to stand."""
     pose = view.pose()
     matrix = np.eye(4)
     matrix[:3, :3] = pose.rotation

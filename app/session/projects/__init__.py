@@ -1,1 +1,1 @@
-"""Opening and starting projects, and what the window remembers of them."""
+"""Opening and starting projects, and the window's memory of them."""

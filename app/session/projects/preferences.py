@@ -1,5 +1,5 @@
-"""What the user prefers, whatever is open: theme, keys, layouts of the panels, memory for decoded frames. A checked
-JSON file beside the other preferences.
+"""The user's preferences for all projects: theme, keys, layouts of the panels, memory for decoded frames. A checked
+JSON file next to the other preferences.
 
 Knows no window: names of keys and actions, and layouts, are plain values that mean something to `ui` alone.
 """
@@ -37,10 +37,10 @@ class Preferences(msgspec.Struct):
 
     Attributes:
         theme: Colours of the window; "system" follows the desktop.
-        backend: What the program computes with from its next start on, see engine.backends.table.
+        backend: For computing from the next start on, see engine.backends.table.
         cache_mb: Memory for decoded frames; None for as much as is usual.
-        projects_dir: Folder of projects without a place of their own; empty for the usual one.
-        keys: By the name of an action, the keys that the user gave it instead of its own; an empty list for none.
+        projects_dir: Default folder of projects; empty for the usual one.
+        keys: By the name of an action, the user's keys instead of the usual ones; an empty list for none.
         layouts: By name, where the panels are, as text of the window's.
         used_actions: Names of actions chosen in the palette, newest first.
     """
@@ -144,7 +144,7 @@ def _read(path: Path) -> Preferences:
 
 
 def _sound_entries(found: dict[str, Any], field: msgspec.structs.FieldInfo, path: Path) -> dict[str, Any]:
-    """Those entries of a dictionary that make sense."""
+    """The valid entries of a dictionary."""
     sound: dict[str, Any] = {}
     for name, value in found.items():
         try:

@@ -18,13 +18,13 @@ class OpenCapture:
     scale: float | None = None
     """Share of the original picture size to work at; None picks one that suits the size."""
     is_new_project: bool = False
-    """Start another project, whatever there is."""
+    """Start another project, even where there are some."""
     follow_links: bool = False
     """Whether the user allows the capture's files to lie outside of its folder; noted in its project."""
     is_asking: bool = False
-    """Report what it is, and ask what a project of it begins with, where there is none; or why it does not open."""
+    """Show a report and ask for the first settings of a project where there is none; or show why it does not open."""
     answers: OpeningAnswers | None = None
-    """What a new project begins with; None takes what suits."""
+    """First settings of a new project; None takes suitable ones."""
     choices: ProjectChoices = AS_USUAL
     """How its project is opened."""
 
@@ -39,7 +39,7 @@ class OpenProject:
 
 @dataclass(frozen=True, slots=True)
 class NewProject:
-    """Ask what another project of the open capture begins with; the others stay as they are."""
+    """Ask for the first settings of another project of the open capture; the others stay as they are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class LeaveTraining:
 
 @dataclass(frozen=True, slots=True)
 class AskStartOver:
-    """Ask with which settings training is to start over, and say what is discarded."""
+    """Ask with which settings training is to start over, and show what is discarded."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""ProjectOpener: opens captures and projects on threads. What was asked for last wins."""
+"""ProjectOpener: opens captures and projects on threads. The newest request wins."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class ProjectOpener:
     Args:
         jobs, notices: Of the session.
         project_dir: Folder for the project of the next capture; one in the folder of projects when None.
-        take: Called by `Jobs.poll` with what was opened.
+        take: Called by `Jobs.poll` with the opened project.
         open_path: Opens a path on the thread; tests bring their own.
-        refuse: Told the folder that does not open and why, where the user was to be asked about it.
-        ask: Told what does not open, and why. Whether the user is asked what to do, so that nothing else has to be
-            said.
+        refuse: Called with a folder that does not open and the error, where the user was to be asked about it.
+        ask: Called with a command that failed and the error. Whether the user is asked what to do, so that no notice is
+            needed.
     """
 
     def __init__(
@@ -42,12 +42,12 @@ class ProjectOpener:
     ) -> None:
         self.project_dir = project_dir
         self.projects = projects_dir()
-        """The folder of projects without a place of their own."""
+        """The default folder of projects."""
         self._jobs, self._notices, self._take, self._open_path = jobs, notices, take, open_path
         self._refuse, self._ask = refuse, ask
         self._refusals: list[Notice] = []
         self._newest: object | None = None
-        """Stands for what was asked for last."""
+        """Identifies the newest request."""
 
     def open(
         self,
@@ -57,7 +57,7 @@ class ProjectOpener:
         recent: Sequence[RecentProject],
         known: Capture | None = None,
     ) -> None:
-        """Open something; see app.project.opening.opening for what that means.
+        """Open a capture or project; see app.project.opening.opening.
 
         Args:
             current: Folder of the project that is open now.
@@ -106,7 +106,7 @@ class ProjectOpener:
         self._jobs.start("Opening", work, take, failed)
 
     def _withdraw_refusals(self) -> None:
-        """Something is open now; why something else was not no longer matters."""
+        """Something is open now: earlier refusals no longer matter."""
         for notice in self._refusals:
             self._notices.withdraw(notice)
         self._refusals.clear()

@@ -1,5 +1,5 @@
-"""ProjectPictures: makes and reads the small pictures of projects, on threads: of what is looked at when a clip is
-finished or the project is left, else of what the capture's first camera took first.
+"""ProjectPictures: makes and reads the small pictures of projects, on threads: of the shown frame when a clip is
+finished or the project is left, else the first picture of the capture's first camera.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class ProjectPictures:
         """Make the picture of a project.
 
         Args:
-            shown: What is shown of it; without that the capture's own picture serves, unless there is one.
+            shown: The shown frame; without it the capture's own picture serves, unless there is one.
             view: From where.
         """
         folder = opened.project.folder.resolve()
@@ -74,7 +74,7 @@ class ProjectPictures:
         self._jobs.start("Pictures of projects", work, take, _note)
 
     def poll(self) -> None:
-        """Take in what was read."""
+        """Take in the pictures that were read."""
         self._jobs.poll()
 
     def close(self) -> None:

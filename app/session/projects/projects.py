@@ -1,4 +1,4 @@
-"""Projects: which project is open, how others are opened and left, and what follows when its settings change."""
+"""Projects: which project is open, how others are opened and left, and the effects of changed settings."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class Projects(SessionPart):
     """For one thread, and nothing here waits.
 
     Attributes:
-        opened: What is open; None before.
-        recent: What was opened lately.
+        opened: The open project; None before.
+        recent: Projects opened lately.
 
     Args:
-        parts: Told what is open.
+        parts: Of the session; each is handed the open project.
         jobs, notices, asked, settings, document, live, showing, opening: Of the session.
         project_dir: Folder for the project of the next capture; one in the folder of projects when None.
         open_path: Opens captures, on a thread.
@@ -147,7 +147,7 @@ class Projects(SessionPart):
             ProjectError: It cannot be done; says why.
         """
         self._asked.put(None)
-        if isinstance(command, SaveProjectAs):  # what is written meanwhile would be half of it
+        if isinstance(command, SaveProjectAs):  # the copy would hold half-written files
             self._parts.check_idle()
         self._files.apply(command, self.project, is_training=self._live.is_busy)
 
@@ -166,7 +166,7 @@ class Projects(SessionPart):
         self._document.change(replace(opened.project.document, settings=changed), name)
 
     def follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
-        """With other settings, what was trained may not fit; everybody takes up the project anew."""
+        """With other settings, progress may not fit; all parts take up the project anew."""
         if before.settings == after.settings or self.opened is None:
             return
         found = discard_unfitting(self.opened.project, before.settings, after.settings)
@@ -218,7 +218,7 @@ class Projects(SessionPart):
             self._enter(found)
 
     def stay(self) -> None:
-        """Close what was held back, where the user has not agreed to leave the project that is open."""
+        """Close the project held back, where the user has not agreed to leave the open one."""
         if self._unopened is not None and not isinstance(self._asked.question, LeaveQuestion):
             self._unopened.leave()
             self._unopened = None
@@ -237,7 +237,7 @@ class Projects(SessionPart):
         for note in found.notes:
             self._notices.add(*note)
 
-    # ---------------------------------------------------------------- what was opened lately
+    # ---------------------------------------------------------------- recent projects
 
     def _keep_recent(self) -> None:
         if self.opened is not None and self._live.service is not None:
@@ -256,7 +256,7 @@ class Projects(SessionPart):
         return ProjectStatus(name, project.folder, n_trained, len(self.opened.clips), project.is_writable)
 
     def poll(self) -> bool:
-        """Take in what was found of recent projects, and keep how far the open one is trained."""
+        """Take in the state of recent projects, and keep how far the open one is trained."""
         self.recent.poll()
         if self._live.n_ended != self._n_ended:
             self._n_ended = self._live.n_ended
@@ -269,7 +269,7 @@ class Projects(SessionPart):
         return self.recent.pictures.revision, self.recent.missing
 
     def close(self) -> None:
-        """Keep what is open among the recent projects. Its files stay locked; whoever closes everything frees them."""
+        """Keep the open project among the recent ones. Its files stay locked until everything is closed."""
         if self._unopened is not None:
             self._unopened.leave()
         self._keep_recent()

@@ -1,4 +1,4 @@
-"""RecentProjects: what was opened lately, how far it was trained, and which of it is still there."""
+"""RecentProjects: projects opened lately, how far they were trained, and which are still there."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class RecentProjects:
         self._looks.start("Looking for recent projects", lambda context: missing_folders(entries), found, failed)
 
     def poll(self) -> None:
-        """Take in what was found."""
+        """Take in the results."""
         self._looks.poll()
         self.pictures.poll()
 

@@ -11,7 +11,7 @@ from engine.training.presets import preset
 
 
 def changed_settings(settings: ProjectSettings, command: SettingCommand, rig: CameraRig) -> ProjectSettings:
-    """The settings as the command wants them; of those of training only what differs from the defaults is kept.
+    """The settings as the command wants them; training settings are kept only where they differ from the defaults.
 
     Args:
         rig: Cameras of the capture; indices of others are ignored.

@@ -29,8 +29,8 @@ class Settings:
     Attributes:
         recent: Projects that were opened lately, newest first.
         live_view: How often the clip that trains is shown anew: "off", "low" or "live".
-        last_answers: What was answered when a capture was opened last.
-        last_export: What was chosen when something was exported last.
+        last_answers: Given when a capture was opened last.
+        last_export: Choices of the last export.
 
     Args:
         path: The file; the platform's place when None.
@@ -45,12 +45,12 @@ class Settings:
         self.last_export = _taken(document.get("export"), ExportChoices)
 
     def set_last_answers(self, answers: LastAnswers) -> None:
-        """Keep what was answered when a capture was opened."""
+        """Keep the answers given when a capture was opened."""
         self.last_answers = answers
         self._save()
 
     def set_last_export(self, choices: ExportChoices) -> None:
-        """Keep what was chosen when something was exported."""
+        """Keep the choices of an export."""
         self.last_export = choices
         self._save()
 

@@ -22,7 +22,7 @@ class StartingOver:
     Args:
         jobs, notices, document: Of the session.
         ask: Takes the question; None once it is answered.
-        reopen: Called when it is done, to read anew what lies on disk.
+        reopen: Called when it is done, to read the files on disk anew.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class StartingOver:
         self._jobs, self._notices, self._document, self._ask, self._reopen = jobs, notices, document, ask, reopen
 
     def ask(self, opened: OpenedProject) -> None:
-        """Find out what would go, and ask.
+        """Find out what would be discarded, and ask.
 
         Raises:
             ProjectError: The project is read-only.
@@ -52,7 +52,7 @@ class StartingOver:
         self._jobs.start("Reading the project", work, self._ask, self._failed)
 
     def start(self, opened: OpenedProject, name: str, question: Question | None) -> None:
-        """Discard what is trained, and take a preset.
+        """Discard all progress, and take a preset.
 
         Args:
             question: The one that is answered by this; it stays up meanwhile.

@@ -1,5 +1,5 @@
-"""What the window looked like when it was last used: its size, layout and scale, and for each project the frame, the
-view and what was shown. A checked JSON file beside the preferences; a project that may only be read has its place, too.
+"""The window as it was when last used: its size, layout and scale, and for each project the frame, the views and the
+overlays. A checked JSON file next to the preferences; a project that may only be read has its place, too.
 
 Knows no window: sizes and the layout are plain values that mean something to `ui` alone.
 """
@@ -74,7 +74,7 @@ class WindowMemory:
     _writing: threading.Thread | None = field(default=None, repr=False)
 
     def keep_view(self, folder: str, view: dict[str, Any]) -> None:
-        """Keep what was looked at in a project; the one that was not used for longest is forgotten."""
+        """Keep the views of a project; the one that was not used for longest is forgotten."""
         self.views.pop(folder, None)
         self.views[folder] = view
         for old in list(self.views)[:-MAX_PROJECTS]:
@@ -156,7 +156,7 @@ def read_window_memory(path: Path | None = None) -> WindowMemory:
 
 
 def view_of(session: SessionView) -> dict[str, Any]:
-    """Frame, views and overlays of the open capture, as plain values. Those of the active view stand by themselves."""
+    """Frame, views and overlays of the open capture, as plain values. Those of the active view are separate entries."""
     looks = session.views.shown
     return {
         "frame_index": session.timeline.frame_index,
@@ -179,7 +179,7 @@ def _look_of(view: OrbitView, overlays: Overlays) -> dict[str, Any]:
 
 
 def show_again(session: SessionView, kept: dict[str, Any]) -> None:
-    """Go back to what `view_of` has kept. What is not valid for this capture stays as it is."""
+    """Restore the values of `view_of`. Anything that is not valid for this capture stays as it is."""
     timeline = session.timeline
     frame_index = _number(kept.get("frame_index"), 0, timeline.last_frame)
     if frame_index is not None:
@@ -204,7 +204,7 @@ def _look_again(view: OrbitView, overlays: Overlays, kept: dict[str, Any]) -> No
         found = kept.get(key)
         names = found if isinstance(found, list) else []
         for name in OVERLAY_NAMES:
-            if name in names:  # what an older version did not know of stays as it is
+            if name in names:  # entries missing in an older file stay as they are
                 setattr(overlays, name, is_shown)
     if kept.get("compare") in COMPARE_MODES:
         overlays.compare = kept["compare"]

@@ -1,1 +1,1 @@
-"""What the user looks at, and what prepares it."""
+"""The shown picture, and everything that prepares it."""

@@ -1,4 +1,4 @@
-"""Commands about what the user looks at: time, views, and what is shown in them. Nothing of it is kept."""
+"""Commands about the display: time, views and their contents. Nothing of it is kept."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class TogglePlay:
 
 @dataclass(frozen=True, slots=True)
 class FollowTraining:
-    """Go along with the training: the playhead stands in the clip with the newest state, until the user moves it."""
+    """Follow the training: the playhead stands in the clip with the newest state, until the user moves it."""
 
     is_on: bool = True
 
@@ -42,7 +42,7 @@ class SetCompare:
 
 @dataclass(frozen=True, slots=True)
 class SetCompareWith:
-    """What to compare with. other: See Overlays.compare_with."""
+    """Choose the picture to compare with. other: See Overlays.compare_with."""
 
     other: str
 
@@ -118,4 +118,4 @@ LookCommand = (
     | ActivateView
     | CompareVersion
 )
-"""Commands on time, views, and what is shown in them."""
+"""Commands on time, views and their contents."""

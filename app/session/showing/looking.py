@@ -1,4 +1,4 @@
-"""What commands make of what the user looks at: time, views, and what is shown in them. Nothing of it is kept."""
+"""Carries out commands about the display: time, views and their contents. Nothing of it is kept."""
 
 from __future__ import annotations
 

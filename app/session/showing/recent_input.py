@@ -1,4 +1,4 @@
-"""Attention: whether the user has just looked elsewhere, so that cores are for what is shown."""
+"""Attention: whether the user has just looked elsewhere, so that cores are for the shown picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ LASTS_S = 2.0
 
 
 class Attention:
-    """Follows what is looked at. For one thread."""
+    """Follows the view and the playhead. For one thread."""
 
     def __init__(self) -> None:
         self._looked_at: object = None

@@ -1,4 +1,4 @@
-"""Showing: the picture that the user looks at, and what prepares it: the timeline, views, frames and residuals."""
+"""Showing: the picture that the user looks at, and everything behind it: the timeline, views, frames and residuals."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Showing(SessionPart):
     """For one thread, and nothing here waits.
 
     Attributes:
-        timeline, views, bookmarks: What the user looks at; the window may change them directly.
-        playback, residuals: Prepare what is shown.
+        timeline, views, bookmarks: The window may change them directly.
+        playback, residuals: Prepare the shown picture.
 
     Args:
         live: Of the session; opened before this, as its files are shown.
@@ -55,7 +55,7 @@ class Showing(SessionPart):
 
     @property
     def overlays(self) -> Overlays:
-        """What the current view shows."""
+        """Overlays of the current view."""
         return self.views.current.overlays
 
     @property
@@ -67,7 +67,7 @@ class Showing(SessionPart):
         """Look at something else, or otherwise."""
         look(command, self.timeline, self.views, self.playback)
 
-    # ---------------------------------------------------------------- what is open
+    # ---------------------------------------------------------------- the open project
 
     def open(self, opened: OpenedProject) -> None:
         """Another project is open."""
@@ -109,7 +109,7 @@ class Showing(SessionPart):
     # ---------------------------------------------------------------- letting finished work in
 
     def poll(self) -> bool:
-        """Take in what was prepared, and prepare what comes next."""
+        """Take in prepared pictures, and prepare the next ones."""
         self._release_snapshot()
         is_training = self._is_training()
         is_attended = self._attention.follow((self.view.look_key, self.timeline.frame_index))
@@ -132,7 +132,7 @@ class Showing(SessionPart):
         self._live.give_back_snapshots(but=None if is_read or clip is None else clip.clip_index)
 
     def follow_training(self) -> None:
-        """Take the playhead along with the training, if the user wants that, and tell the training what was loaded."""
+        """Take the playhead along with the training, if the user wants that, and report loaded clips to it."""
         follow_training(self.timeline, self._live)
         if self.timeline.clip is not None:
             self._live.note_anchors(self.timeline.clip.clip_index, self.playback.live_anchors(self.timeline))
@@ -143,7 +143,7 @@ class Showing(SessionPart):
         return self.playback.finished
 
     def take_failures(self) -> Iterable[tuple[str, Exception]]:
-        """Failures of what is shown. Of a live state nothing is told: another one follows."""
+        """Failures of the shown picture. Those of a live state are left out: another state follows."""
         told = []
         for failure in [*self.playback.take_failures(), *self.residuals.take_failures()]:
             if failure.is_live:

@@ -1,4 +1,4 @@
-"""Versions: what the clips of the open project were before they were trained again, listed, restored and removed.
+"""Versions: earlier versions of the open project's clips, listed, restored and removed.
 
 Folders and headers are read on a thread when somebody looks; files are moved by short jobs.
 """
@@ -33,7 +33,7 @@ MAX_KEPT = 64
 
 @dataclass(frozen=True, slots=True)
 class VersionsRequest:
-    """Versions of a clip as they are now: the folder's time and the catalog's revision tell whether they were read. The
+    """Versions of a clip as they are now: the folder's time and the catalog's revision show whether they were read. The
     name is that of its files: clips that were cut otherwise have other ones under the same index."""
 
     clip_index: int
@@ -45,7 +45,7 @@ class VersionsRequest:
 
 @dataclass(frozen=True, slots=True)
 class FoundVersions:
-    """What lies on disk, and what is shown of it; of the same length."""
+    """Versions on disk, and their status values; of the same length."""
 
     found: tuple[ClipVersion, ...] = ()
     statuses: tuple[VersionStatus, ...] = ()
@@ -79,7 +79,7 @@ class Versions(SessionPart):
         return self._found(clip_index).statuses
 
     def state(self, clip_index: int, number: int) -> ShownState | None:
-        """The file of a version, for whoever shows it; None until it was read, and where it cannot be shown."""
+        """The file of a version, to be shown; None until it was read, and where it cannot be shown."""
         found = next((one for one in self._found(clip_index).found if one.number == number), None)
         if found is None or found.header is None or self._opened is None:
             return None

@@ -1,5 +1,5 @@
-"""LiveTraining: the training of the open project as a session sees it. Its service and what that tells, its snapshots,
-its curves, and the plan of the next clip.
+"""LiveTraining: the training of the open project as a session sees it. Its service and events, its snapshots, its
+curves, and the plan of the next clip.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ logger = logging.getLogger(__name__)
 
 
 class LiveTraining(SessionPart):
-    """The running training, its queue and what comes of it. For one thread, and nothing here waits.
+    """The running training, its queue and results. For one thread, and nothing here waits.
 
     At most one snapshot of each running training is unread: its worker writes no other before that was given back.
 
     Args:
         jobs, notices: Of the session.
         launch: Starts a worker.
-        settle: Waits a moment until what was edited is on disk, where workers read it.
+        settle: Waits a moment until edits are on disk, where workers read it.
         can_measure: Whether plans may time the machine.
         live_view: How often running clips are shown anew, one of app.training.messages.LIVE_VIEWS.
     """
@@ -74,7 +74,7 @@ class LiveTraining(SessionPart):
         self._curves.worker.start()
 
     def open(self, opened: OpenedProject) -> None:
-        """Take up a project, or the same one with other settings. What trains in another one is ended on a thread,
+        """Take up a project, or the same one with other settings. A training of another one is ended on a thread,
         keeping progress."""
         service, before = self.service, self._opened
         if service is not None and before is not None:
@@ -194,7 +194,7 @@ class LiveTraining(SessionPart):
             self._notices.add("info", "Every clip is trained")
 
     def train(self, clip_index: int, *, is_confirmed: bool, own: OwnSettings | None = None) -> RetrainQuestion | None:
-        """Train a clip, or return what has to be answered before a finished one is trained again.
+        """Train a clip, or return the question before a finished one is trained again.
 
         Args:
             own: Settings that it alone is to have.
@@ -211,7 +211,7 @@ class LiveTraining(SessionPart):
 
     @property
     def opened_project(self) -> OpenedProject:
-        """What is open. There has to be something."""
+        """The open project. There has to be one."""
         assert self._opened is not None
         return self._opened
 
@@ -231,7 +231,7 @@ class LiveTraining(SessionPart):
             self.service.pause()
 
     def resume(self) -> None:
-        """Go on after a pause, or with a queue that was held."""
+        """Resume after a pause, or continue with a queue that was held."""
         if self.service is not None:
             self.service.resume()
             self.service.go_on()
@@ -241,10 +241,10 @@ class LiveTraining(SessionPart):
         if self.service is not None:
             self.service.stop()
 
-    # ---------------------------------------------------------------- what the worker said
+    # ---------------------------------------------------------------- events of the workers
 
     def poll(self) -> bool:
-        """Take in what the workers said, and tell the user what is news. Whether there was anything."""
+        """Take in the workers' events, with notices to the user. Whether there were any."""
         events = [] if self.service is None else self.service.poll()
         for clip_index, event in events:
             tell(event, self._notices, clip_index)
@@ -325,14 +325,14 @@ class LiveTraining(SessionPart):
         return [] if self._statuses is None else self._statuses.all(self._live_counts)
 
     def plan(self) -> PlanStatus | None:
-        """What training the next clip would take; None while something trains or nothing is left to train."""
+        """Time and memory for training the next clip; None while something trains or nothing is left to train."""
         if self.service is None or self._opened is None:
             return None
         opened, can_measure = self._opened, self._can_measure and not self._jobs.statuses
         return self._forecasts.next_clip(self.service, opened.project, opened.capture, can_measure=can_measure)
 
     def queue(self) -> QueueStatus:
-        """What waits, and what all of it takes."""
+        """The waiting clips, and the time for all of them."""
         if self.service is None or self._opened is None:
             return QueueStatus(live_view=self._live_view)
         opened, can_measure = self._opened, self._can_measure and not self._jobs.statuses

@@ -1,4 +1,4 @@
-"""The question with which settings of its own a clip is to be trained, made of what its project says."""
+"""The question which settings a clip is to be trained with instead of the project's."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LABELS = {
     "volume_weight": "Weight of volume",
     "residual": "Residual anchors",
 }
-"""Of settings that have no label of their own, or a longer one than one clip needs."""
+"""Of settings without a label, or with a longer one than one clip needs."""
 
 
 def settings_question(opened: OpenedProject, catalog: ClipCatalog, clip_index: int) -> SettingsQuestion:

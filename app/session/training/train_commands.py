@@ -1,4 +1,4 @@
-"""Commands about what is trained when, how it is shown meanwhile, and which version of a clip counts."""
+"""Commands about the order of training, the live view, and versions of clips."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class TrainClip:
 
 @dataclass(frozen=True, slots=True)
 class AskTrainSettings:
-    """Ask with which settings of its own a clip is to be trained."""
+    """Ask which settings a clip is to be trained with, instead of the project's."""
 
     clip_index: int
 
 
 @dataclass(frozen=True, slots=True)
 class TrainClips:
-    """Train those of these clips that are not finished, one after the other, and before them what they need."""
+    """Train those of these clips that are not finished, one after the other, preceded by the clips that they need."""
 
     clip_indices: tuple[int, ...]
 
@@ -61,7 +61,7 @@ class RemoveFromQueue:
 
 @dataclass(frozen=True, slots=True)
 class StopAfterClip:
-    """Let the queue wait once the clip that trains has ended, or go on after all."""
+    """Let the queue wait once the clip that trains has ended, or continue after all."""
 
     is_wanted: bool = True
 
@@ -73,7 +73,7 @@ class PauseTraining:
 
 @dataclass(frozen=True, slots=True)
 class ResumeTraining:
-    """Go on after a pause, or with a queue that waits."""
+    """Resume after a pause, or continue with a queue that waits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +83,14 @@ class StopTraining:
 
 @dataclass(frozen=True, slots=True)
 class SetLiveView:
-    """How often the clip that trains is shown anew: "off", "low" or "live". Trains on meanwhile."""
+    """How often the clip that trains is shown anew: "off", "low" or "live". Training continues meanwhile."""
 
     mode: str
 
 
 @dataclass(frozen=True, slots=True)
 class RestoreVersion:
-    """Bring back what a clip was before it was trained again; what it is now becomes a version."""
+    """Bring back an earlier version of a clip; the present one becomes a version."""
 
     clip_index: int
     version: int

@@ -38,7 +38,7 @@ def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
 
 
 def tell_dropped(dropped: Sequence[int], notices: Notices) -> None:
-    """Tell the user that clips left the queue, because what they need cannot come."""
+    """Add a notice that clips left the queue, because clips that they need cannot come."""
     if dropped:
         them, needs = ("Clip", "it needs") if len(dropped) == 1 else ("Clips", "they need")
         notices.add("warn", f"{them} {listed(dropped)} left the queue: {needs} a clip that is not trained")

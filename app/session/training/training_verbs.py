@@ -1,4 +1,4 @@
-"""TrainingVerbs: carries out what is asked of the training, its queue and the versions of clips."""
+"""TrainingVerbs: carries out commands on the training, its queue and the versions of clips."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class TrainingVerbs:
         self._live, self._versions, self._notices, self._settings = live, versions, notices, settings
 
     def obey(self, command: TrainCommand | HoldCommand) -> Question | None:
-        """Carry out a command. Returns what has to be answered first, if anything.
+        """Carry out a command. Returns the question to answer first, if any.
 
         Raises:
             EngineError: It cannot be done; says why.
