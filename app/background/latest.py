@@ -66,8 +66,8 @@ class LatestWorker(Generic[Request, Result]):
     def request(self, request: Request, *, lane: Hashable = 0) -> None:
         """Ask for a result. Never blocks for long.
 
-        The same request again changes nothing while it waits or runs, nor after it failed: asking at every frame
-        must not try in vain at every frame.
+        The same request again changes nothing while it waits or runs, nor after it failed: a request in every frame
+        must not fail in every frame.
         """
         with self._condition:
             if self._is_closed or self._pending.get(lane) == request or self._failed.get(lane) == request:

@@ -26,7 +26,7 @@ def peak_bytes(*, is_reset: bool = False) -> int:
 
 
 def peak_mb() -> float | None:
-    """Most memory this process ever held, 10^6 bytes; None where the system does not say."""
+    """Most memory this process ever held, 10^6 bytes; None where unknown."""
     with suppress(NotImplementedError):
         return round(peak_bytes() / 1e6, 1)
     return None

@@ -27,7 +27,7 @@ class ProcessUsage:
 
 
 def read_usage(pid: int | None = None) -> ProcessUsage:
-    """Of a process, this one when None. Values are None where the system does not say, or the process has ended."""
+    """Of a process, this one when None. Values are None where unknown, or where the process has ended."""
     memory_mb = cpu_s = None
     if sys.platform.startswith("linux"):
         place = f"/proc/{'self' if pid is None else pid}"

@@ -78,7 +78,7 @@ def check_paths(paths: Sequence[CameraPath]) -> None:
     """Check that paths can be kept and distinguished: each has its own name, and there are not too many.
 
     Raises:
-        ProjectError: They cannot; says why.
+        ProjectError: They cannot; states the cause.
     """
     names: set[str] = set()
     for path in paths:

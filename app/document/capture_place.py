@@ -1,4 +1,4 @@
-"""Where the capture of a project lies, as its files say it: relative to the project folder where both lie together.
+"""Where the capture of a project lies, as stored in its files: relative to the project folder where both lie together.
 
 A capture in the folder that holds the project folder, or in the project folder itself, is written as a path that
 begins with "./" or "../", so that the folder with both can be moved; any other as an absolute path.
@@ -15,7 +15,7 @@ from app.document.project_document import ProjectDocument
 
 
 def stored_place(capture: str, folder: Path) -> str:
-    """A capture's folder as the files of a project say it. folder: Of the project."""
+    """A capture's folder as stored in the files of a project. folder: Of the project."""
     home = folder.resolve()
     if not Path(capture).is_absolute() or not Path(capture).is_relative_to(home.parent):
         return capture

@@ -15,11 +15,11 @@ from engine.capture.files.frame_runs import runs_of
 PLAYING_S = 1.5
 """Playing time that is made ready ahead while it plays."""
 MAX_PLAYING, STANDING = 64, 8
-"""At most so many frames while it plays; so many once the playhead stands."""
+"""Most frames ahead while it plays, and while the playhead stands."""
 SETTLED_S = 0.3
-"""The view, and the playhead unless it plays, have to stand still so long: until then cores are for the shown frame."""
+"""The view, and the playhead unless it plays, have to rest for this long: until then cores are for the shown frame."""
 MOST_UNASKED = 30
-"""After so many turns of the loop in which nobody asked for a picture, none are drawn ahead."""
+"""After this many turns of the loop without a request for a picture, none are drawn ahead."""
 SPARE = 2
 """Frames that memory holds in addition to those that come: the one shown, and the newest."""
 
@@ -66,7 +66,7 @@ class Ahead:
         self._runs: list[tuple[int, int]] = []
 
     def note(self, view_id: Hashable, asked: AskedLook) -> None:
-        """A place on screen shows rasterized pictures in this way. It says so again for as long as it does."""
+        """A place on screen shows rasterized pictures in this way. It repeats the call for as long as it does."""
         self._asked[view_id] = asked
 
     def clear(self) -> None:

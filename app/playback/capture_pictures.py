@@ -32,7 +32,7 @@ class PictureRequest:
     Attributes:
         generation: Of the open project. Two takes with the same cameras have the same fingerprint.
         scene_gain: By which the camera's colours differ from the scene's, to be taken out; None for the picture as it
-            was taken. It says all that the picture depends on of a clip and its revision.
+            was taken. The picture depends on a clip's state through this alone.
     """
 
     generation: int

@@ -88,7 +88,7 @@ class LoadedClip:
     """A model in memory and its parts.
 
     Attributes:
-        colors: The cameras' rendition of the scene's colours; None where the files do not say.
+        colors: The cameras' rendition of the scene's colours; None where unknown.
         trained: The clip as cameras see it; None in the same case.
         parts: Its parts that can be decoded apart.
     """
@@ -160,7 +160,7 @@ class FrameDecoder:
         )
 
     def keep_megabytes(self, megabytes: int | None) -> None:
-        """Hold frames up to so many megabytes from the next one on; None for as many as is usual."""
+        """Limit the frames kept, in megabytes, from the next one on; None for the default."""
         self._cache.max_bytes = CACHE_BYTES if megabytes is None else megabytes << 20
 
     def frame(self, request: FrameRequest) -> ShownFrame | None:

@@ -1,4 +1,4 @@
-"""Markers: frames that the user wants to find again, to be looked up by frame. The document says which there are."""
+"""Markers: frames that the user wants to find again, to be looked up by frame. The document holds them."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class Failure:
 
     Attributes:
         title: The message to the user.
-        is_of_clip: Whether it came of the file of a clip.
+        is_of_clip: Whether the file of a clip caused it.
         is_live: Whether that file is a snapshot of a running training: it may be gone before it is read, and another
             one follows.
     """
@@ -174,7 +174,7 @@ class Playback:
     ) -> Picture | None:
         """The rasterizer's picture of the frame and view; None where nothing is trained or ready.
 
-        Stale where it is of another frame, view, size or state of the clip; it says of which.
+        Stale where it is of another frame, view, size or state of the clip; it states its source.
 
         Args:
             width, height: Its size, px.
@@ -327,7 +327,7 @@ class Playback:
 
     def cloud(self, view: OrbitView) -> PointArrays | None:
         """A cloud for frames that are not trained; None until it is made, and through a capture camera while there is
-        only the hint: the captured picture itself says more there."""
+        only the hint: the captured picture itself shows more there."""
         opened = self._opened
         if opened is None:
             return None
@@ -354,7 +354,7 @@ class Playback:
 
     def compared_picture(self, timeline: Timeline, camera_index: int, max_width: int) -> Picture | None:
         """A camera's picture at the playhead, to compare with the render: in the scene's colours where the frame is
-        trained and loaded, otherwise as it was taken. The picture says which. None until it was decoded."""
+        trained and loaded, otherwise as it was taken. The picture states which. None until it was decoded."""
         opened = self._opened
         if opened is None:
             return None

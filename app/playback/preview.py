@@ -103,7 +103,7 @@ def make_cloud(job: CloudJob, context: JobContext) -> Path:
     Args:
         context: Receives signs of life; cancelling it ends the process.
     Raises:
-        PreparationError: There is no cloud; says why.
+        PreparationError: There is no cloud; states the cause.
     """
     doing = "starting a process"
 

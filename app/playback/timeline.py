@@ -31,7 +31,7 @@ class Timeline:
         speed: Multiple of the capture's own speed, one of SPEEDS.
         in_frame, out_frame: Where playing begins and ends; None where the capture does. in_frame <= out_frame.
         around: Frames that are played over and over for the moment, regardless of in_frame and out_frame; else None.
-        is_following: Whether the playhead goes along with the training. Ends when the user moves it.
+        is_following: Whether the playhead follows the training. Ends when the user moves it.
         markers: Frames that the user wants to find again; put here by who owns the document.
     """
 

@@ -73,7 +73,7 @@ class PathsStatus:
         paths: In the user's order.
         chosen: Row of the path that is shown and edited; None without paths.
         chosen_key: Number of the key of that path that stands out; None without one.
-        along: Index of the view that goes along the chosen path with the playhead; None while none does.
+        along: Index of the view that follows the chosen path with the playhead; None while none does.
         can_edit: Whether paths can be changed now.
         why_not: Cause and remedy if they cannot.
     """
@@ -87,7 +87,7 @@ class PathsStatus:
 
     @property
     def is_along(self) -> bool:
-        """Whether a view goes along the path."""
+        """Whether a view follows the path."""
         return self.along is not None
 
     @property

@@ -198,7 +198,7 @@ class Exporting(SessionPart):
         return _Wish(self._n_asked, self._opened.generation, self.page.context, choices, self._queue.targets)
 
     def close_page(self) -> None:
-        """Ask no more."""
+        """Close the page."""
         if self.page is not None:
             self.page = None
             self._revision += 1

@@ -32,7 +32,7 @@ class SessionPart:
         """The document has changed: show the consequences."""
 
     def close_page(self) -> None:
-        """Ask no more."""
+        """Close the page."""
 
     def poll(self) -> bool:
         """Take in finished work. Whether anything visible changed."""

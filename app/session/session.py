@@ -306,7 +306,7 @@ class Session(SessionFace):
         self.project_status = self.projects.status()
 
     def lead_view(self) -> bool:
-        """Let the view go along the camera path, where that is wanted, after the playhead has moved. Whether anything
+        """Let the view follow the camera path, where that is wanted, after the playhead has moved. Whether anything
         changed."""
         has_changed = self.camera_paths.lead(self.views, self.timeline)
         if has_changed:

@@ -14,7 +14,7 @@ from app.document.project_document import ProjectDocument
 from engine.errors import ProjectError
 
 MIN_SINE = 1e-3
-"""Points on a line say nothing of a plane."""
+"""Points on a line do not define a plane."""
 
 
 def set_up(document: ProjectDocument, direction: Sequence[float] | None) -> ProjectDocument:

@@ -64,7 +64,7 @@ class DocumentStore:
         """The contents of the project.
 
         Raises:
-            JournalDamage, DamagedDocument: Something is damaged; app.document.storing.recovery says what is left.
+            JournalDamage, DamagedDocument: Something is damaged; see app.document.storing.recovery.
             ProjectError: The folder is not a project, or of a newer schema.
         """
         self._wait_for_writing()
@@ -169,7 +169,7 @@ class DocumentStore:
             self._known = known
 
     def _to_store(self, event: Event) -> Event:
-        """An event with the capture as the files say it, and with merge keys that are texts."""
+        """An event with the capture as stored in the files, and with merge keys as text."""
         assert self._session is not None
         match event:
             case Changed(document=document, merge=merge):

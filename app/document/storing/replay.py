@@ -29,7 +29,7 @@ class Replayed:
     """The contents of a project.
 
     Attributes:
-        history: The document and the way back; the capture as the files say it.
+        history: The document and the way back; the capture as stored in the files.
         step: Number of the last step.
         n_replayed: Steps that were taken from the journal.
         journal: The file that the next event belongs into; None where a new one has to begin.

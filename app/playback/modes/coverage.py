@@ -17,9 +17,9 @@ from app.playback.modes.arrays import AnchorArrays
 from engine.clip_files.roles import ROLES
 
 N_NEIGHBORS = 3
-"""A sphere's radius is the mean distance to so many neighbours, as in the preparation of a clip."""
+"""A sphere's radius is the mean distance to this many neighbours, as in the preparation of a clip."""
 RANGE_RADII = 10.0
-"""Distances are shown up to so many usual radii."""
+"""Distances are shown up to this many usual radii."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

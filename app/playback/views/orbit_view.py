@@ -32,7 +32,7 @@ FLAT_SHARE = 10_000.0
 before or behind the pivot is then 0.08 px from where it belongs. Depths are float32 in the rasterizers and come in
 steps of a thousandth of a radius: enough to draw, not to sort, so renderers sort by depth within the scene."""
 FLAT_REACH = 0.9
-"""An orthographic view is cut off so many scene radii before the pivot, where the cameras stand: a wall behind them
+"""An orthographic view is cut off this many scene radii before the pivot, where the cameras stand: a wall behind them
 would hide everything. Farther away where one has moved away farther."""
 FRAME_SHARE = 1.15
 """A framed subject leaves a little room at the edge."""
@@ -134,7 +134,7 @@ class OrbitView:
     @property
     def near(self) -> float:
         """Nothing nearer to the camera of `world_to_camera` than this is to be drawn, scene units; 0 where the scene
-        alone decides. Only an orthographic view, whose camera stands far away, says something else."""
+        alone decides. Above 0 only for an orthographic view, whose camera stands far away."""
         pose = self.shown_pose
         if pose.eye_distance <= pose.distance:
             return 0.0

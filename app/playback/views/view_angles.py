@@ -37,7 +37,7 @@ def angles_of(up: np.ndarray, rotation: np.ndarray) -> tuple[float, float, float
     e0, e1 = horizontal_axes(up)
     rise = float(np.clip(forward @ up, -1.0, 1.0))
     level = forward - rise * up
-    if float(np.linalg.norm(level)) < 1e-6:  # then the right hand side says where it is turned to
+    if float(np.linalg.norm(level)) < 1e-6:  # then the right direction gives the yaw
         level = cross(up, right)
         return math.atan2(float(level @ e1), float(level @ e0)), -math.copysign(math.pi / 2, rise), 0.0
     yaw, pitch = math.atan2(float(level @ e1), float(level @ e0)), -math.asin(rise)

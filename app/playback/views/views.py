@@ -70,7 +70,7 @@ class Views:
             self._drawn = before
 
     def show(self, n: int) -> None:
-        """Show so many views. New ones look as the active one does, and are independent from then on.
+        """Show this many views. New ones look as the active one does, and are independent from then on.
 
         Raises:
             ValueError: There is no such layout.

@@ -31,7 +31,7 @@ class Calibrating(SessionPart):
 
     Attributes:
         page: Shown now; None for none.
-        revision: Goes up when the page is another.
+        revision: Goes up whenever the page changes.
     """
 
     def __init__(self) -> None:

@@ -48,7 +48,7 @@ class CaptureOpening(SessionPart):
         refused: The folder that does not open, and why; None while there is none.
         pictures: Small ones of first frames, by camera.
         findings: Of the capture doctor, in the numbers alone, the worst first; None until known.
-        revision: Goes up when any of these is another.
+        revision: Goes up whenever any of these changes.
 
     Args:
         can_measure: Whether steps may be timed for a forecast.

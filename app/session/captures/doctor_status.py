@@ -21,7 +21,7 @@ class DoctorStatus:
         findings: So far; from the numbers alone before a capture was examined.
         diagnosis: None before the end.
         progress: Of the job that runs; None while none does.
-        revision: Another one whenever findings are others.
+        revision: Differs whenever the findings do.
         memory_bytes: That examining takes; 0 until known.
     """
 

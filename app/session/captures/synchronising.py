@@ -28,7 +28,7 @@ class Synchronising(SessionPart):
 
     Attributes:
         page: Shown now; None for none.
-        revision: Goes up when the page is another.
+        revision: Goes up whenever the page changes.
     """
 
     def __init__(self) -> None:

@@ -97,7 +97,7 @@ class ClipWork(SessionPart):
         """Carry out a command. Returns the question to answer first, if that is known at once.
 
         Raises:
-            ProjectError: It cannot be done; says why.
+            ProjectError: It cannot be done; states the cause.
         """
         opened, service = self._opened, self._live.service
         if opened is None or service is None:

@@ -14,7 +14,7 @@ def expected_seconds(
     """Seconds of training clips of these lengths, one after the other.
 
     Args:
-        catalog, clips: Of the project as it is; say how long a frame takes.
+        catalog, clips: Of the project as it is; give the time per frame.
         n_frames: Of each clip that would be trained.
         n_references: How many of them, at the beginning, inherit nothing.
     Returns:

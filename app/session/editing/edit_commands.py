@@ -162,7 +162,7 @@ class Redo:
 
 @dataclass(frozen=True, slots=True)
 class GoToStep:
-    """Take back so many steps of the history, or do so many again where the number is positive."""
+    """Undo steps of the history, or redo them where the number is positive."""
 
     n_steps: int
 
@@ -187,4 +187,4 @@ EditCommand = (
 """Commands that change edits, markers, labels and the world, and can be taken back."""
 
 HistoryCommand = Undo | Redo | GoToStep
-"""Commands that go along the history."""
+"""Commands that move in the history."""

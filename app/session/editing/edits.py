@@ -98,7 +98,7 @@ class Edits:
             check_acts(reach_of_edit(edit, self._reaches.clips()), edit.scope)
 
     def go(self, n_steps: int) -> None:
-        """Take back so many steps, or do so many again where the number is positive; as many as there are.
+        """Undo steps, or redo them where the number is positive; as many as there are.
 
         Raises:
             ProjectError: A step cannot be taken; those before it were.

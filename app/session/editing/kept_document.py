@@ -151,7 +151,7 @@ class KeptDocument(SessionPart):
         """The project, if something can be changed in it.
 
         Raises:
-            ProjectError: Not now; says why.
+            ProjectError: Not now; states the cause.
         """
         if self._project is None:
             raise ProjectError("No capture is open.", hint="Open a capture first; its project keeps the edits.")

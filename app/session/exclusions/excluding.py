@@ -29,7 +29,7 @@ def apply_exclusion(
     Args:
         camera_names, n_frames: Of the open capture.
     Raises:
-        ProjectError: It cannot be done; says why.
+        ProjectError: It cannot be done; states the cause.
     """
     before = document.checked().document
     after = excluded_document(before, command, camera_names, n_frames)

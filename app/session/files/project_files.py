@@ -67,7 +67,7 @@ class ProjectFiles:
         """Carry out a command.
 
         Raises:
-            ProjectError: Not now; says why.
+            ProjectError: Not now; states the cause.
         """
         match command:
             case AskSaveAs():

@@ -41,7 +41,7 @@ class ProjectMending(SessionPart):
 
     Attributes:
         page: Shown now; None for none.
-        revision: Goes up when the page is another.
+        revision: Goes up whenever the page changes.
     """
 
     def __init__(self, live: LiveTraining, overlays: Callable[[], Overlays]) -> None:
@@ -94,7 +94,7 @@ class ProjectMending(SessionPart):
         """Carry out a command.
 
         Raises:
-            ProjectError: It cannot be done; says why.
+            ProjectError: It cannot be done; states the cause.
         """
         match command:
             case AskMend(after=after, frames=frames):

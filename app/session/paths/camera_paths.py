@@ -1,4 +1,4 @@
-"""CameraPaths: the camera paths of the open project, which of them is edited, and a view that goes along it."""
+"""CameraPaths: the camera paths of the open project, which of them is edited, and a view that follows it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class CameraPaths(SessionPart):
         self._document = document
         self._chosen: int | None = None
         self._key: int | None = None
-        self._along: tuple[int, OrbitView] | None = None  # the view that goes along, and its index
+        self._along: tuple[int, OrbitView] | None = None  # the view that follows the path, and its index
         self._led: tuple[ViewPlace, Any] | None = None  # where it was put, and for which frame and path
 
     @property
@@ -47,7 +47,7 @@ class CameraPaths(SessionPart):
         return PathsStatus(paths, chosen, key, along, not why_not, why_not)
 
     def apply(self, command: PathCommand, views: Views, timeline: Timeline) -> None:
-        """Carry out a command on what the current view shows.
+        """Carry out a command for the current view.
 
         Raises:
             ProjectError: It cannot be done now, or is not valid.
@@ -96,11 +96,11 @@ class CameraPaths(SessionPart):
             self._chosen = changed[0]
 
     def lead(self, views: Views, timeline: Timeline) -> bool:
-        """Bring the view that goes along to where the path is at the playhead. It goes along no more when somebody
-        else has moved it, when it is not shown any more, and when the path is gone.
+        """Move the following view to where the path is at the playhead. It stops following when it was moved otherwise,
+        when it is not shown any more, and when the path is gone.
 
         Returns:
-            Whether the view was moved, or that has ended.
+            Whether the view was moved, or has stopped following.
         """
         if self._along is None:
             return False

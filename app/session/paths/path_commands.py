@@ -116,7 +116,7 @@ class ChooseCameraKey:
 
 @dataclass(frozen=True, slots=True)
 class LookAlongPath:
-    """Let the view go along the chosen path with the playhead, until the user moves it; or stop that."""
+    """Let the view follow the chosen path with the playhead, until the user moves it; or stop that."""
 
     is_on: bool = True
 

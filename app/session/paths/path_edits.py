@@ -46,7 +46,7 @@ def edited(status: PathsStatus, command: c.PathEdit, view: OrbitView, timeline: 
         timeline: Its playhead is where keys go, and its played frames are those of presets.
 
     Raises:
-        ProjectError: It is not valid now; says why.
+        ProjectError: It is not valid now; states the cause.
     """
     match command:
         case c.NewCameraPath(name=name):

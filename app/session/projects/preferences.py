@@ -1,7 +1,7 @@
 """The user's preferences for all projects: theme, keys, layouts of the panels, memory for decoded frames. A checked
 JSON file next to the other preferences.
 
-Knows no window: names of keys and actions, and layouts, are plain values that mean something to `ui` alone.
+Knows no window: names of keys and actions, and layouts, are plain values that only `ui` understands.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class PreferencesFile:
     """The preferences and the file they are kept in.
 
     Attributes:
-        values: Changed in place; `save` writes them if they are others than those on disk.
+        values: Changed in place; `save` writes them if they differ from those on disk.
         failure: Why they could not be written; empty while they could.
 
     Args:

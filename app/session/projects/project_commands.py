@@ -49,7 +49,7 @@ class LeaveTraining:
 
 @dataclass(frozen=True, slots=True)
 class AskStartOver:
-    """Ask with which settings training is to start over, and show what is discarded."""
+    """Ask which settings to start training over with, and show what is discarded."""
 
 
 @dataclass(frozen=True, slots=True)

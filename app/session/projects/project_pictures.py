@@ -32,7 +32,7 @@ class ProjectPictures:
 
     Attributes:
         found: By folder, pictures that were read; those of folders without one are left out.
-        revision: Goes up when `found` is another.
+        revision: Goes up whenever `found` changes.
     """
 
     def __init__(self) -> None:

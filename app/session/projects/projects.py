@@ -111,7 +111,7 @@ class Projects(SessionPart):
         """Carry out a command.
 
         Raises:
-            EngineError: It cannot be done; says why.
+            EngineError: It cannot be done; states the cause.
         """
         if isinstance(command, ForgetRecent):
             self.recent.forget(Path(command.folder))
@@ -144,7 +144,7 @@ class Projects(SessionPart):
         """Carry out a command on the files of the project.
 
         Raises:
-            ProjectError: It cannot be done; says why.
+            ProjectError: It cannot be done; states the cause.
         """
         self._asked.put(None)
         if isinstance(command, SaveProjectAs):  # the copy would hold half-written files

@@ -1,7 +1,7 @@
 """The window as it was when last used: its size, layout and scale, and for each project the frame, the views and the
 overlays. A checked JSON file next to the preferences; a project that may only be read has its place, too.
 
-Knows no window: sizes and the layout are plain values that mean something to `ui` alone.
+Knows no window: sizes and the layout are plain values that only `ui` understands.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ WRITING_TIMEOUT_S = 5.0
 
 @dataclass
 class WindowMemory:
-    """The values, read once; `save` writes them if they are others than those on disk.
+    """The values, read once; `save` writes them if they differ from those on disk.
 
     A file that is damaged counts as empty, never as a failure; so does a value in it that is not valid.
 

@@ -77,7 +77,7 @@ class SetContent:
 
 @dataclass(frozen=True, slots=True)
 class SetFrameMemory:
-    """Keep decoded frames up to so many megabytes; None for as many as is usual."""
+    """Limit the decoded frames kept, in megabytes; None for the default."""
 
     megabytes: int | None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 LASTS_S = 2.0
-"""For so long after the view or the playhead has moved."""
+"""For this long after the view or the playhead has moved."""
 
 
 class Attention:

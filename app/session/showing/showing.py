@@ -95,7 +95,7 @@ class Showing(SessionPart):
             self.residuals.open(self._opened, self._live.service.catalog)
 
     def follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
-        """Show the document's markers, let views stand upright as it says, and judge residuals by its exclusions."""
+        """Show the document's markers, let views stand upright by it, and judge residuals by its exclusions."""
         if before.settings == after.settings and before.exclusions != after.exclusions:
             if self._live.service is not None:
                 self._live.service.catalog.judge_anew()

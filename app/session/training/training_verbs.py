@@ -48,7 +48,7 @@ class TrainingVerbs:
         """Carry out a command. Returns the question to answer first, if any.
 
         Raises:
-            EngineError: It cannot be done; says why.
+            EngineError: It cannot be done; states the cause.
         """
         live, service = self._live, self._live.service
         match command:
