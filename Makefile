@@ -9,6 +9,8 @@ SETUP_FLAGS :=
 WORKERS := 2
 # Files as a whole, so that what a file builds for its tests is built once; in the order of tests/conftest.py.
 PYTEST := $(BIN)/python -m pytest --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder
+# Children of tests would compile every module again.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:

@@ -53,6 +53,7 @@ def test_surfaces_lie_where_the_truth_has_them_and_become_the_picture(supersampl
     assert np.array_equal(rounded, camera.image(30))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in CHANGES if name != "none"])
 def test_a_change_is_its_factor_on_the_unchanged_pictures(footage: CameraFootage, name: str) -> None:
     change = changed(name)
@@ -145,6 +146,7 @@ def test_light_changes_where_it_should() -> None:
         assert (change.camera_gains == 1).all()
 
 
+@pytest.mark.slow
 def test_the_parcel_appears_in_the_middle_of_a_clip_and_something_always_moves() -> None:
     parcel = SCENE.parts[SCENE.part_index("gift")]
     first = next(frame_index for frame_index in range(N_FRAMES) if parcel.pose(frame_index) is not None)
@@ -160,6 +162,7 @@ def test_there_is_no_change_of_another_name() -> None:
         changed("fog")
 
 
+@pytest.mark.slow
 def test_captures_are_written_alike_each_time_and_open(tmp_path: Path) -> None:
     scene = make_long_scene(size=(48, 36), n_cameras=4, n_frames=6, clip_length=3)
     chosen = {name: make_change(name, scene) for name in ("none", "daylight")}

@@ -32,6 +32,7 @@ def revision_of(session) -> str:
     return "" if shown is None else shown.revision
 
 
+@pytest.mark.slow
 def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
     from engine.model import decoder
 

@@ -110,6 +110,7 @@ def test_names_reach_the_terminal_written_out():
     assert stream.getvalue() == "cam\\x1b[31m \\ud800\n"
 
 
+@pytest.mark.slow
 def test_a_camera_name_cannot_command_the_terminal(capture_folder, tmp_path):
     import shutil
 

@@ -256,6 +256,7 @@ def test_training_a_finished_clip_again_is_asked_first(make_session):
     assert session.training.state != "idle"
 
 
+@pytest.mark.slow
 def test_a_damaged_clip_is_shown_as_such_and_only_trained_again_when_confirmed(make_session):
     session = make_session(name="own")
     session.dispatch(SetClipLength(2))
@@ -280,6 +281,7 @@ def test_a_damaged_clip_is_shown_as_such_and_only_trained_again_when_confirmed(m
     poll_until(session, lambda: session.clip_states[1].state == "trained", what="the clip")
 
 
+@pytest.mark.slow
 def test_a_clip_whose_arrays_turn_out_to_be_damaged_is_shown_as_such(make_session):
     session = make_session(name="own")
     session.dispatch(SetClipLength(3))

@@ -8,6 +8,7 @@ import re
 import subprocess
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -79,9 +80,15 @@ def python_files() -> list[Path]:
     return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
+@cache
+def parsed(source: str) -> ast.Module:
+    """Rules look at the same files."""
+    return ast.parse(source)
+
+
 def banned_uses(source: str) -> Iterator[str]:
     """Describe each banned import, call or attribute in `source`, as "line: what"."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(parsed(source)):
         match node:
             case ast.Import(names=names):
                 modules = [alias.name for alias in names]
@@ -158,7 +165,7 @@ def test_rule_accepts_innocent_source(innocent: str) -> None:
 def test_a_public_class_name_means_one_thing() -> None:
     places: dict[str, list[str]] = {}
     for path in python_files():
-        for node in ast.parse(path.read_text("utf-8")).body:
+        for node in parsed(path.read_text("utf-8")).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
     assert len(places) > 500, "the classes were not found"

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.skipif(not can_mount(), reason="needs root, to mount sm
 SETTINGS = ProjectSettings(capture="none", fingerprint="none")
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_while_somebody_edits(tmp_path: Path) -> None:
     with full_disk(tmp_path, 160) as disk:
         project = create_project(disk / "project", SETTINGS)

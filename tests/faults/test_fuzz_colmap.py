@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.faults.fuzz_colmap import run_case
 from tests.faults.tally import run_cases
 
 
+@pytest.mark.slow
 def test_no_damaged_model_is_more_than_a_message(tmp_path: Path) -> None:
     tally = run_cases("fuzz_colmap", run_case, n_cases=60, seed=5, work_dir=tmp_path)
     assert [f"{outcome.verdict}: {outcome.what}: {outcome.detail}" for outcome in tally.faults] == []

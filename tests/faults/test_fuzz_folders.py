@@ -13,6 +13,7 @@ from tests.faults.fuzz_project import make_project
 from tests.faults.tally import run_cases
 
 
+@pytest.mark.slow
 def test_nothing_outside_of_a_project_is_touched_whatever_its_folders_are(tmp_path: Path) -> None:
     tally = run_cases("fuzz_folders", run_case, n_cases=80, seed=7, work_dir=tmp_path)
     assert [f"{outcome.verdict}: {outcome.what}: {outcome.detail}" for outcome in tally.faults] == []

@@ -13,6 +13,7 @@ from tests.faults.kill_editing import KillTest
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a process that is killed there ends otherwise")
 
 
+@pytest.mark.slow
 def test_what_is_edited_outlives_a_kill(tmp_path: Path) -> None:
     test = KillTest(tmp_path, random.Random(3))
     test.run(6)

@@ -63,6 +63,7 @@ def test_growth_is_seen_whatever_the_noise():
     assert [growth.name for growth in growths(samples(0.0), warm_up=12) if growth.share > MAX_GROWTH] == []
 
 
+@pytest.mark.slow
 def test_what_is_not_closed_is_counted(tmp_path):
     before = held_now()
     files = [(tmp_path / f"{n}.txt").open("w") for n in range(7)]

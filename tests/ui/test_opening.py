@@ -84,6 +84,7 @@ def type_into(pilot: Pilot, name: str, text: str) -> None:
     pilot.key(key.RETURN)
 
 
+@pytest.mark.slow
 def test_enter_takes_what_is_offered_and_escape_nothing(asked: Pilot) -> None:
     asked.key(key.RETURN)
     assert asked.sent(OpenCapture) == opened(OFFERED)
@@ -94,6 +95,7 @@ def test_enter_takes_what_is_offered_and_escape_nothing(asked: Pilot) -> None:
     assert asked.sent(CloseQuestion) == [CloseQuestion()]
 
 
+@pytest.mark.slow
 def test_numbers_are_typed_and_held_to_what_there_is(asked: Pilot) -> None:
     type_into(asked, "opening.first", "10")
     type_into(asked, "opening.last", "1000")
@@ -106,6 +108,7 @@ def test_numbers_are_typed_and_held_to_what_there_is(asked: Pilot) -> None:
     assert asked.session.opening.asked[-1].frames == (10, 30)
 
 
+@pytest.mark.slow
 def test_frames_of_another_shape_are_asked_about(asked: Pilot) -> None:
     assert "opening.fit" not in asked.rects
     report = replace(make_report(), misfit_px=8.0)
@@ -118,6 +121,7 @@ def test_frames_of_another_shape_are_asked_about(asked: Pilot) -> None:
     assert asked.sent(OpenCapture) == opened(replace(OFFERED, fit="cropped_end"))
 
 
+@pytest.mark.slow
 def test_frames_of_quite_another_shape_have_no_usual_answer(asked: Pilot) -> None:
     report = replace(make_report(), misfit_px=80.0, needs_fit=True)
     asked.session.opening.page = OpeningPage(report, OFFERED, is_new_project=True, follow_links=True)
@@ -130,6 +134,7 @@ def test_frames_of_quite_another_shape_have_no_usual_answer(asked: Pilot) -> Non
     assert asked.sent(OpenCapture) == opened(replace(OFFERED, fit="scaled"))
 
 
+@pytest.mark.slow
 def test_keys_in_a_list_choose_and_do_not_answer_the_dialog(asked: Pilot) -> None:
     report = replace(make_report(), misfit_px=8.0)
     asked.session.opening.page = OpeningPage(report, OFFERED, is_new_project=True, follow_links=True)
@@ -146,6 +151,7 @@ def test_keys_in_a_list_choose_and_do_not_answer_the_dialog(asked: Pilot) -> Non
     assert asked.sent(OpenCapture) == opened(replace(OFFERED, fit="cropped_end"))
 
 
+@pytest.mark.slow
 def test_cameras_are_held_out_on_the_map_and_in_the_list(asked: Pilot) -> None:
     box = asked.rects["opening.map"]
     places, _ = seen_from_above(make_report())
@@ -160,6 +166,7 @@ def test_cameras_are_held_out_on_the_map_and_in_the_list(asked: Pilot) -> None:
     assert asked.sent(OpenCapture) == opened(OpeningAnswers(None, 0.5, 10, ("cam00", "cam05")))
 
 
+@pytest.mark.slow
 def test_by_keyboard_alone_a_camera_is_held_out_and_enter_only_accepts(asked: Pilot) -> None:
     asked.click("opening.none")
     asked.draw(2)
@@ -172,6 +179,7 @@ def test_by_keyboard_alone_a_camera_is_held_out_and_enter_only_accepts(asked: Pi
     assert len(command.answers.holdout) == 1
 
 
+@pytest.mark.slow
 def test_too_few_cameras_cannot_be_accepted(asked: Pilot) -> None:
     for row in range(5):
         if NAMES[row] != "cam03":
@@ -226,6 +234,7 @@ def test_why_a_folder_does_not_open_is_shown_and_videos_can_be_calibrated(open_p
     assert len(session.notices) == 0
 
 
+@pytest.mark.slow
 def test_files_outside_are_allowed_by_a_button_only(open_pilot: Callable[..., Pilot]) -> None:
     session = FakeSession(has_capture=False)
     pilot = open_pilot(session)
@@ -263,6 +272,7 @@ def show(pilot: Pilot, page: CalibrationPage | None, progress: JobStatus | None 
     pilot.draw(4)
 
 
+@pytest.mark.slow
 def test_a_calibration_from_options_to_the_capture(open_pilot: Callable[..., Pilot]) -> None:
     pilot = open_pilot(FakeSession(has_capture=False))
     folder = Path("/videos/garden")
@@ -311,6 +321,7 @@ def test_a_calibration_that_has_failed_is_kept_only_when_chosen(open_pilot: Call
     assert pilot.sent(CloseQuestion) == [CloseQuestion()]
 
 
+@pytest.mark.slow
 def test_a_calibration_that_is_there_is_replaced_only_where_that_is_said(open_pilot: Callable[..., Pilot]) -> None:
     pilot = open_pilot(FakeSession(has_capture=False))
     folder = Path("/videos/garden")
@@ -326,6 +337,7 @@ def test_a_calibration_that_is_there_is_replaced_only_where_that_is_said(open_pi
     assert pilot.sent(CloseQuestion) == [CloseQuestion()]
 
 
+@pytest.mark.slow
 def test_the_first_screen_leads_to_calibration(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -340,6 +352,7 @@ def test_the_first_screen_leads_to_calibration(
     assert pilot.sent(OpenCapture) == []
 
 
+@pytest.mark.slow
 def test_offsets_are_shown_and_corrected_by_keyboard(pilot: Pilot) -> None:
     folder = Path("/captures/100% kitchen")
     sure = OffsetRow("50%s", 2.0, 0.05, 0.97, "audio", is_sure=True)

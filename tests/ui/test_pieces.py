@@ -98,6 +98,7 @@ def test_text_that_names_no_key_is_refused(label: str) -> None:
         parse_key(label)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", ["ui.main", "ui.__main__"])
 def test_importing_the_entry_point_loads_no_torch_and_no_window(module: str) -> None:
     code = (
@@ -109,6 +110,7 @@ def test_importing_the_entry_point_loads_no_torch_and_no_window(module: str) -> 
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
 def test_the_window_itself_needs_no_torch() -> None:
     code = (
         "import sys, pyglet\n"
@@ -150,6 +152,7 @@ def test_without_a_display_the_demo_runs_instead(monkeypatch: pytest.MonkeyPatch
     assert [str(path) for path, _, _ in seen] == ["some_capture"]
 
 
+@pytest.mark.slow
 def test_the_headless_job_prints_no_log_records() -> None:
     script = """
 import logging, sys, types

@@ -67,6 +67,7 @@ def picks(project: Project, clip_index: int, role: str, numbers: np.ndarray) -> 
     return Picked((PickedRows(clip_index, origin(project, clip_index), role, pack_rows(numbers)),))
 
 
+@pytest.mark.slow
 def test_what_is_seen_stays_the_same_and_the_clips_become_smaller(folder: Path) -> None:
     project = open_project(folder)
     give(
@@ -95,6 +96,7 @@ def test_what_is_seen_stays_the_same_and_the_clips_become_smaller(folder: Path) 
     project.close()
 
 
+@pytest.mark.slow
 def test_headers_say_what_is_left_and_dependants_fit(folder: Path) -> None:
     project = open_project(folder)
     give(project, Edit(1, "", picks(project, 0, "static", np.arange(0, 800)), Delete()))
@@ -108,6 +110,7 @@ def test_headers_say_what_is_left_and_dependants_fit(folder: Path) -> None:
     project.close()
 
 
+@pytest.mark.slow
 def test_an_edit_that_holds_in_a_part_of_a_clip_stays_in_the_stack(folder: Path) -> None:
     project = open_project(folder)
     give(
@@ -126,6 +129,7 @@ def test_an_edit_that_holds_in_a_part_of_a_clip_stays_in_the_stack(folder: Path)
     project.close()
 
 
+@pytest.mark.slow
 def test_versions_bring_back_what_was_deleted(folder: Path) -> None:
     project = open_project(folder)
     give(project)
@@ -153,6 +157,7 @@ def test_versions_bring_back_what_was_deleted(folder: Path) -> None:
     project.close()
 
 
+@pytest.mark.slow
 def test_applying_twice_has_nothing_left_to_do(folder: Path) -> None:
     project = open_project(folder)
     give(
@@ -166,6 +171,7 @@ def test_applying_twice_has_nothing_left_to_do(folder: Path) -> None:
     project.close()
 
 
+@pytest.mark.slow
 def test_where_a_clip_is_not_trained_the_reference_keeps_its_anchors(folder: Path) -> None:
     project = open_project(folder)
     give(project, Edit(1, "", picks(project, 0, "static", np.arange(0, 800)), Delete()))
@@ -194,6 +200,7 @@ class Killed(BaseException):
     """The program ended here."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_done", [0, 1, 2])
 def test_a_program_that_ends_during_the_exchange_ends_it_when_it_is_opened(
     folder: Path, n_done: int, monkeypatch: pytest.MonkeyPatch
@@ -221,6 +228,7 @@ def test_a_program_that_ends_during_the_exchange_ends_it_when_it_is_opened(
     project.close()
 
 
+@pytest.mark.slow
 def test_a_program_that_ends_before_the_exchange_has_changed_nothing(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -265,6 +273,7 @@ def test_a_damaged_list_is_a_typed_error(folder: Path) -> None:
     assert not (folder / "exchange").exists()
 
 
+@pytest.mark.slow
 def test_picks_hold_for_a_mended_clip_and_for_what_it_was(folder: Path) -> None:
     """Mending gives a clip another look and leaves its anchors in their rows."""
     project = open_project(folder)

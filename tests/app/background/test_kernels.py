@@ -94,6 +94,7 @@ main.main({arguments})
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "start",
     [

@@ -74,6 +74,7 @@ def test_a_collector_that_was_off_stays_off(collector: None):
     assert not gc.isenabled()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_libraries_are_there_before_their_packages_and_the_packages_still_load():
     script = """

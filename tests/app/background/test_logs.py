@@ -41,6 +41,7 @@ def no_handlers():
         logger.setLevel(level)
 
 
+@pytest.mark.slow
 def test_several_processes_share_a_log_beyond_its_size(tmp_path):
     path = tmp_path / "clipgstream.log"
     writers = [

@@ -30,6 +30,7 @@ def test_every_command_has_a_module_with_arguments_and_work(name: str) -> None:
     assert callable(module.run)
 
 
+@pytest.mark.slow
 def test_only_the_command_in_use_is_imported() -> None:
     modules = {command.module for command in COMMANDS.values()}
     assert loaded_by() & modules == set()

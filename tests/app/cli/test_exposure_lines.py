@@ -4,6 +4,7 @@ import json
 import re
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from app.cli.captures.exposure_lines import curve_signs, exposure_document, exposure_lines
@@ -48,6 +49,7 @@ def test_the_curve_spans_its_signs():
     assert curve_signs(np.zeros(3)) == "___"
 
 
+@pytest.mark.slow
 def test_inspecting_measures_the_pictures_of_a_capture(run, tmp_path):
     folder = write_capture(tmp_path / "ring", size=(64, 48))
     wall = np.random.default_rng(0).integers(60, 160, (6, 8, 3)).repeat(8, 0).repeat(8, 1)

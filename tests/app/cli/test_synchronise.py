@@ -45,6 +45,7 @@ def test_offsets_are_found_shown_and_applied(run, tmp_path):
     assert "All cameras are synchronised." in out
 
 
+@pytest.mark.slow
 def test_plain_videos_need_no_calibration_but_cannot_be_corrected(run, tmp_path):
     folder = shifted_capture(tmp_path / "videos", [0.0, 2.0])
     (folder / "cameras.json").unlink()
@@ -74,6 +75,7 @@ def test_a_video_without_a_rate_is_named(run, tmp_path, fault):
     assert err.strip().count("\n") == 0
 
 
+@pytest.mark.slow
 def test_links_out_of_the_folder_are_followed_only_when_allowed(run, tmp_path):
     folder = shifted_capture(tmp_path / "videos", [0.0, 2.0])
     (folder / "cameras.json").unlink()

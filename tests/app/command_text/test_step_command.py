@@ -57,7 +57,7 @@ def held(project: Project) -> ProjectDocument:
 
 def pasted(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> int:
     """Let a real shell take the line apart, then carry the command out in this process."""
-    (folder / "clipgstream").write_text(f"#!{sys.executable}\n{TELL}\n")
+    (folder / "clipgstream").write_text(f"#!{sys.executable} -S\n{TELL}\n")
     (folder / "clipgstream").chmod(0o755)
     done = subprocess.run(
         ["sh", "-c", line],

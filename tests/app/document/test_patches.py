@@ -27,7 +27,7 @@ def exact(value: Any) -> str:
     return json.dumps(value, sort_keys=True)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150)
 @given(plain, plain)
 def test_a_patch_makes_one_value_of_another_to_the_last_sign(before: Any, after: Any) -> None:
     kept = exact(before)

@@ -64,6 +64,7 @@ def is_over(said: list[Event]) -> bool:
     return bool(said) and not isinstance(said[-1], ExportGoesOn)
 
 
+@pytest.mark.slow
 def test_it_writes_and_tells_how_far_it_is(start: Start, tmp_path: Path):
     said = until(start(), is_over)
     ending = said[-1]
@@ -75,6 +76,7 @@ def test_it_writes_and_tells_how_far_it_is(start: Start, tmp_path: Path):
     assert steps[-1] == ExportProgress(2, 2, "clips")
 
 
+@pytest.mark.slow
 def test_a_killed_process_is_reported_and_what_it_began_disappears(start: Start, tmp_path: Path):
     process = start()
     until(process, bool)  # it is at work
@@ -102,6 +104,7 @@ def test_a_cancelled_process_ends_and_leaves_nothing(start: Start, tmp_path: Pat
     assert list((tmp_path / "out").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_cannot_be_written_is_told_in_words(start: Start, tmp_path: Path):
     (tmp_path / "file").write_text("x")
     ending = until(start(out=tmp_path / "file" / "m.csv"), is_over)[-1]

@@ -130,6 +130,7 @@ def test_masks_tell_moving_standing_and_appearing_parts() -> None:
         make_truth(scene, 0, 0).mask("teapot")
 
 
+@pytest.mark.slow
 def test_only_what_moves_or_appears_changes_the_picture() -> None:
     scene = small_scene()
     camera = SceneCamera(scene, 3, supersampling=2)
@@ -150,6 +151,7 @@ def test_coverage_agrees_with_the_masks_of_pixel_centres() -> None:
     assert not mask[share == 0].any()
 
 
+@pytest.mark.slow
 def test_a_small_capture_is_written_and_matches_what_was_rendered(tmp_path: Path) -> None:
     truth_dir = tmp_path / "truth"
     shape = {"size": (96, 72), "n_cameras": 4, "n_frames": 4, "clip_length": 2, "supersampling": 2}
@@ -175,6 +177,7 @@ def test_a_small_capture_is_written_and_matches_what_was_rendered(tmp_path: Path
     ]
 
 
+@pytest.mark.slow
 def test_writing_twice_gives_the_same_bytes(tmp_path: Path) -> None:
     shape = {"size": (64, 48), "n_cameras": 2, "n_frames": 3, "clip_length": 2, "supersampling": 2}
     for name in ("a", "b"):
@@ -189,6 +192,7 @@ def test_yuv_of_known_colours() -> None:
     assert to_yuv444(colors)[:, 0].T.tolist() == [[235, 128, 128], [16, 128, 128], [81, 90, 240]]
 
 
+@pytest.mark.slow
 def test_shipped_sample_is_what_the_generator_makes() -> None:
     document = json.loads((SAMPLE / "cameras.json").read_text())
     assert document == json.loads(json.dumps(cameras_document(SHIPPED)))

@@ -29,6 +29,7 @@ def test_births_and_changes_belong_to_the_gaussians_of_every_part(content: str, 
     assert parts.changes(found.gaussians, found.rows).shape == (len(found.gaussians),)
 
 
+@pytest.mark.slow
 def test_static_and_dynamic_together_are_everything() -> None:
     _, state = reference()
     parts = parts_of(*source(state), state)

@@ -12,6 +12,8 @@ from app.playback.markers import Markers
 from app.playback.timeline import SEAM_REACH, SPEEDS, Timeline
 from engine.capture.clip import split_clips
 
+MANY_CLIPS = split_clips(1_000_000, 100)
+
 
 def timeline_of(n_frames: int = 100, fps: float = 10.0) -> Timeline:
     return Timeline(split_clips(n_frames, 10), fps=fps)
@@ -24,7 +26,7 @@ def timeline_of(n_frames: int = 100, fps: float = 10.0) -> Timeline:
     direction=st.sampled_from([1, -1]),
 )
 def test_the_frames_gone_are_those_of_the_time_that_passed(ticks, fps, speed, direction):
-    timeline = Timeline(split_clips(1_000_000, 100), fps=fps)
+    timeline = Timeline(MANY_CLIPS, fps=fps)
     timeline.speed = speed
     timeline.seek(500_000)
     timeline.shuttle(direction)
@@ -37,7 +39,7 @@ def test_the_frames_gone_are_those_of_the_time_that_passed(ticks, fps, speed, di
 
 
 def test_an_hour_of_ticks_ends_on_the_frame():
-    timeline = Timeline(split_clips(1_000_000, 100), fps=29.97)
+    timeline = Timeline(MANY_CLIPS, fps=29.97)
     timeline.toggle_play()
     for _ in range(3600 * 60):
         timeline.tick(1 / 60)

@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 from app.playback.timeline import Timeline
 from engine.capture.clip import split_clips
 
+MANY_CLIPS = split_clips(100_000, 10)
+
 
 def test_an_empty_timeline_stands_still():
     timeline = Timeline()
@@ -29,7 +31,7 @@ def test_every_frame_lies_in_exactly_the_clip_that_is_named(n_frames, clip_lengt
 
 @given(st.lists(st.floats(0.0, 0.2), max_size=60), st.floats(1.0, 120.0))
 def test_ticks_add_up_to_the_time_that_passed(ticks, fps):
-    timeline = Timeline(split_clips(100_000, 10), fps=fps)
+    timeline = Timeline(MANY_CLIPS, fps=fps)
     timeline.toggle_play()
     for dt_s in ticks:
         timeline.tick(dt_s)

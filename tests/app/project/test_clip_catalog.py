@@ -68,6 +68,7 @@ def test_every_state_is_the_one_by_definition(tmp_path: Path, seed: int) -> None
     assert states(ClipCatalog(project, n_clips)) == expected
 
 
+@pytest.mark.slow
 def test_a_thousand_clips_that_go_on_from_each_other_are_read_in_one_pass(tmp_path: Path) -> None:
     n_clips = 1000
     project = make_chain(tmp_path, n_clips)

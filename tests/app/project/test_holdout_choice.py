@@ -17,6 +17,7 @@ def rig_of(poses: list[np.ndarray]) -> CameraRig:
     return CameraRig(names, np.stack(poses), np.stack([K] * n), np.tile(np.array([[32, 24]]), (n, 1)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n_cameras", "n_held_out"), [(2, 0), (5, 0), (6, 1), (12, 1), (13, 2), (36, 3)])
 def test_so_many_as_a_rig_can_spare(n_cameras: int, n_held_out: int) -> None:
     found = suggested_holdout(rig_of(ring(n_cameras)))

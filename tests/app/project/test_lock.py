@@ -233,6 +233,7 @@ def test_a_folder_made_ready_by_two_is_the_project_of_one(tmp_path, monkeypatch)
     project.close()
 
 
+@pytest.mark.slow
 def test_many_processes_and_kills_never_make_two_owners():
     command = [sys.executable, "-m", "tests.faults.lock_stress", "--attempts", "600", "--seed", "1"]
     run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=ROOT)

@@ -24,6 +24,7 @@ def document(project):
     return evaluate_project(opened, clip_indices=[0, 1], on_progress=lambda *_: None)
 
 
+@pytest.mark.slow
 def test_means_are_those_of_an_evaluation(open_residuals, document):
     opened = open_residuals()
     names = opened.opened.rig.names
@@ -72,6 +73,7 @@ def test_error_and_luminance_are_of_the_picture_that_is_measured(open_residuals,
     assert row["psnr"] == pytest.approx(-10 * np.log10(((picture - truth) ** 2).mean()), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_two_clips_at_one_instant(open_residuals, document):
     opened = open_residuals()
     for row in document["seams"]["rows"]:

@@ -203,6 +203,7 @@ def test_while_a_clip_trains_it_is_held_back_where_training_has_every_core(open_
     assert not poll(opened, is_busy=True).is_held_back
 
 
+@pytest.mark.slow
 def test_kept_figures_are_there_without_measuring(open_residuals, launched, project):
     document = evaluate(project)
     opened = open_residuals(launch=launched)
@@ -217,6 +218,7 @@ def test_kept_figures_are_there_without_measuring(open_residuals, launched, proj
     assert status.message == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("metrics", ["all", "quick"])
 def test_the_held_out_psnr_of_a_clip_is_the_evaluations_everywhere(open_residuals, launched, project, capsys, metrics):
     few = 20.0
@@ -259,6 +261,7 @@ def test_quick_figures_are_shown_and_flip_is_measured(open_residuals, launched, 
     assert not launched.all[0].job.pairs.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [b"{", b"\xff\xfe\x00", b"[" * 5000])
 def test_damaged_figures_are_told_once_and_measured_again(open_residuals, launched, project, damage):
     evaluate(project)

@@ -131,6 +131,7 @@ def test_figures_are_those_of_eval_and_eval_takes_them_up(project):
         np.testing.assert_array_equal(values, read.cells[column])
 
 
+@pytest.mark.slow
 def test_without_keeping_nothing_is_written(project):
     heard = Heard()
     measure(job_of(project, is_kept=False), heard)
@@ -147,6 +148,7 @@ def test_only_what_is_not_known_is_measured(project):
     assert [e.pair.frame_index for e in heard.measured if e.pair is not None] == [3]
 
 
+@pytest.mark.slow
 def test_what_the_user_looks_at_comes_first_even_in_the_middle(project):
     heard = Heard(MeasuringFocus(0, 2), then=MeasuringFocus(1, 3), after=2)
     measure(job_of(project), heard)

@@ -95,6 +95,7 @@ def test_a_clip_that_cannot_be_read_is_told_once_and_marked(open_session, launch
     assert len(session.notices) == 1
 
 
+@pytest.mark.slow
 def test_a_clip_has_heat_while_it_trains_and_what_is_gone_is_no_fault(make_session, monkeypatch):
     monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
     monkeypatch.setattr(keeper, "SNAPSHOT_SHARE", 1.0)

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from app.project.opening.project_access import open_project
 from app.scripting.scripted_project import open_scripted
 from tests.app.conftest import inline
@@ -54,6 +56,7 @@ def test_the_program_on_the_page_of_scripts(tmp_path, monkeypatch):
     assert len(list((tmp_path / "frames").glob("*.spz"))) == 2
 
 
+@pytest.mark.slow
 def test_it_says_why_it_cannot(tmp_path):
     environment = {"PYTHONPATH": str(ROOT), "XDG_DATA_HOME": str(tmp_path), "PATH": "/usr/bin:/bin"}
     done = subprocess.run(

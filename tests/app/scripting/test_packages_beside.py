@@ -24,6 +24,7 @@ def run_beside(folder: Path, script: str, *names: str) -> subprocess.CompletedPr
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("app", "engine"), ("app.py",), ()])
 def test_packages_of_the_same_names_are_not_in_the_way(tmp_path: Path, names: tuple[str, ...]) -> None:
     script = """
@@ -51,6 +52,7 @@ def test_one_that_was_imported_before_is_named(tmp_path: Path, names: tuple[str,
     assert said.endswith(str(tmp_path / names[0]))
 
 
+@pytest.mark.slow
 def test_child_processes_use_the_packages_of_the_program_too(tmp_path: Path) -> None:
     script = """
 from pathlib import Path

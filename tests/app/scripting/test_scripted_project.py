@@ -259,6 +259,7 @@ def clipgstream_changed(project: ScriptedProject, settings):
     return Changed("move the capture", replace(project.document, settings=settings))
 
 
+@pytest.mark.slow
 def test_a_training_whose_process_dies(untrained):
     with open_scripted(untrained, launch=_crashing) as project:
         with pytest.raises(TrainingError, match="ended by signal 9"):
@@ -314,6 +315,7 @@ def test_what_is_deleted_goes_for_good(trained):
             project.restore_version(0, 9)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_mended(trained):
     with opened(trained) as project:
         wrong: Any = ({}, {"boundary": 1, "frames": range(3)}, {"frames": range(0, 6, 2)})

@@ -117,6 +117,7 @@ def test_a_process_of_its_own_examines_and_says_what_is_wrong(session) -> None:
     assert session.doctor_status.diagnosis.n_pictures == session.capture.n_frames * len(session.rig)
 
 
+@pytest.mark.slow
 def test_a_process_that_cannot_read_the_capture_says_why(session, tmp_path) -> None:
     shutil.rmtree(session.capture.path)
     session.dispatch(ExamineCapture())

@@ -105,6 +105,7 @@ def test_one_jumps_to_any_step(session):
     assert len(session.edits.edits) == 4
 
 
+@pytest.mark.slow
 def test_five_hundred_steps_back_and_forth_are_the_same_documents(session):
     random = np.random.default_rng(0)
     texts = [json_text(plain_document(session.document.content))]

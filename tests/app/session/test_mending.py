@@ -94,6 +94,7 @@ def test_a_seam_is_asked_about_before_anything_happens(session: Session) -> None
     assert fingerprint(session) == before
 
 
+@pytest.mark.slow
 def test_a_mended_clip_is_shown_compared_and_taken_back(session: Session) -> None:
     before = fingerprint(session)
     page = mend(session)
@@ -118,6 +119,7 @@ def test_a_mended_clip_is_shown_compared_and_taken_back(session: Session) -> Non
     assert page_of(session).state == "reverted"
 
 
+@pytest.mark.slow
 def test_what_was_picked_in_a_clip_is_not_lost_by_mending_it(session: Session) -> None:
     picked = Picked((PickedRows(1, fingerprint(session), "residual", pack_rows(np.arange(2))),))
     session.dispatch(AddEdit(Hide(), picked))
@@ -131,6 +133,7 @@ def test_what_was_picked_in_a_clip_is_not_lost_by_mending_it(session: Session) -
     assert session.edits.lost == ()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_mended_says_why(session: Session, make_session: Make) -> None:
     session.dispatch(AskMend(after=2))
     assert "Clip 2 has no boundary" in list(session.notices)[-1].detail

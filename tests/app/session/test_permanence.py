@@ -47,6 +47,7 @@ def n_static(session: Session) -> int:
     return 0 if found is None else len(found)
 
 
+@pytest.mark.slow
 def test_it_is_asked_first_and_then_done(session: Session):
     session.dispatch(AddEdit(Delete(), picked(session, np.arange(4))))
     session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(3, 6))))
@@ -94,6 +95,7 @@ def test_edits_that_have_lost_their_picks_are_named(session: Session):
     assert session.edits.lost == (LostPicks(2, (1,), is_all=True),)
 
 
+@pytest.mark.slow
 def test_clips_stay_as_long_as_the_disk_does_not_keep_what_was_edited(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:

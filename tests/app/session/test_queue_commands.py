@@ -71,6 +71,7 @@ def test_without_a_capture_every_command_is_told_that_there_is_nothing(make_sess
     assert session.clip_curves(0) is None
 
 
+@pytest.mark.slow
 def test_all_clips_are_trained_with_a_forecast_for_the_whole_of_it(session: Session) -> None:
     poll_until(session, lambda: session.queue.everything is not None and session.queue.everything.n_steps > 0)
     everything = session.queue.everything
@@ -148,6 +149,7 @@ def test_a_clip_moved_before_what_it_needs_waits_no_more(session: Session) -> No
     assert titles(session)[-1] == "Clips 3, 4, 5 left the queue: they need a clip that is not trained"
 
 
+@pytest.mark.slow
 def test_a_failed_clip_shows_its_reason_and_the_others_go_on(make_session: Make) -> None:
     def fails(job, store, report):
         training = make_fake(job, store, report)
@@ -165,6 +167,7 @@ def test_a_failed_clip_shows_its_reason_and_the_others_go_on(make_session: Make)
     assert "Training failed" in titles(session)
 
 
+@pytest.mark.slow
 def test_training_a_clip_with_other_settings_asks_what_has_to_be_known(session: Session) -> None:
     session.dispatch(TrainAll())
     wait_idle(session)
@@ -190,6 +193,7 @@ def test_training_a_clip_with_other_settings_asks_what_has_to_be_known(session: 
     assert "There is no clip 99" in session.notices[-1].detail
 
 
+@pytest.mark.slow
 def test_a_version_comes_back_and_dependants_are_out_of_date_as_after_training(session: Session) -> None:
     session.dispatch(TrainClips((0, 1)))
     wait_idle(session)
@@ -220,6 +224,7 @@ def test_a_version_comes_back_and_dependants_are_out_of_date_as_after_training(s
     poll_until(session, lambda: not session.jobs and session.clip_versions(0) == ())
 
 
+@pytest.mark.slow
 def test_the_reference_does_not_change_under_a_clip_that_trains(make_session: Make) -> None:
     def slow_later(job, store, report):
         return make_fake(job, store, report) if job.clip_index == 0 else make_slow(job, store, report)

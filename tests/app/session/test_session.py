@@ -138,6 +138,7 @@ def test_a_source_clip_waits_for_its_reference(make_session):
     poll_until(session, lambda: all(state.state == "trained" for state in session.clip_states))
 
 
+@pytest.mark.slow
 def test_stopping_keeps_what_was_learned_and_training_goes_on_there(make_session):
     session = make_session(make_training=make_slow)
     session.dispatch(TrainNextClip())
@@ -225,6 +226,7 @@ def test_training_the_reference_again_makes_source_clips_stale(make_session):
     assert session.training.next_clip_index == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goes_on", [True, False])
 def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_session, goes_on):
     session = make_session()
@@ -244,6 +246,7 @@ def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_sessi
     assert [state.state for state in session.clip_states] == ["trained", "trained"] + [later] * (n_clips - 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends_by", ["stopping", "failing"])
 def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_finished(make_session, ends_by):
     session = make_session()

@@ -98,6 +98,7 @@ def test_live_states_are_told_apart(six: OpenedProject) -> None:
     assert service.catalog[2].resume_step
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_workers", [1, 2, 3])
 def test_the_command_line_trains_several_and_begins_none_after_a_failure(six: OpenedProject, n_workers: int) -> None:
     def fails(job, store, report):

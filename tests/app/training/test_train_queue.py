@@ -78,6 +78,7 @@ def test_waiting_clips_are_moved_and_taken_out() -> None:
     assert not queue.is_held, "an empty queue holds nothing"
 
 
+@pytest.mark.slow
 def test_clips_are_trained_in_the_order_they_were_put_in(six: OpenedProject) -> None:
     service = make_service(six)
     assert service.enqueue_all(range(6)) == []

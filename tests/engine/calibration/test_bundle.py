@@ -25,6 +25,7 @@ def adjusted(seen: Seen, lens: str, **expect) -> tuple[Cameras, np.ndarray]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "lens", "most_deg"),
     [
@@ -58,11 +59,13 @@ def test_wrong_sightings_do_not_pull() -> None:
     assert np.median(errors) < 0.5
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_shared_lens_are_the_same_for_all() -> None:
     cameras, _ = adjusted(make_seen("forward", "simple"), "simple", groups=(0,) * 12)
     assert np.ptp(cameras.lens_params) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_cameras_of_one_group_share_a_lens_and_groups_do_not() -> None:
     cameras, _ = adjusted(make_seen("forward", "simple"), "simple", groups=(0, 1) * 6)
     assert np.ptp(cameras.lens_params[::2]) == pytest.approx(0.0, abs=1e-12)

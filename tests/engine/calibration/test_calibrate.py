@@ -23,6 +23,7 @@ def scratch(tmp_path, monkeypatch) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_pictures_without_anything_in_them_say_what_is_missing(tmp_path: Path, scratch: Path) -> None:
     for name in ("a", "b", "c"):
         (tmp_path / "grey" / name).mkdir(parents=True)

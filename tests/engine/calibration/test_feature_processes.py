@@ -21,6 +21,7 @@ def pictures() -> CameraPictures:
     return CameraPictures(wall, (part,))
 
 
+@pytest.mark.slow
 def test_a_process_finds_key_points_of_background_and_moments() -> None:
     shares: list[float] = []
     found = feature_processes.key_points(pictures(), "cam0", shares.append)

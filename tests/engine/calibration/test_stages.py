@@ -44,6 +44,7 @@ def test_stages_follow_each_other_and_a_late_word_takes_nothing_back() -> None:
     assert told[-1].done == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_every_frame_that_is_read_counts(tmp_path) -> None:
     write_corner(tmp_path)
     shares: list[float] = []

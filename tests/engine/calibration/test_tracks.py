@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from engine.calibration.matching.matching import KeyPoints, match_all
 from engine.calibration.solving.tracks import build_tracks, fitting_matches
@@ -42,6 +43,7 @@ def test_only_points_of_equal_times_are_matched() -> None:
         np.testing.assert_array_equal(lists[a].moments[rows[:, 0]], lists[b].moments[rows[:, 1]])
 
 
+@pytest.mark.slow
 def test_a_wrong_match_costs_a_sighting_and_not_the_track() -> None:
     seen, lists, _ = made_key_points(n_looks=1000)
     matches = match_all(lists)

@@ -51,6 +51,7 @@ def points() -> np.ndarray:
     return np.random.default_rng(3).uniform(-0.8, 0.8, (200, 2))
 
 
+@pytest.mark.slow
 def test_models_agree_with_colmap(points: np.ndarray) -> None:
     asked = json.dumps([[[model, params] for model, params, _ in CASES], points.tolist()])
     told = subprocess.run([sys.executable, "-c", _CHILD], input=asked, capture_output=True, text=True, check=True)

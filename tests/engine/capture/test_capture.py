@@ -176,6 +176,7 @@ def test_panoptic_uses_the_frames_that_all_cameras_have_when_cut_alike(make_pano
     assert "lists 4 frames, the first 3" in capture.warnings[0]
 
 
+@pytest.mark.slow
 def test_real_dome_capture() -> None:
     folder = Path(__file__).parents[3] / ".." / "shared" / "data" / "panoptic_basketball"
     if not folder.is_dir():

@@ -36,6 +36,7 @@ def by_colmap(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["binary", "text"])
 def test_every_model_of_colmap_projects_as_in_colmap(by_colmap: Path, kind: str) -> None:
     rig = read_rig(by_colmap / kind)
@@ -69,6 +70,7 @@ LENSES = (
 )
 
 
+@pytest.mark.slow
 def test_colmap_reads_what_is_written(tmp_path: Path) -> None:
     scene = make_scene(lens="pinhole", names=[f"cam{row}" for row in range(len(LENSES))])
     object.__setattr__(scene, "lenses", LENSES)

@@ -272,6 +272,7 @@ def test_an_image_that_claims_to_be_huge(make_panoptic: MakeCapture) -> None:
         capture.frame(1, 1)
 
 
+@pytest.mark.slow
 def test_a_message_repeats_no_megabytes(make_sample: MakeCapture) -> None:
     def edit(document: dict[str, Any]) -> None:
         document["fps"] = "x" * 2_000_000
@@ -393,6 +394,7 @@ def test_an_exif_rotation_is_said(make_panoptic: MakeCapture, pictures: Callable
     assert "32x48 frames, its calibration is for 48x32. An EXIF entry turns them" in message
 
 
+@pytest.mark.slow
 def test_a_long_list_of_missing_frames_is_one_sentence(make_panoptic: MakeCapture) -> None:
     def edit(documents: dict[str, dict[str, Any]]) -> None:
         for document in documents.values():

@@ -173,6 +173,7 @@ def test_missing_folders_and_pipes_are_refused(tmp_path: Path) -> None:
             read_points(tmp_path / name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ply", "bin", "txt"])
 def test_no_more_memory_than_twice_the_file(tmp_path: Path, kind: str) -> None:
     points = np.random.default_rng(2).normal(size=(10_000, 3))

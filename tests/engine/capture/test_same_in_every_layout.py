@@ -104,6 +104,7 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> CopiedScene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "layout", [pytest.param(name, marks=[pytest.mark.slow] * (name == "colmap_frames")) for name in LAYOUTS]
 )
@@ -120,6 +121,7 @@ def test_the_sample_is_the_same_in_every_layout(tmp_path: Path, sample: CopiedSc
             assert np.array_equal(capture.frame(row, frame_index), sample.picture(row, frame_index))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layout", "like"),
     [

@@ -40,6 +40,7 @@ def test_a_point_falls_where_it_fell(tmp_path: Path, layout: str) -> None:
     assert capture.format == FORMATS[layout.split("-")[0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["easyvolcap-opencv5", "anipose-fisheye", "transforms-opencv4"])
 def test_undistorted_pictures_show_the_scene_where_a_pinhole_camera_sees_it(tmp_path: Path, layout: str) -> None:
     """A point's colour in the undistorted picture is the one that it has in the stored picture."""

@@ -59,6 +59,7 @@ def test_a_video_of_masks_and_smaller_masks(make_sample: MakeCapture) -> None:
     assert not mask[:, width // 2 + 1 :].any()
 
 
+@pytest.mark.slow
 def test_masks_go_where_the_lens_puts_the_picture(make_sample: MakeCapture) -> None:
     folder = make_sample(n_cameras=3, n_frames=4)
     size = open_capture(folder).picture_size

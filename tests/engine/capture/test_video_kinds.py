@@ -169,6 +169,7 @@ def test_colours_come_back_as_they_were_coded(tmp_path, matrix, is_full, n_bits,
     assert np.abs(found.astype(int) - image)[is_inner].max() <= (2 if n_bits == 8 else 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "matrix"), [(1, "BT.601"), (20, "BT.709")])
 def test_unstated_colours_follow_the_size(tmp_path, scale, matrix):
     image = np.kron(patches(0), np.ones((scale, scale, 1), np.uint8))

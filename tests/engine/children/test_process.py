@@ -94,6 +94,7 @@ def test_a_child_without_an_answer_is_a_reason(how, reason, is_final) -> None:
     assert caught.value.is_final == is_final
 
 
+@pytest.mark.slow
 def test_what_a_child_refuses_is_raised_as_it_raised_it(tmp_path) -> None:
     with pytest.raises(CaptureError) as caught:
         run_child(AT_ONCE, Ask("refuse", tmp_path))
@@ -117,6 +118,7 @@ def test_one_that_stands_still_is_ended() -> None:
         run_child(AT_ONCE, Ask("sleep"), stall_s=0.5)
 
 
+@pytest.mark.slow
 def test_one_that_works_and_says_nothing_does_not_stand_still() -> None:
     child = ChildProcess(AT_ONCE, Ask("spin"))
     assert first_event(child) == "working"
@@ -139,6 +141,7 @@ def test_whoever_gives_up_leaves_no_process(kind) -> None:
     assert not is_alive(pids[0])
 
 
+@pytest.mark.slow
 def test_one_that_tidies_up_has_time_for_it(tmp_path) -> None:
     child = ChildProcess(TIDY, Ask("tidy up", tmp_path / "tidy"))
     pid = int(first_event(child))
@@ -171,6 +174,7 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="processes have no groups there")
 def test_in_a_terminal_ctrl_z_halts_both_and_ctrl_c_is_for_the_parent_to_understand(tmp_path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -105,6 +105,7 @@ def test_the_smallest_changes_are_none_and_larger_ones_do_not_jump():
     assert np.abs(np.diff(kept)).max() < 2.01 * (logs[1] - logs[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("picture", [np.zeros((40, 60, 3)), np.full((40, 60, 3), 255.0)], ids=["black", "white"])
 def test_pictures_that_cannot_tell_say_no_change(picture):
     look = at_working_size(taken(scene(), np.ones(3)))[:40, :60]

@@ -87,6 +87,7 @@ def test_where_no_light_changes_every_anchor_keeps_its_colours(measure):
     assert (measure.at(frames(no_light)) == 0).mean() > 0.99
 
 
+@pytest.mark.slow
 def test_people_in_front_of_some_cameras_are_no_light(measure):
     def with_people(row):
         taken = [picture.copy() for picture in frames(no_light)(row)]
@@ -98,6 +99,7 @@ def test_people_in_front_of_some_cameras_are_no_light(measure):
     assert (measure.at(with_people) == 0).mean() > 0.98
 
 
+@pytest.mark.slow
 def test_what_few_cameras_see_and_what_they_do_not_agree_on_stays(measure):
     at_odds = [pictures(evenly(0.2 * (row % 5 - 2)), 9)[row] for row in range(N_CAMERAS)]
     assert (measure.at(lambda row: [at_odds[row]]) == 0).all()

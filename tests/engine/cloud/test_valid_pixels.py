@@ -91,6 +91,7 @@ def test_hulls_ask_only_cameras_that_see_the_place() -> None:
     assert len(carve(masks & is_valid, projections, grid, is_valid=is_valid, **options)) == 0  # nor does it support
 
 
+@pytest.mark.slow
 def test_no_point_of_the_static_cloud_comes_from_pixels_that_are_not_valid() -> None:
     from engine.assets import asset_path
     from engine.capture.capture import open_capture

@@ -50,6 +50,7 @@ def look_of(films: list[np.ndarray]) -> PictureSurvey:
     return PictureSurvey(_Capture(make_rig(len(films), (128, 96))), frames, spread, cameras, {})  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_films_in_which_all_goes_well_raise_no_alarm() -> None:
     look = look_of([film(camera) for camera in range(5)])
     assert check_frozen(look) == check_black(look) == check_movement(look) == []

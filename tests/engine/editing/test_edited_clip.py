@@ -92,6 +92,7 @@ def test_every_action_on_every_target(action: str, target: str, is_inverted: boo
             assert_same(clip.decode(clip_time, effects_of(effect)), truth.at((effect,), clip_time))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("has_light", [False, True])
 def test_stacks(seed: int, has_light: bool) -> None:

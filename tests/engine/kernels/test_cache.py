@@ -123,6 +123,7 @@ def real_kernel_files() -> list[str]:
     return sorted(path.relative_to(engine).as_posix() for path in held)
 
 
+@pytest.mark.slow
 def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     changed = ""
     texts_on_disk = cache._python_texts

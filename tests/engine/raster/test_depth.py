@@ -62,6 +62,7 @@ def outcome(scene: GaussianScene, backend: str, dtype: torch.dtype) -> tuple[lis
     return [picture.detach() for picture in pictures], gradients(leaves)
 
 
+@pytest.mark.slow
 def test_the_fast_back_end_matches_float64():
     scene = layered_scene(400, 80, 60, 4.0)
     exact, expected = outcome(scene, "reference", torch.float64)

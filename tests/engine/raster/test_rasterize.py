@@ -81,6 +81,7 @@ def test_float32_matches_float64_forward_and_backward(truth):
     assert relative(gradient(actual.means2d), gradient(expected.means2d)) <= GRADIENT_TOLERANCE
 
 
+@pytest.mark.slow
 def test_reference_gradients_match_finite_differences():
     scene = layered_scene(60, 40, 24, 3.0)
     gaussians = leaves(scene.gaussians, torch.float64)

@@ -50,6 +50,7 @@ def weights_of(scene: GaussianScene) -> torch.Tensor:
     return torch.randn(len(scene.Ks), scene.height, scene.width, 4, generator=torch.Generator().manual_seed(1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("frozen", [False, True])
 def test_wanted_tiles_are_the_same_and_others_do_not_count(backend, frozen):
@@ -74,6 +75,7 @@ def test_wanted_tiles_are_the_same_and_others_do_not_count(backend, frozen):
         torch.testing.assert_close(got, want, rtol=1e-5, atol=1e-6 * float(want.abs().max()))
 
 
+@pytest.mark.slow
 def test_back_ends_agree_with_one_mask_per_camera():
     scene = layered_scene(120, 75, 90, 5.0)
     scene = dataclasses.replace(scene, viewmats=scene.viewmats.repeat(2, 1, 1), Ks=scene.Ks.repeat(2, 1, 1))

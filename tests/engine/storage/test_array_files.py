@@ -39,6 +39,7 @@ def test_arrays_and_texts_come_back_without_the_checksum(path: Path) -> None:
     assert (texts, sizes) == (TEXTS, {name: array.nbytes for name, array in ARRAYS.items()})
 
 
+@pytest.mark.slow
 def test_every_changed_bit_is_refused_or_changes_nothing(path: Path) -> None:
     good = path.read_bytes()
     n_accepted = 0

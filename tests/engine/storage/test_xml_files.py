@@ -21,6 +21,7 @@ def test_elements_and_attributes_come_in_order() -> None:
     assert list(root.inside("nothing", "b")) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("data", "said"),
     [

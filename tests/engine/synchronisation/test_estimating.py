@@ -19,6 +19,7 @@ def errors(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return np.abs(wrong - np.median(wrong))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_parts_of_frames_are_found_with_calibration(seed):
     rig = ring(6)
@@ -33,6 +34,7 @@ def test_parts_of_frames_are_found_with_calibration(seed):
     assert not found.is_in_step
 
 
+@pytest.mark.slow
 def test_short_recordings_are_not_in_step_because_all_begin():
     rig = ring(5)
     offsets = np.array([0.0, 6.0, 0.0, -5.0, 0.0])
@@ -40,6 +42,7 @@ def test_short_recordings_are_not_in_step_because_all_begin():
     assert errors(found.offsets_frames, offsets).max() < 0.7
 
 
+@pytest.mark.slow
 def test_cameras_in_step_are_said_to_be():
     rig = ring(5)
     found = estimate_offsets(made_recordings(rig, np.zeros(5)), fps=FPS, rig=rig)
@@ -57,6 +60,7 @@ def test_how_much_moves_tells_whole_frames_without_calibration():
     assert all(camera.sigma_frames >= 0.9 for camera in found.cameras)
 
 
+@pytest.mark.slow
 def test_uneven_times_count():
     rig = ring(4)
     offsets = np.array([0.0, 2.0, -3.0, 0.0])
@@ -79,6 +83,7 @@ def test_where_nothing_moves_nothing_is_known():
     assert found.offsets_frames.tolist() == [0, 0, 0]
 
 
+@pytest.mark.slow
 def test_a_camera_that_sees_nothing_move_stays_unknown():
     rig = ring(5)
     recordings = made_recordings(rig, [0, 3, 0, -2, 0])
@@ -95,6 +100,7 @@ def test_too_short_recordings_tell_nothing():
     assert not estimate_offsets(made_recordings(rig, [0, 0, 0], n_frames=5), fps=FPS, rig=rig).is_known
 
 
+@pytest.mark.slow
 def test_progress_is_reported_and_may_cancel():
     rig = ring(3)
     recordings = made_recordings(rig, [0, 1, 0], n_frames=30)

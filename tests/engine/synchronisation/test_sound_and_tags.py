@@ -35,6 +35,7 @@ def heard(sound: np.ndarray, delay_s: float, microphone: int) -> np.ndarray:
     return np.clip(own * generator.uniform(0.3, 0.6) + generator.normal(0, 0.004, len(own)), -1, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("codec", "suffix"), [("aac", ".mp4"), ("pcm_s16le", ".mov")])
 def test_sound_tells_offsets_to_two_milliseconds(tmp_path, codec, suffix):
     sound, paths = scene_sound(), []
@@ -48,6 +49,7 @@ def test_sound_tells_offsets_to_two_milliseconds(tmp_path, codec, suffix):
     assert np.nanmax(found.sigmas_frames) < 0.3
 
 
+@pytest.mark.slow
 def test_other_sounds_and_silence_tell_nothing(tmp_path):
     generator = np.random.default_rng(3)
     paths = [tmp_path / f"{row}.mp4" for row in range(4)]

@@ -91,6 +91,7 @@ def test_a_clip_in_which_nothing_moves_is_covered():
     assert "residual" not in model.roles()
 
 
+@pytest.mark.slow
 def test_a_clip_keeps_its_coverage_through_a_checkpoint(tiny, tmp_path):
     said: list[str] = []
     first = tiny.prepared(1, max_moving_points=60, report=lambda progress: said.append(progress.message))

@@ -16,6 +16,8 @@ from engine.metrics.clips.trained_clip import TrainedClip
 from engine.training.clip_training import ClipTraining
 from tests.engine.training.tiny_training import Tiny, finish, same_arrays, take_steps
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def own_tiny(tiny: Tiny, tmp_path_factory: pytest.TempPathFactory) -> Tiny:

@@ -71,6 +71,7 @@ def test_headless_context_is_new_enough_and_knows_its_renderer(ctx: moderngl.Con
     assert ctx.gc_mode == "context_gc"
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_everything_draws_on_plain_3_3_without_heavy_imports(ctx: moderngl.Context) -> None:
     """Mesa can be told to offer no more than 3.3, forward-compatible; other drivers ignore the variables."""

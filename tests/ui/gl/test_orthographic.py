@@ -79,6 +79,7 @@ def test_the_rasterizer_s_picture_is_that_of_a_true_orthographic_camera(view: Or
     assert psnr(image / 255.0, from_infinitely_far(view, arrays)) > 55.0
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_splats_are_drawn_as_by_a_true_orthographic_camera(view: OrbitView, ctx: moderngl.Context, keep: Keep) -> None:
     arrays = made_up(view)

@@ -61,6 +61,7 @@ def check(
         assert share_off <= MOST_PIXELS_OFF
 
 
+@pytest.mark.slow
 def test_twenty_random_views_of_what_looks_like_a_trained_clip(ctx: moderngl.Context, keep: Keep) -> None:
     check(ctx, keep, learned_like(4000, 0), random_cameras(20, SIZE, distance=2.6))
 

@@ -70,6 +70,7 @@ def test_the_last_step_of_the_window_is_done_again_by_the_command(pilot, clipboa
     assert open_project(folder, is_writable=False).document == made
 
 
+@pytest.mark.slow
 def test_from_the_menus_of_panels(pilot, clipboard):
     session, ui = pilot.session, pilot.studio.frame.ui
     session.dispatch(AddEdit(Delete(), Sphere((0.5, 0.0, 0.0), 0.25), name=NAME))
@@ -96,6 +97,7 @@ def test_from_the_menus_of_panels(pilot, clipboard):
         pilot.rects.pop(entry, None)
 
 
+@pytest.mark.slow
 def test_the_training_of_a_clip_and_an_export(pilot, clipboard):
     run_action(pilot, "train.copy_command")
     arguments = shlex.split(clipboard[-1])

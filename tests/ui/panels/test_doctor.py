@@ -70,6 +70,7 @@ def test_a_capture_is_examined_from_the_panel_and_stopped(pilot: Pilot) -> None:
     assert not [notice for notice in pilot.session.notices if notice.kind == "error"]
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_findings_offer_what_corrects_them(pilot: Pilot) -> None:
     found = diagnosis(pilot.session.rig.names)

@@ -50,6 +50,7 @@ CONTEXT_WITH_EDITS = msgspec.structs.replace(CONTEXT, has_edits=True)
 STATUS = ExportStatus(1, "Gaussians, PLY", Path("/out") / ODD)
 
 
+@pytest.mark.slow
 def test_edits_go_along_or_are_left_out(open_pilot) -> None:
     pilot = open_pilot()
     for kind, takes_edits in (("gaussians", True), ("video", True), ("player", True), ("cameras", False)):
@@ -88,6 +89,7 @@ def asked(pilot: Pilot) -> ExportChoices:
     return pilot.session.exporting.asked[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_ctrl_e_asks_and_enter_exports(pilot: Pilot) -> None:
     pilot.key(key.E, modifiers=(CTRL,))
@@ -101,6 +103,7 @@ def test_ctrl_e_asks_and_enter_exports(pilot: Pilot) -> None:
     assert not errors(pilot)
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_escape_closes_and_problems_hold_it_back(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(out="/out/g"), problems=(f"The disk of {ODD} is full.",))
@@ -113,6 +116,7 @@ def test_escape_closes_and_problems_hold_it_back(pilot: Pilot) -> None:
     assert not errors(pilot)
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_while_it_is_looked_at_nothing_can_be_exported(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(out="/out/g"))
@@ -122,6 +126,7 @@ def test_while_it_is_looked_at_nothing_can_be_exported(pilot: Pilot) -> None:
     assert not [one for one in pilot.session.commands if isinstance(one, StartExport)]
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_every_kind_is_asked_for_and_gets_a_name_unless_one_was_typed(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(out="/out/g"))
@@ -142,6 +147,7 @@ def test_every_kind_is_asked_for_and_gets_a_name_unless_one_was_typed(pilot: Pil
     assert not errors(pilot)
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_names_of_cameras_and_paths_are_shown_as_they_are(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(kind="video", out="/out/v"))
@@ -159,6 +165,7 @@ def test_names_of_cameras_and_paths_are_shown_as_they_are(pilot: Pilot) -> None:
     assert not errors(pilot)
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_names_are_shown_as_they_are_where_they_are_few(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(kind="video", out="/out/v"), context=replace_context(cameras=("a##b", "a"), paths=()))
@@ -171,6 +178,7 @@ def test_names_are_shown_as_they_are_where_they_are_few(pilot: Pilot) -> None:
     assert not errors(pilot)
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_a_turntable_has_turns(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(kind="video", out="/out/v").with_answer("from", "turntable"))
@@ -181,6 +189,7 @@ def test_a_turntable_has_turns(pilot: Pilot) -> None:
     assert job.turntable == Turntable(2.0)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_nothing_is_exported_before_there_is_a_name(pilot: Pilot) -> None:
     exporting = pilot.session.exporting
@@ -196,6 +205,7 @@ def test_nothing_is_exported_before_there_is_a_name(pilot: Pilot) -> None:
     assert pilot.session.commands[-1] == StartExport(ExportChoices(out="/out/gaussians"))
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_a_box_of_answers_takes_enter_and_escape_for_itself(pilot: Pilot) -> None:
     ask(pilot, ExportChoices(kind="video", out="/out/v"))
@@ -215,6 +225,7 @@ def test_a_box_of_answers_takes_enter_and_escape_for_itself(pilot: Pilot) -> Non
     assert [one for one in pilot.session.commands if isinstance(one, StartExport)]
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_the_panel_lists_exports_and_its_buttons_act(pilot: Pilot) -> None:
     result = ExportResult(Path("/out"), 2, 10, 41.5, (f"As {ODD}.",))
@@ -248,6 +259,7 @@ def test_the_panel_lists_exports_and_its_buttons_act(pilot: Pilot) -> None:
     assert not errors(pilot)
 
 
+@pytest.mark.slow
 @pytest.mark.gl
 def test_the_panel_is_reached_and_used_by_keyboard(pilot: Pilot) -> None:
     pilot.session.exporting.statuses = (replace(STATUS, state="failed", message="x"),)

@@ -75,6 +75,7 @@ def test_a_key_means_the_seam_that_is_played_around(pilot: Pilot) -> None:
     assert pilot.sent(AskMend) == [AskMend(after=2)]
 
 
+@pytest.mark.slow
 def test_escape_closes_what_lies_on_top_and_leaves_the_tool_after_that(pilot: Pilot) -> None:
     tool = pilot.studio.frame.ui.selecting
     tool.choose("lasso")
@@ -104,6 +105,7 @@ def test_what_runs_shows_how_far_it_is_and_can_be_stopped(pilot: Pilot) -> None:
     assert not pilot.sent(CloseMend)
 
 
+@pytest.mark.slow
 def test_a_result_can_be_compared_taken_back_and_kept(pilot: Pilot) -> None:
     show(pilot, DONE)
     for name, kind in (("compare", CompareMended), ("revert", RevertMend), ("keep", CloseMend)):
@@ -129,6 +131,7 @@ def test_figures_of_hostile_words_are_drawn_as_they_are(pilot: Pilot) -> None:
     assert not [notice for notice in pilot.session.notices if "could not be drawn" in notice.title]
 
 
+@pytest.mark.slow
 def test_a_seam_has_a_menu_in_the_list_of_residuals(pilot: Pilot) -> None:
     from pyglet.window import mouse
 

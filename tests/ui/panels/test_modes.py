@@ -34,6 +34,7 @@ def trained(open_pilot: Callable[..., Pilot]) -> Pilot:
     return open_pilot(session)
 
 
+@pytest.mark.slow
 def test_every_mode_has_a_key_of_its_own_and_leaves_the_others_theirs(trained: Pilot) -> None:
     for digit in DIGITS[: len(MODES)]:
         trained.key(digit, modifiers=(SHIFT,))
@@ -47,6 +48,7 @@ def test_every_mode_and_part_can_be_reached_from_the_table_of_actions() -> None:
     assert {f"compare.with_{name}" for name in (CAPTURED, *MODES)} <= ids
 
 
+@pytest.mark.slow
 def test_the_box_of_modes_sets_mode_and_part(trained: Pilot) -> None:
     for name, kind in (("viewport.mode.normals", SetMode), ("viewport.content.f_s", SetContent)):
         trained.click("viewport.mode")
@@ -57,6 +59,7 @@ def test_the_box_of_modes_sets_mode_and_part(trained: Pilot) -> None:
     assert trained.studio.frame.viewport.hud.text.label.endswith("f_s only, Normals")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(900, 600), (1280, 800), (1920, 1000)])
 @pytest.mark.parametrize("n_views", [1, 4])
 def test_the_toolbar_fits(size: tuple[int, int], n_views: int, open_pilot: Callable[..., Pilot]) -> None:
@@ -80,6 +83,7 @@ def test_the_toolbar_fits(size: tuple[int, int], n_views: int, open_pilot: Calla
     assert all(box.width >= 20 for box in boxes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["R", "clips"])
 @pytest.mark.parametrize(("size", "scale"), [((1600, 1000), 1.0), ((1600, 1000), 1.5), ((1600, 1000), 2.0)])
 def test_words_of_the_toolbar_are_whole_or_in_the_menu(
@@ -116,6 +120,7 @@ def test_a_row_hides_what_is_missed_least_first() -> None:
     assert fit(10.0) == RowFit(1, {"a": 60.0}, ("b", "c"))
 
 
+@pytest.mark.slow
 def test_a_bar_says_what_colours_mean_and_the_value_under_the_pointer(
     trained: Pilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -134,6 +139,7 @@ def test_a_bar_says_what_colours_mean_and_the_value_under_the_pointer(
     assert trained.rects["viewport.color_bar"].x1 <= pane.x1
 
 
+@pytest.mark.slow
 def test_comparing_with_a_mode_needs_no_camera(trained: Pilot) -> None:
     session = trained.session
     session.dispatch(SetCompareWith("depth"))
@@ -151,12 +157,14 @@ def test_comparing_with_a_mode_needs_no_camera(trained: Pilot) -> None:
     assert trained.rects["viewport.rendered"].width < 0.55 * pane.width
 
 
+@pytest.mark.slow
 def test_a_captured_picture_still_takes_the_nearest_camera(trained: Pilot) -> None:
     trained.session.dispatch(SetCompareWith(CAPTURED))
     trained.key(key.G)
     assert len(trained.sent(LookThrough)) == 1
 
 
+@pytest.mark.slow
 def test_while_b_is_held_the_other_picture_is_seen_alone(trained: Pilot) -> None:
     trained.session.dispatch(SetCompareWith("depth"))
     trained.draw(2)

@@ -48,6 +48,7 @@ def test_the_button_works_where_something_is_deleted(panel: Pilot) -> None:
     assert panel.session.commands.count(ApplyDeletions()) == n_before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("button", "command"), [("question.no", CloseQuestion()), ("question.yes", ApplyDeletions(is_confirmed=True))]
 )
@@ -59,6 +60,7 @@ def test_it_is_asked_before_clips_are_written(panel: Pilot, button: str, command
     assert panel.session.commands[n_before] == command  # the made-up session goes on asking
 
 
+@pytest.mark.slow
 def test_an_edit_that_has_lost_its_picks_looks_otherwise(panel: Pilot) -> None:
     before = panel.picture()
     show(panel, DELETES, BRIGHTENS, lost=(LostPicks(2, (1,), is_all=True),))

@@ -130,6 +130,7 @@ def _show(pilot: Pilot) -> None:
     pilot.draw(6)
 
 
+@pytest.mark.slow
 def test_a_click_on_a_cell_goes_to_its_frame_and_camera(pilot: Pilot) -> None:
     _show(pilot)
     area = pilot.rects["residuals.matrix"]
@@ -138,6 +139,7 @@ def test_a_click_on_a_cell_goes_to_its_frame_and_camera(pilot: Pilot) -> None:
     assert pilot.session.view.look_through == 5
 
 
+@pytest.mark.slow
 def test_the_worst_picture_comes_first_and_a_click_goes_there(pilot: Pilot) -> None:
     _show(pilot)
     pilot.click("residuals.worst12.5")
@@ -147,6 +149,7 @@ def test_the_worst_picture_comes_first_and_a_click_goes_there(pilot: Pilot) -> N
     assert "residuals.worst12.5" in pilot.rects
 
 
+@pytest.mark.slow
 def test_a_seam_is_played_around_as_its_worst_camera_sees_it(pilot: Pilot) -> None:
     _show(pilot)
     pilot.click("residuals.seam2")
@@ -157,6 +160,7 @@ def test_a_seam_is_played_around_as_its_worst_camera_sees_it(pilot: Pilot) -> No
     assert pilot.session.view.look_through == 5
 
 
+@pytest.mark.slow
 def test_a_heat_map_lies_over_the_picture_with_its_bar_and_the_value_under_the_pointer(pilot: Pilot) -> None:
     pilot.session.dispatch(LookThrough(2))
     pilot.key(key.RIGHT)
@@ -199,6 +203,7 @@ def test_where_there_is_no_map_the_reason_is_said_and_nothing_breaks(pilot: Pilo
     assert "viewport.heat_bar" in pilot.rects
 
 
+@pytest.mark.slow
 def test_every_kind_can_be_chosen_by_key(pilot: Pilot) -> None:
     pilot.session.dispatch(LookThrough(2))
     pilot.session.dispatch(SetFrame(4))
@@ -211,6 +216,7 @@ def test_every_kind_can_be_chosen_by_key(pilot: Pilot) -> None:
     assert len(pilot.session.notices) == 0
 
 
+@pytest.mark.slow
 def test_in_a_free_view_anchors_show_their_residual(pilot: Pilot) -> None:
     pilot.draw(3)
     before = pilot.picture()
@@ -231,6 +237,7 @@ def test_anchors_that_nobody_saw_are_left_out_and_the_hottest_come_last() -> Non
     assert colors[0, 3] < 0.5
 
 
+@pytest.mark.slow
 def test_words_of_a_heat_map_lie_over_the_wipe_and_fit_into_the_picture(
     pilot: Pilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

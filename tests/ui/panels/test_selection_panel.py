@@ -56,6 +56,7 @@ def tool(pilot: Pilot) -> SelectTool:
     return pilot.studio.frame.ui.selecting
 
 
+@pytest.mark.slow
 def test_every_button_sends_its_command(panel: Pilot) -> None:
     for name, command in (
         ("all", SelectAll()),
@@ -69,6 +70,7 @@ def test_every_button_sends_its_command(panel: Pilot) -> None:
         assert panel.session.commands[-1] == command
 
 
+@pytest.mark.slow
 def test_the_same_by_keys(panel: Pilot) -> None:
     for symbol, modifiers, command in (
         (key.A, (CTRL,), SelectAll()),
@@ -82,6 +84,7 @@ def test_the_same_by_keys(panel: Pilot) -> None:
         assert panel.session.commands[-1] == command
 
 
+@pytest.mark.slow
 def test_tools_modes_and_options(panel: Pilot) -> None:
     for kind in TOOLS:
         panel.click(f"selection.{kind}")
@@ -96,12 +99,14 @@ def test_tools_modes_and_options(panel: Pilot) -> None:
         assert getattr(tool(panel), name)
 
 
+@pytest.mark.slow
 def test_what_moves_is_selected_by_a_button(panel: Pilot) -> None:
     panel.click("selection.subtract")
     panel.click("selection.what moves")
     assert panel.sent(SelectByAttribute) == [SelectByAttribute("motion", 1.0, 1.0, How("subtract"))]
 
 
+@pytest.mark.slow
 def test_a_range_by_its_handles_and_by_numbers(panel: Pilot) -> None:
     bars = panel.rects["selection.histogram"]
     panel.drag((bars.x0 + 2, bars.center[1]), (bars.x0 + 0.25 * bars.width, bars.center[1]))
@@ -130,6 +135,7 @@ def test_the_whole_range_holds_its_ends_exactly(panel: Pilot) -> None:
     assert panel.sent(SelectByAttribute) == [SelectByAttribute("opacity", 0.0, 1.0)]
 
 
+@pytest.mark.slow
 def test_attributes_with_few_values_are_chosen_by_name(panel: Pilot) -> None:
     tool(panel).attribute = "birth"
     panel.draw(2)
@@ -140,6 +146,7 @@ def test_attributes_with_few_values_are_chosen_by_name(panel: Pilot) -> None:
     assert "selection.histogram" not in panel.rects
 
 
+@pytest.mark.slow
 def test_a_box_and_a_sphere_by_numbers(panel: Pilot) -> None:
     panel.click("selection.new_sphere")
     panel.click("selection.radius")
@@ -163,6 +170,7 @@ def test_a_box_and_a_sphere_by_numbers(panel: Pilot) -> None:
     assert isinstance(panel.sent(SelectVolume)[-1].volume, Box)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_done_is_not_offered(panel: Pilot) -> None:
     panel.session.selection = SelectionStatus()
     panel.draw(2)

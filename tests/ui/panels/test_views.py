@@ -73,6 +73,7 @@ def test_a_view_that_is_drawn_takes_the_place_of_the_active_one_even_if_drawing_
     assert views.current is first
 
 
+@pytest.mark.slow
 def test_the_pointer_makes_a_view_active_and_turns_only_that_one(pilot: Pilot) -> None:
     pilot.key(key.V)
     pilot.draw(4)
@@ -88,6 +89,7 @@ def test_the_pointer_makes_a_view_active_and_turns_only_that_one(pilot: Pilot) -
     assert pilot.session.views.active_index == 0
 
 
+@pytest.mark.slow
 def test_each_view_looks_through_its_own_camera_and_they_share_time(pilot: Pilot) -> None:
     pilot.click("viewport.views4")
     pilot.draw(4)
@@ -108,6 +110,7 @@ def test_each_view_looks_through_its_own_camera_and_they_share_time(pilot: Pilot
     assert last.y0 > first.y1
 
 
+@pytest.mark.slow
 def test_words_over_small_views_stay_in_their_view_and_parts_stay_whole(pilot: Pilot) -> None:
     from ui.panels.picture.hud import wrapped
     from ui.viewport.hud_text import PARTS

@@ -72,6 +72,7 @@ def test_endless_input_is_cut() -> None:
     assert match("a" * 10_000, "a" * (MAX_TYPED - 1)) is None
 
 
+@pytest.mark.slow
 def test_each_action_is_the_first_that_its_own_words_find() -> None:
     texts = [action.text for action in ACTIONS]
     for text in texts:

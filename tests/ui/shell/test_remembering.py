@@ -22,6 +22,7 @@ def open_again(open_pilot: Callable[..., Pilot], path: Path, **options: object) 
     return pilot
 
 
+@pytest.mark.slow
 def test_view_frame_overlays_scale_and_layout_come_back(open_pilot: Callable[..., Pilot], tmp_path: Path) -> None:
     path = tmp_path / "window.json"
     pilot = open_again(open_pilot, path)
@@ -53,6 +54,7 @@ def test_view_frame_overlays_scale_and_layout_come_back(open_pilot: Callable[...
     assert again.rects["timeline.track"].height < left["timeline.track"].height - 20
 
 
+@pytest.mark.slow
 def test_the_camera_looked_through_comes_back(open_pilot: Callable[..., Pilot], tmp_path: Path) -> None:
     path = tmp_path / "window.json"
     pilot = open_again(open_pilot, path)
@@ -61,6 +63,7 @@ def test_the_camera_looked_through_comes_back(open_pilot: Callable[..., Pilot], 
     assert open_again(open_pilot, path).session.view.look_through == 2
 
 
+@pytest.mark.slow
 def test_a_floating_panel_floats_again(open_pilot: Callable[..., Pilot], tmp_path: Path) -> None:
     path = tmp_path / "window.json"
     pilot = open_again(open_pilot, path)
@@ -92,6 +95,7 @@ def test_a_layout_that_is_none_gives_the_one_to_begin_with(
         assert pilot.rects[name] == expected[name]
 
 
+@pytest.mark.slow
 def test_a_project_opened_later_has_its_own_view(open_pilot: Callable[..., Pilot], tmp_path: Path) -> None:
     path = tmp_path / "window.json"
     pilot = open_again(open_pilot, path)

@@ -84,6 +84,7 @@ def test_taking_a_palette_changes_every_colour_that_the_panels_look_up() -> None
     assert theme.named("no such theme") is DARK
 
 
+@pytest.mark.slow
 def test_no_module_keeps_a_colour_of_the_theme() -> None:
     files = [path for path in UI.rglob("*.py") if path.name != "theme.py"]
     found = [f"{path.relative_to(UI)}:{line}" for path in files for line in kept_colors(path.read_text("utf-8"))]

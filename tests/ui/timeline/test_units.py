@@ -20,6 +20,7 @@ from ui.panels.timeline.units import (
 )
 
 FPS = st.sampled_from([1.0, 10.0, 12.5, 23.976, 24.0, 25.0, 29.97, 30.0, 50.0, 59.94, 60.0, 119.88, 240.0])
+CLIPS = split_clips(2_000_001, 100)
 
 
 @given(
@@ -53,7 +54,7 @@ def test_ticks_stand_at_round_numbers():
 @given(frame_index=st.integers(0, 2_000_000), fps=FPS, unit=st.sampled_from(UNITS))
 def test_what_is_written_is_read_as_the_same_frame(frame_index, fps, unit):
     text = format_time(frame_index, fps, unit)
-    jump = parse_jump(text, 0, split_clips(2_000_001, 100), fps)
+    jump = parse_jump(text, 0, CLIPS, fps)
     assert jump.words == ""
     # hundredths of a second cannot tell frames of a faster capture apart
     off = max(1, round(0.01 * fps)) if unit == SECONDS else 0

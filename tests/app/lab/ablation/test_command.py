@@ -69,11 +69,14 @@ def test_the_command_prints_the_table(run, runner, capture_folder):
     table, _, said = out.partition("\n\n")
     assert [line.split()[0] for line in table.splitlines()[1:]] == [FULL, "decoder-new"]
     assert said.startswith("Flicker: ")
+    assert "Here 32 x 24 px, by CPU rasterizer, 2 threads. No OpenGL: no driver." in said
+    assert runner.rated == [f"{name}-seed0" for name in (FULL, "decoder-new")]
     assert 'those of the clips of "full"' in said
     code, out, _ = run(*arguments, *settings, "--json", "--quiet")
     assert code == 0
     assert json.loads(out)["n_clips"] == 2
     assert json.loads(out)["precision"] == "float"
+    assert [line["fps_cpu"] for line in json.loads(out)["lines"]] == [12.5, 12.5]
     code, out, _ = run(*arguments, *settings, "--json", "--quiet", "--precision", "8bit")
     assert json.loads(out)["precision"] == "8bit"
     code, _, err = run(*arguments, "--set", "joint_steps=7")
@@ -84,8 +87,9 @@ def test_the_command_prints_the_table(run, runner, capture_folder):
 def test_the_reference_clip_is_that_of_every_variant_cut_alike(run, runner, capture_folder):
     code, _, err = run(
         "ablate", capture_folder, "--project", runner.folder, "--clip-length", 3, "--variants", "decoder-new,,gate-off",
-        "--reference-clip", 1, "--quiet",
+        "--reference-clip", 1, "--quiet", "--no-fps",
     )  # fmt: skip
     assert code == 0, err
+    assert runner.rated == []
     for name in (FULL, "decoder-new", "gate-off"):
         assert read_settings(project_folder(runner.folder, name, 0)).reference_clip == 1

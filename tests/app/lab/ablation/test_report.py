@@ -9,11 +9,12 @@ import pytest
 
 from app.lab.ablation import report
 from app.lab.report.write import write_report
-from tests.app.lab.report.made_up import FakePictures, Measure, Page
+from tests.app.lab.report.made_up import FakePictures, Measure, Page, draw_nothing
 
 
 @pytest.fixture
 def arguments(runner, capture_folder, monkeypatch):
+    draw_nothing(monkeypatch)
     quick = partial(write_report, measuring=Measure(), make_pictures=FakePictures)
     monkeypatch.setattr(report, "write_report", quick)
     return ["ablate", capture_folder, "--project", runner.folder, "--clip-length", 3, "--quiet"]

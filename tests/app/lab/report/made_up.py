@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import random
 import zlib
 from collections.abc import Iterator
@@ -10,9 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
+from PIL import Image
 
 from app.evaluation.evaluation import EvaluationScope, Frames
 from app.evaluation.headless import TrainedProject
+from app.lab.report.paper_figures.crop_sheet import Sheet
 from app.lab.report.write import write_report
 from app.project.opening.project_access import create_project, default_settings
 from engine.capture.capture import open_capture
@@ -164,3 +168,25 @@ def report(project: Path, measure: Measure | None = None, **options: Any) -> Pat
     )
     assert "Drawing" in stages
     return page
+
+
+def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports without charts, for tests that look at words and numbers only."""
+    buffer = io.BytesIO()
+    Image.new("RGB", (2, 2)).save(buffer, "png")
+    for module, names in {
+        "measured": ("draw_over_time", "draw_pictures"),
+        "over_clips": ("draw_over_time",),
+        "length": ("draw_over_time",),
+        "seam_parts": ("draw_over_time", "draw_maps"),
+        "costs": ("draw_stacked",),
+        "comparison": ("draw_speed_error",),
+        "paper_figures.change_maps": ("draw_change_maps",),
+        "paper_figures.features": ("draw_picture_rows",),
+        "paper_figures.over_length": ("draw_over_length",),
+    }.items():
+        for name in names:
+            monkeypatch.setattr(f"app.lab.report.{module}.{name}", lambda *_args, **_options: buffer.getvalue())
+    monkeypatch.setattr(
+        "app.lab.report.paper_figures.crops.draw_crops", lambda *_args: Sheet(buffer.getvalue(), n_times=1)
+    )

@@ -160,6 +160,7 @@ def test_lines_end_where_frames_are_missing():
     assert not crossed([0, 1, 101, 102], "frame")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_clips", [1, 30, 300])
 def test_bars_of_many_clips_stay_on_a_page(n_clips):
     with Image.open(

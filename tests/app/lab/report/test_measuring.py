@@ -6,6 +6,8 @@ import json
 import shutil
 from dataclasses import replace
 
+import pytest
+
 from app.evaluation.evaluation import EvaluationScope, is_measured
 from app.evaluation.headless import open_trained
 from app.lab.report.measured import N_PICTURES
@@ -28,6 +30,7 @@ def test_one_clip_has_no_seam(tmp_path, capture_folder, quick_charts):
     assert not list((project / "reports" / "figures").glob("seam_0*"))
 
 
+@pytest.mark.slow
 def test_many_clips_do_not_make_a_page_of_lists(tmp_path, quick_charts):
     """24 clips of three frames, of which one in the middle is not trained."""
     project = train(tmp_path / "p", write_capture(tmp_path / "capture", n_frames=72), n_clips=24)
@@ -156,6 +159,7 @@ def rows_fingerprint(project) -> str:
     return header.fingerprint
 
 
+@pytest.mark.slow
 def test_rounded_pictures_are_measured_and_kept_by_themselves(project):
     measure = Measure()
     report(project, measure)
@@ -167,6 +171,7 @@ def test_rounded_pictures_are_measured_and_kept_by_themselves(project):
     assert len(measure.asked) == 4
 
 
+@pytest.mark.slow
 def test_compared_projects_are_measured_quickly_unless_all_is_there(project, tmp_path, capture_folder):
     train(tmp_path / "more" / "a", capture_folder)
     train(tmp_path / "more" / "b", capture_folder)

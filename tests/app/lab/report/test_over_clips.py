@@ -63,6 +63,7 @@ def test_without_a_figure_there_is_no_loss(quick_charts):
     assert (row["lost_color"], row["lost_light"], row["lost_rest"]) == (pytest.approx(0.0), None, None)
 
 
+@pytest.mark.slow
 def test_exposures_are_drawn_over_the_frames_of_all_clips():
     drift = np.ones((2, 3, 3), np.float32)
     drift[0, 1:] = 1.1

@@ -68,6 +68,7 @@ def test_frames_that_were_ready_under_other_cuts_do_no_harm(session: Session) ->
     assert all(stop <= 6 for _, stop in session.cached_frames())
 
 
+@pytest.mark.slow
 def test_a_split_asks_and_undo_brings_the_trained_clip_back(session: Session) -> None:
     path = project_of(session).clip_path(1)
     before = path.read_bytes()
@@ -101,6 +102,7 @@ def test_a_merge_of_clips_that_are_not_trained_asks_nothing(make_session: Make) 
     assert titles(session) == ["The clips cannot be changed"]
 
 
+@pytest.mark.slow
 def test_another_reference_makes_everything_stale_and_one_command_trains_it(session: Session) -> None:
     session.dispatch(SetReferenceClip(2))
     question = session.question
@@ -128,6 +130,7 @@ def test_clips_are_not_cut_while_one_trains(make_session: Make) -> None:
     assert titles(session)[-1] == "The clips cannot be changed"
 
 
+@pytest.mark.slow
 def test_a_damaged_clip_is_offered_with_the_version_before_it(session: Session) -> None:
     project = project_of(session)
     session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
@@ -150,6 +153,7 @@ def test_a_damaged_clip_is_offered_with_the_version_before_it(session: Session) 
     assert [found.read_bytes() for found in (project.folder / DAMAGED).iterdir()] == [b"damaged"]
 
 
+@pytest.mark.slow
 def test_room_is_asked_about_with_its_figure_and_then_made(session: Session) -> None:
     project = project_of(session)
     session.dispatch(TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))

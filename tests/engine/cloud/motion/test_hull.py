@@ -74,6 +74,7 @@ def test_hull_contains_the_sphere_and_little_else() -> None:
     assert not is_hull[distances > 1.25 * RADIUS + 0.03].any()
 
 
+@pytest.mark.slow
 def test_coarse_blocks_lose_nothing() -> None:
     rig = dome_rig()
     masks = sphere_masks(rig, CENTER, RADIUS)
@@ -142,6 +143,7 @@ def test_colors_are_balanced_and_taken_from_visible_cameras() -> None:
     assert np.isnan(colors[2]).all()
 
 
+@pytest.mark.slow
 def test_moving_cloud_follows_the_sphere_through_the_clip() -> None:
     rig = dome_rig()
     positions = [CENTER + np.array([0.3 * m, 0.0, 0.0]) for m in range(3)]

@@ -13,6 +13,8 @@ from engine.cloud.kept_results import Arrays, do_now
 from engine.cloud.stereo.frames_cloud import FRAME_SPACING_PX, FramesCloud, build_frames_cloud, merged_frames
 from engine.errors import PreparationError
 
+pytestmark = pytest.mark.slow
+
 WIDTH, HEIGHT, FOCAL_PX = 64, 48, 64.0
 WALL_Z, BOARD_Z, BOARD_HALF = 4.0, 2.6, 0.45
 BOARD_X = (-0.6, 0.6)

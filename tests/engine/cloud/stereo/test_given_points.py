@@ -44,6 +44,7 @@ def room() -> Room:
     return Room(images, np.ones(images.shape[:3], bool), scene.rig, np.concatenate(points))
 
 
+@pytest.mark.slow
 def test_points_on_surfaces_are_used(room: Room) -> None:
     found = true_points(room.points, room.images, room.is_stable, room.rig)
     assert found.is_used

@@ -33,6 +33,7 @@ def wall_views(n_cameras: int = 4) -> tuple[np.ndarray, CameraRig]:
     return pictures, CameraRig(names, poses, np.repeat(K[None], n_cameras, axis=0), sizes)
 
 
+@pytest.mark.slow
 def test_points_of_a_textured_wall_lie_on_it() -> None:
     pictures, rig = wall_views()
     lines: list[str] = []
@@ -46,6 +47,7 @@ def test_points_of_a_textured_wall_lie_on_it() -> None:
     assert (found.errors < 2.0).all()
 
 
+@pytest.mark.slow
 def test_a_flat_picture_gives_no_points_and_says_so() -> None:
     pictures, rig = wall_views()
     lines: list[str] = []

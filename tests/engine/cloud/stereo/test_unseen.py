@@ -52,6 +52,7 @@ def test_a_wall_goes_on_beyond_the_pictures_in_its_colours(rig: CameraRig, wall:
     assert size > SPACING
 
 
+@pytest.mark.slow
 def test_there_are_as_few_as_asked_for_and_then_they_are_larger(
     rig: CameraRig, wall: tuple[np.ndarray, np.ndarray]
 ) -> None:

@@ -63,6 +63,7 @@ def test_a_lasso_far_beyond_the_picture_holds_all_of_it() -> None:
     np.testing.assert_array_equal(lasso_mask(many, SIZE), lasso_mask(many[::100], SIZE))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_brush_is_a_disc_along_a_line(seed: int) -> None:
     rng = np.random.default_rng(seed)

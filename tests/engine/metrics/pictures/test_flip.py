@@ -46,6 +46,7 @@ def test_pictures_smaller_than_the_filters_are_continued_by_their_border(size):
     assert_same(rng.random((*size, 3)), rng.random((*size, 3)))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(
     truth=hnp.arrays(np.float32, (12, 19, 3), elements=st.floats(0, 1, width=32)),

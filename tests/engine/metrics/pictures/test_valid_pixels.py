@@ -27,6 +27,7 @@ def case() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return disturbed(truth), pixels, x < 60, is_valid
 
 
+@pytest.mark.slow
 def test_what_is_rendered_where_nothing_is_seen_changes_no_figure() -> None:
     image, pixels, is_moving, is_valid = case()
     other = np.where(is_valid[..., None], image, 1.0 - image)

@@ -204,6 +204,7 @@ def test_scratch_is_used_again_for_other_pictures():
     assert torch.equal(again_grad, kept)
 
 
+@pytest.mark.slow
 def test_memory_of_a_dropped_gradient_is_used_again():
     workspace = LossWorkspace(8, 8)
     first = workspace.gradient()

@@ -96,6 +96,7 @@ def learn(cameras: TrainingCameras, truth: list[Tensor], gaussians: Gaussians, n
         cameras.settle()
 
 
+@pytest.mark.slow
 def test_wrong_cameras_are_found_again_where_the_scene_is_known() -> None:
     rig, gaussians = ring(), round_scene()
     right = cameras_of(rig)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from app.project.disk.use import ClipUse, DiskUse
 from app.session.clips.clip_commands import AskFreeSpace, CompareVersion, MergeClips, SplitClip
@@ -63,6 +64,7 @@ def test_the_brush_gives_strokes_of_its_scope() -> None:
     assert tool.radius == 0.25
 
 
+@pytest.mark.slow
 def test_the_panel_compares_frees_and_trains_what_is_stale(open_pilot: Callable[..., Pilot]) -> None:
     session = FakeSession()
     session.clip_states = [ClipStatus("trained"), ClipStatus("stale"), ClipStatus("stale")]
@@ -89,6 +91,7 @@ def test_the_panel_compares_frees_and_trains_what_is_stale(open_pilot: Callable[
     assert session.commands[-1] == MergeClips(1)
 
 
+@pytest.mark.slow
 def test_a_camera_is_excluded_from_its_menu(open_pilot: Callable[..., Pilot]) -> None:
     session = FakeSession()
     pilot = open_pilot(session)

@@ -18,6 +18,8 @@ from engine.metrics.columns import COLUMNS
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import CAMERAS, ODD_NAME, Page, change_header, report, train
 
+pytestmark = pytest.mark.slow
+
 COVERAGE = {
     "n_points": 4000,
     "n_inherited": 500,
@@ -55,7 +57,6 @@ def numbers(made: Path) -> dict[str, Any]:
     return json.loads((made / ODD_NAME / "reports" / "report.json").read_text(encoding="utf-8"))
 
 
-@pytest.mark.slow
 def test_the_page_needs_nothing_but_itself(page):
     names = {name for name, _ in page.tags}
     assert not names & {"script", "link", "iframe", "object", "base", "form", "i"}

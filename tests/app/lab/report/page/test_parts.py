@@ -86,6 +86,7 @@ def test_borders_are_the_first_frames_of_clips():
     assert clip_borders({"frame_index": [0, 1, 5, 6, 9], "clip_index": [0, 0, 1, 1, 2]}) == [5, 9]
 
 
+@pytest.mark.slow
 def test_the_range_of_error_pictures_is_locked():
     import matplotlib as mpl
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from app.lab.report.paper_figures.by_hand import InsetWindow
@@ -41,6 +42,7 @@ def test_pixels_of_a_window_are_enlarged_by_a_whole_number(rng):
     assert draw_crops(truth, window, tiles).png == sheet.png
 
 
+@pytest.mark.slow
 def test_a_window_as_large_as_the_picture_is_shown_as_it_is(rng):
     truth = rng.integers(0, 255, (300, 1300, 3), dtype=np.uint8)
     sheet = draw_crops(truth, InsetWindow("cam", 3, 0, 0, 1300, 300), [Tile("truth", "", truth)] * 2)
@@ -50,6 +52,7 @@ def test_a_window_as_large_as_the_picture_is_shown_as_it_is(rng):
     assert picture.shape[0] > 600
 
 
+@pytest.mark.slow
 def test_maps_share_one_locked_range():
     import matplotlib as mpl
 
@@ -68,6 +71,7 @@ def test_maps_share_one_locked_range():
     assert many[1] > 100_000
 
 
+@pytest.mark.slow
 def test_equal_figures_are_equal_files(rng):
     pictures = [(rng.random((24, 32, 3), np.float32), "20 dB"), (np.full((24, 32, 3), np.nan, np.float32), "")]
     panels = [
