@@ -1,1 +1,1 @@
-"""Where a trained clip differs from what the cameras took, and from its neighbours: maps, figures, seams."""
+"""Differences of a trained clip from the captured pictures and from its neighbours: maps, figures, seams."""

@@ -1,8 +1,8 @@
-"""Anchor heat: mean error and mean E of the pixels that each anchor covers, for a view from where no camera stood.
+"""Anchor heat: mean error and mean E of the pixels that each anchor covers, for views without a camera.
 
 The maps of one camera after another are spread over the anchors by the weights with which its picture was blended
-(engine.metrics.clips.anchor_shares), so that what is hidden counts for nothing. Cameras follow each other so that the
-first few stand around the whole scene; each one more refines what is shown. Made on a thread; the newest request wins.
+(engine.metrics.clips.anchor_shares), so that hidden anchors do not count. Cameras are ordered so that the first few
+stand around the whole scene; each further one refines the result. Made on a thread; the newest request wins.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from engine.metrics.clips.anchor_shares import AnchorShares
 
 ANCHOR_COLUMNS = ("error", "E")
-"""What can be shown: mean over channels of |render - captured picture|, and excess flicker; see HEAT_KINDS."""
+"""The figures: mean over channels of |render - captured picture|, and excess flicker; see HEAT_KINDS."""
 N_CAMERAS = 12
-"""Pictures that are looked at for one frame; all cameras where there are fewer. About a second each at most."""
+"""Pictures used for one frame; all cameras where there are fewer. About a second each at most."""
 MIN_PIXELS = 0.5
 """An anchor that covers less, in all cameras together, was not seen."""
 CACHE_BYTES = 64 << 20
@@ -47,8 +47,8 @@ class AnchorHeat:
         values: Mean over the pixels it covers, in 1/255; NaN where no camera sees it. [A] float32
         column: Of ANCHOR_COLUMNS.
         key: Changes when the content does.
-        clip_index, frame_index: Of what.
-        n_cameras, n_cameras_all: Cameras that were looked at so far, and those that will be.
+        clip_index, frame_index: The moment.
+        n_cameras, n_cameras_all: Cameras used so far, and in the end.
         is_stale: It is of another frame than the playhead's.
         note: Why there are no values, in a sentence; empty otherwise.
     """
@@ -91,7 +91,7 @@ class AnchorRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sums:
-    """What is known of a moment. rows: of the anchors that exist then, in the sums [A] int64."""
+    """The heat of a moment so far. rows: of the anchors that exist then, in the sums [A] int64."""
 
     n_cameras: int
     rows: np.ndarray
@@ -124,8 +124,8 @@ class AnchorHeats:
         )
 
     def anchor_heat(self, opened: OpenedProject, timeline: Timeline, column: str) -> AnchorHeat | None:
-        """What is known at the playhead; each call may ask for one more camera. Until the first was looked at, the last
-        one of this column as stale, or None.
+        """The heat so far at the playhead; each call may ask for one more camera. Before the first, the last heat of
+        this column as stale, or None.
 
         Raises:
             ValueError: There is no such column.
@@ -164,7 +164,7 @@ class AnchorHeats:
         return last
 
     def note_failure(self, request: AnchorRequest, reason: str) -> None:
-        """A picture could not be looked at; from now on it says why where there is nothing else."""
+        """Record that a picture failed; from now on the reason is given where there is nothing else."""
         self._reasons[request.moment] = reason
 
     def clear(self) -> None:

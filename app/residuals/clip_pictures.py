@@ -1,6 +1,6 @@
 """ClipPictures: renders and captured pictures of cameras as an evaluation compares them. Kept up to a number of bytes.
 
-For threads, which share one: what is loaded for playback is used, other clips are loaded here, a few at a time.
+Shared by threads: clips loaded for playback are used, others are loaded here, a few at a time.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class ClipPictures:
         """The clip of a request as cameras see it.
 
         Raises:
-            ProjectError: Its file is missing or damaged, or does not say what cameras make of its colours.
+            ProjectError: Its file is missing or damaged, or lacks the colours of the cameras.
         """
         known = self._of_playback(request)
         if known is not None:
@@ -115,7 +115,7 @@ class ClipPictures:
 
 
 def captured(capture: Capture, camera_index: int, frame_index: int) -> np.ndarray:
-    """What a camera took. [H, W, 3] float32 in 0..1
+    """The captured picture. [H, W, 3] float32 in 0..1
 
     Raises:
         CaptureError: The file is missing or damaged.

@@ -1,7 +1,7 @@
-"""Figures: what is known of every picture of a project, as arrays over frames and cameras, and the score of each seam.
+"""Figures of every picture of a project, as arrays over frames and cameras, and the score of each seam.
 
 Numbers are those of the rows of an evaluation. A reading of kept figures or a measuring hands them over clip by clip;
-what was trained again is forgotten.
+those of a clip trained again are forgotten.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class PairFigures:
 
 @dataclass(frozen=True, slots=True)
 class ClipMeasurements:
-    """What was found of one clip."""
+    """Figures of one clip."""
 
     clip_index: int
     rows: Sequence[RowFigures] = ()
@@ -71,12 +71,12 @@ def mean_excess(pair: PairRow) -> float | None:
 
 
 def row_figures(row: EvalRow, camera_index: int, *, has_flip: bool = True) -> RowFigures:
-    """What the window shows of a row. has_flip: Whether FLIP was among the figures that were measured."""
+    """A row's figures for the window. has_flip: Whether FLIP was measured."""
     return RowFigures(row.frame_index, camera_index, row.figures["psnr"], row.figures["flip"], has_flip)
 
 
 def pair_figures(pair: PairRow, camera_index: int) -> PairFigures:
-    """What the window shows of a pair."""
+    """A pair's figures for the window."""
     return PairFigures(pair.frame_index, camera_index, mean_excess(pair), pair.excess_static, pair.change_static)
 
 
@@ -97,7 +97,7 @@ class Figures:
         n_cameras: Of the capture.
         is_usable: Pictures that can be measured, because they are not excluded; None for all. [F, C] bool
         cells: By column of CELL_COLUMNS, NaN where not known. [F, C] float64
-        has_psnr, has_row, has_pair: What was measured, whether or not there is a figure; quick rows have PSNR alone.
+        has_psnr, has_row, has_pair: Whether it was measured, even without a figure; quick rows have PSNR alone.
             [F, C] bool
         is_wanted: Frames of trained clips. [F] bool
         is_wanted_pair: Frames whose pair with the frame before can be measured. [F] bool
@@ -134,7 +134,7 @@ class Figures:
         self.seams = [SeamStatus(clip.clip_index, clip.start) for clip in self.clips[1:]]
 
     def set_trained(self, trained: Iterable[int]) -> None:
-        """Say which clips are trained, and so can be measured."""
+        """Set the clips that are trained, and so can be measured."""
         known = set(trained)
         self.is_wanted[:] = self.is_wanted_pair[:] = False
         for clip in self.clips:
@@ -163,7 +163,7 @@ class Figures:
         self.revision += 1
 
     def take(self, found: ClipMeasurements) -> None:
-        """Take up what was measured of a clip. What is known already is overwritten."""
+        """Take in figures of a clip. Known ones are overwritten."""
         for row in found.rows:
             at = row.frame_index, row.camera_index
             self.cells["psnr"][at] = _number(row.psnr)
@@ -215,7 +215,7 @@ class Figures:
         return SeamStatus(later, after.start, score, ratio, int(is_in.sum()), int(is_seen.sum()), worst)
 
     def held_out_psnr(self, holdout: Sequence[int]) -> list[float | None]:
-        """What an evaluation says of each clip: mean PSNR of its frames in the held-out cameras, dB. None until every
+        """Mean PSNR of each clip's frames in the held-out cameras, dB, as in an evaluation. None until every
         one of them is measured, and without held-out cameras."""
         cameras = sorted(holdout)
         if not cameras:
@@ -225,7 +225,7 @@ class Figures:
         frames = [slice(clip.start, clip.stop) for clip in self.clips]
         return [mean_of(_known(values[found].T)) if is_in[found].all() else None for found in frames]
 
-    # ---------------------------------------------------------------- what is left
+    # ---------------------------------------------------------------- missing figures
 
     @property
     def measured(self) -> dict[str, tuple[int, int]]:

@@ -92,7 +92,7 @@ class Heat:
         return None if last is None else replace(last, is_stale=True)
 
     def note_failure(self, request: HeatRequest, reason: str) -> None:
-        """A map could not be made; from now on it says why."""
+        """Record that a map could not be made; from now on the reason is given."""
         self._reasons[request] = reason
 
     def clear(self) -> None:
@@ -106,7 +106,7 @@ class Heat:
         """End the thread."""
         self.worker.close()
 
-    # ---------------------------------------------------------------- what is needed
+    # ---------------------------------------------------------------- requests
 
     def _wanted(
         self, opened: OpenedProject, timeline: Timeline, clip: Clip, camera_index: int, kind: str
@@ -221,7 +221,7 @@ def _other_side(timeline: Timeline, clip: Clip, frame_index: int) -> int | str:
 
 
 def sentence(clause: str) -> str:
-    """A clause as a sentence of its own."""
+    """A clause as a sentence."""
     return f"{clause[:1].upper()}{clause[1:]}."
 
 

@@ -17,15 +17,15 @@ LEVEL_UNIT = "1/255"
 
 @dataclass(frozen=True, slots=True)
 class HeatKind:
-    """What a heat map can show.
+    """A kind of heat map.
 
     Attributes:
         name: Key of HEAT_KINDS.
         label: As shown to the user.
         unit: Of the values; "1" for a number without unit.
         color_map: "sequential" from nothing to much, or "signed" around zero.
-        value_range: What the colours span unless the user says otherwise: one range for all frames and cameras, so that
-            the colours themselves do not flicker.
+        value_range: Default range of the colours: one for all frames and cameras, so that the colours themselves do not
+            flicker.
         meaning: One sentence.
     """
 
@@ -40,7 +40,7 @@ class HeatKind:
 _CHANGE_RANGE = (MAP_RANGE[0] * LEVELS, MAP_RANGE[1] * LEVELS)
 """That of the report's maps."""
 _ERROR_RANGE = 51.0
-"""A fifth of what a display can show: beyond it nobody cares by how much. 20 dB is an error of about 25."""
+"""A fifth of a display's range: larger errors need no distinction. 20 dB is an error of about 25."""
 
 
 def _kinds() -> dict[str, HeatKind]:
@@ -117,12 +117,12 @@ class HeatMap:
         values: In the unit of the kind, NaN in pixels that the camera does not see; None where there is nothing to
             show. [H, W] float32
         kind: Name, see HEAT_KINDS.
-        key: What it shows; equal keys mean equal values.
-        clip_index, frame_index, camera_index: Of which picture.
+        key: Names the content; equal keys mean equal values.
+        clip_index, frame_index, camera_index: The picture.
         mean: Of the values over all pixels that the camera sees.
-        is_stale: It is not what was asked for now, but the last one of this kind and camera.
+        is_stale: It is not the requested map, but the last one of this kind and camera.
         is_extrapolated: One of the two clips was asked for an instant outside of its own frames.
-        note: Why there is none, or what has to be known about it, in a sentence; may be empty.
+        note: Why there is none, or a remark on it, in a sentence; may be empty.
     """
 
     values: np.ndarray | None

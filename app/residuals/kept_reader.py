@@ -1,4 +1,4 @@
-"""KeptReader: reads kept figures on a thread of its own, clip by clip, for whoever polls."""
+"""KeptReader: reads kept figures on its own thread, clip by clip; results are polled."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class KeptReader:
         self._thread.start()
 
     def poll(self, n_at_most: int = 20) -> list[ClipMeasurements | str]:
-        """What was read since the last call: figures, and sentences that the user should know."""
+        """Figures read since the last call, and sentences for the user."""
         found: list[ClipMeasurements | str] = []
         while len(found) < n_at_most:
             try:

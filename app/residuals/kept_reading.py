@@ -1,5 +1,5 @@
-"""Figures that were measured before, by the window or by `clipgstream eval`: read clip by clip from what evaluations
-keep in the project.
+"""Figures that were measured before, by the window or by `clipgstream eval`: read clip by clip from the project's
+evaluations.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from engine.metrics.pictures.picture import Choice  # brings torch, which only the thread needs
 
 WINDOW_METRICS: Choice = "all"
-"""What the window measures: what `clipgstream eval` measures unless it is told otherwise, so that neither measures what
-the other has. It takes half as long again as PSNR and FLIP alone would, rendering included."""
+"""Metrics of the window: the default of `clipgstream eval`, so that neither repeats the other's work. It takes
+half as long again as PSNR and FLIP alone, rendering included."""
 READ_METRICS: tuple[Choice, ...] = ("quick", WINDOW_METRICS)
-"""What is read: quick figures have PSNR and pairs too."""
+"""The choices that are read: quick figures have PSNR and pairs too."""
 
 
 def note_kept(catalog: ClipCatalog, project: Project, capture: Capture) -> None:
-    """Let a catalog know what evaluations say of its clips, as far as they are kept and can be read."""
+    """Give a catalog the kept figures of its clips, as far as they can be read."""
     trained = [index for index in range(len(catalog)) if catalog[index].state == "trained"]
     try:
         opened = open_trained(project, capture)
@@ -43,12 +43,12 @@ def note_kept(catalog: ClipCatalog, project: Project, capture: Capture) -> None:
 def read_kept(
     opened: TrainedProject, trained: Sequence[int], clip_indices: Sequence[int], say: Callable[[str], None]
 ) -> Iterator[ClipMeasurements]:
-    """What is known of some clips, one after another. A clip that is damaged is left out.
+    """Known figures of some clips, one clip after another. Damaged clips are left out.
 
     Args:
         trained: All clips that can be measured.
         clip_indices: Those that are read.
-        say: Told of what cannot be read, in sentences.
+        say: Receives sentences about files that cannot be read.
     """
     cameras = {name: index for index, name in enumerate(opened.capture.rig.names)}
     for clip_index in clip_indices:

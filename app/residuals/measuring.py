@@ -23,18 +23,18 @@ from app.training.rate import SmoothedRate
 from engine.parallel import n_cores
 
 SHARE_WHILE_BUSY = 0.05
-"""Of one core's time, while a clip trains on every core: training takes at most that much longer, whatever
-the scheduler makes of it, and the order in which things are measured shows seams long before everything is."""
+"""Share of one core's time, while a clip trains on every core: training takes at most that much longer under any
+scheduler, and the order of measuring shows seams long before everything is measured."""
 N_CORES_ENOUGH = 3
-"""From here on a training leaves one core to the window, most of which the window leaves alone."""
+"""With so many cores a training leaves one to the window, which uses little of it."""
 START_AFTER_S = 2.0
 """Quiet before the process is started: not while a project opens, nor between two clips of a queue."""
 STATUS_EVERY_S = 0.25
-"""Figures come more often than anybody looks."""
+"""Figures come more often than the status is needed."""
 RATE_TIME_CONSTANT_S = 300.0
 """Items begin slowly, with the background of a camera: a forecast by the last half minute jumps by twice its value."""
 FORECAST_AFTER_S = 60.0
-"""Of measuring at full speed: before, nobody can know how long the rest takes."""
+"""Time at full speed before the rest can be forecast."""
 
 
 class BackgroundMeasuring:
@@ -78,13 +78,13 @@ class BackgroundMeasuring:
         self._remake()
 
     def look_at(self, timeline: Timeline, camera_index: int | None) -> None:
-        """Say what the user looks at: measured first. Nothing is measured before the first call."""
+        """Set what the user looks at, which is measured first. Nothing is measured before the first call."""
         clip = timeline.clip
         if clip is not None:
             self._look = MeasuringFocus(clip.clip_index, camera_index)
 
     def poll(self, *, is_busy: bool) -> bool:
-        """Take in what was read and measured, and start what is missing. Whether the status has changed.
+        """Take in figures, and start missing work. Returns whether the status has changed.
 
         Args:
             is_busy: Whether a clip trains now, or the user looks around: cores are needed for that.
@@ -109,7 +109,7 @@ class BackgroundMeasuring:
         return True
 
     def close(self) -> None:
-        """End thread and process at once; what was measured is kept."""
+        """End thread and process at once; measured figures are kept."""
         self._end()
         self._opened = None
 
@@ -121,7 +121,7 @@ class BackgroundMeasuring:
         self._reader = self._process = self._told = None
         self._rate = SmoothedRate(RATE_TIME_CONSTANT_S)
 
-    # ---------------------------------------------------------------- what comes in
+    # ---------------------------------------------------------------- incoming
 
     def _take_catalog(self) -> None:
         """See which clips are trained, and were trained again."""
@@ -180,14 +180,14 @@ class BackgroundMeasuring:
                     self._process, self._is_given_up = None, True
         if n_new:
             if self._is_held_back:
-                self._rate.pause()  # that speed says nothing of the rest
+                self._rate.pause()  # that speed does not hold for the rest
             self._rate.update(self._figures.n_done, self._clock())
 
     def _say(self, message: str) -> None:
         if message not in self._messages:
             self._messages.append(message)
 
-    # ---------------------------------------------------------------- what goes out
+    # ---------------------------------------------------------------- outgoing
 
     def _start(self) -> None:
         """Start measuring where something is missing and nothing stands in the way."""
@@ -220,7 +220,7 @@ class BackgroundMeasuring:
         self._process = self._launch(job)
 
     def _tell(self) -> None:
-        """Tell the process what has changed since it was told last."""
+        """Send the process the changes since the last message."""
         if self._process is None or self._told is None or self._look is None:
             return
         look, share = self._told

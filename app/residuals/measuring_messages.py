@@ -17,11 +17,11 @@ class MeasureJob(msgspec.Struct, frozen=True, eq=False):
         project: Folder.
         capture, scale, frames, follow_links: How its capture is opened; the project may still name another place.
         trained: Clips that can be measured.
-        rows, pairs: What is not known, by frame and camera; pairs by the later frame. [F, C] bool
+        rows, pairs: Missing figures, by frame and camera; pairs by the later frame. [F, C] bool
         is_kept: Whether figures are written into the project.
-        look: What the user looks at.
+        look: The clip and camera that the user looks at.
         share: Of the time that may be computed, see SetShare.
-        backend: Name of what is computed with.
+        backend: Name of the back end.
     """
 
     project: str
@@ -65,7 +65,7 @@ class Trouble(msgspec.Struct, frozen=True, tag=True):
 
 
 class MeasuringEnded(msgspec.Struct, frozen=True, tag=True):
-    """Nothing is left that could be measured, or nobody is left to do it. Made by MeasuringProcess, never sent."""
+    """Nothing is left to measure, or the process has ended. Made by MeasuringProcess, never sent."""
 
 
 Command = LookAt | SetShare

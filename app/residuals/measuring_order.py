@@ -1,5 +1,5 @@
-"""What is measured first: what the user looks at, then the held-out cameras of all clips, which say where the seams
-are, then everything else; the nearest clips first.
+"""The order of measuring: the clip and camera that the user looks at, then the held-out cameras of all clips, which
+show the seams, then everything else; the nearest clips first.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ Item = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class MeasuringFocus:
-    """What the user looks at.
+    """The clip and camera that the user looks at.
 
     Attributes:
         clip_index: Under the playhead.
@@ -28,7 +28,7 @@ def first_item(items: Iterable[Item], look: MeasuringFocus, holdout: Collection[
     """The item to measure first; None without items.
 
     Args:
-        items: What is not measured yet.
+        items: Those not measured yet.
         holdout: Held-out cameras.
     """
     return min(items, key=lambda item: _rank(item, look, holdout), default=None)

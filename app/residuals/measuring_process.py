@@ -42,10 +42,10 @@ LaunchMeasuring = Callable[[MeasureJob], Measurer]
 
 
 class MeasuringProcess:
-    """A process of its own. See `Measurer`.
+    """A separate process. See `Measurer`.
 
     Args:
-        job: What to measure.
+        job: The figures to measure.
     """
 
     def __init__(self, job: MeasureJob) -> None:
@@ -72,7 +72,7 @@ class MeasuringProcess:
         return events
 
     def end(self) -> None:
-        """See `Measurer`. Figures are written whole, one by one, so that nothing but the one at hand is lost."""
+        """See `Measurer`. Figures are written whole, one by one, so that only the present one is lost."""
         self._has_ended = True
         self.child.ask_to_end()
         self.child.kill()

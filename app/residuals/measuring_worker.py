@@ -1,8 +1,8 @@
 """The process that measures: one camera of one clip after another, in the order of measuring_order, with one thread and
-only what nobody else computes with. Nothing imported here may draw anything.
+only spare computing time. Nothing imported here may draw anything.
 
-While a clip trains it keeps to a share of one core's time as well, by resting after each picture: so even where its
-memory traffic or its turns were in the training's way, they would be for that share of the time only.
+While a clip trains it also keeps to a share of one core's time, by resting after each picture: it can slow the training
+down for that share of the time at most.
 """
 
 from __future__ import annotations
@@ -63,19 +63,19 @@ def main(job: MeasureJob, parent: Parent[Event]) -> None:
 
 
 class Talking(Protocol):
-    """What the process hears and says, and when it rests."""
+    """The process's messages in both directions, and its rests."""
 
     @property
     def look(self) -> MeasuringFocus:
-        """What the user looks at."""
+        """The clip and camera that the user looks at."""
         ...
 
     def send(self, event: Event) -> None:
-        """Tell the window's process. Raises Unwanted."""
+        """Report to the window's process. Raises Unwanted."""
         ...
 
     def say(self, message: str) -> None:
-        """Tell the user, once. Raises Unwanted."""
+        """Report to the user, once. Raises Unwanted."""
         ...
 
     def rest(self) -> None:
@@ -90,7 +90,7 @@ class Talk:
         self._parent = parent
         self._look, self._share = job.look, job.share
         self._said: set[str] = set()
-        self._cpu_s = 0.0  # what was computed before it began counts too
+        self._cpu_s = 0.0  # computing before it began counts too
 
     @property
     def look(self) -> MeasuringFocus:
@@ -108,7 +108,7 @@ class Talk:
             self.send(Trouble(message))
 
     def rest(self) -> None:
-        """Take in commands, and wait for as long as the share demands for what was computed since the last call. Raises
+        """Take in commands, and rest as long as the share demands for the computing since the last call. Raises
         Unwanted."""
         spent_s = time.process_time() - self._cpu_s
         began_s = time.monotonic()
@@ -128,7 +128,7 @@ class Talk:
 
 
 class _TrainedAgain(Exception):
-    """A clip was trained again meanwhile: what is loaded is of another version than what is on disk."""
+    """A clip was trained again meanwhile: the loaded version is not the one on disk."""
 
 
 class _Clips:
@@ -160,7 +160,7 @@ class _Clips:
         return self._loaded[clip_index]
 
     def figures(self, clip_index: int) -> KeptFigures | None:
-        """Where the figures of a clip are kept; None where they are not."""
+        """Kept figures of a clip; None where none are kept."""
         if not self._is_kept:
             return None
         if clip_index not in self._figures:
@@ -175,7 +175,7 @@ class _Clips:
 
 
 def measure(job: MeasureJob, talk: Talking) -> None:
-    """Measure what the job wants, most wanted first. What cannot be read is told and left out.
+    """Measure the job's figures, most wanted first. Clips that cannot be read are reported and left out.
 
     Raises:
         CaptureError, ProjectError: The capture or the project cannot be opened.
@@ -223,8 +223,8 @@ def _items(opened: TrainedProject, trained: tuple[int, ...], wanted: np.ndarray)
 def _measure_item(
     item: Item, evaluation: Evaluation, clips: _Clips, rows: np.ndarray, pairs: np.ndarray, talk: Talking
 ) -> bool:
-    """Measure one camera of one clip; what is done is taken out of rows and pairs. False where the user looked at
-    something else before it was done."""
+    """Measure one camera of one clip; measured items leave rows and pairs. False where the user looked at something
+    else before the end."""
     clip_index, camera = item
     trained = clips.load(clip_index)
     clip, look = trained.clip, talk.look

@@ -1,4 +1,4 @@
-"""Residuals: where the open project differs from what the cameras took: maps of the picture at the playhead, heat of
+"""Residuals: differences of the open project from the captured pictures: maps of the picture at the playhead, heat of
 anchors, and figures of every picture, measured in the background.
 """
 
@@ -65,16 +65,16 @@ class Residuals:
         return None if self._opened is None else self._anchors.anchor_heat(self._opened, timeline, column)
 
     def look_at(self, timeline: Timeline, camera_index: int | None) -> None:
-        """Say what the user looks at, and that figures are wanted; see Measuring.look_at."""
+        """Set what the user looks at, and ask for figures; see Measuring.look_at."""
         self.measuring.look_at(timeline, camera_index)
 
     @property
     def status(self) -> ResidualStatus:
-        """What is measured."""
+        """Progress of the measuring."""
         return self.measuring.status
 
     def poll(self, *, is_busy: bool) -> bool:
-        """Take in what threads and the process have finished. Whether something visible changed."""
+        """Take in finished work of threads and process. Returns whether something visible changed."""
         has_changed = self.measuring.poll(is_busy=is_busy)
         seen = self._finished
         has_changed |= seen != self._seen
@@ -82,7 +82,7 @@ class Residuals:
         return has_changed
 
     def take_failures(self) -> list[Failure]:
-        """What could not be made since the last call. Of a live state nothing is told: another one follows."""
+        """Failures since the last call. Those of a live state are not reported: another one follows."""
         found = []
         for worker in self._workers:
             failure = worker.take_error()

@@ -19,7 +19,7 @@ class Arrival:
 
     Args:
         project: With its lock.
-        is_endless: A window is open: whoever sits before it makes room, or stops the training.
+        is_endless: A window is open: its user makes room, or stops the training.
         clock: Seconds; tests bring their own.
 
     Attributes:
@@ -38,7 +38,7 @@ class Arrival:
         self._begin()
 
     def poll(self) -> bool:
-        """Whether it is over: the clip is in its place, or that was given up."""
+        """Whether it is over: the clip is in its place, or was given up."""
         if self._thread is None:
             if self._retries.wait_s <= 0.0:
                 self._begin()
@@ -52,7 +52,7 @@ class Arrival:
         return not self._retries.failed(is_kept=True)
 
     def wait(self) -> None:
-        """Wait for what the thread is doing now."""
+        """Wait for the thread's present work."""
         if self._thread is not None:
             self._thread.join()
 
@@ -66,7 +66,7 @@ class Arrival:
             try:
                 is_there = take_in(self._project, self._clip_index)
             except DiskError:
-                if not remove_stages(self._project.prep_dir, self._clip_index):  # of no more use, and may fill a disk
+                if not remove_stages(self._project.prep_dir, self._clip_index):  # no longer of use, and may fill a disk
                     raise
                 is_there = take_in(self._project, self._clip_index)
             if not is_there:

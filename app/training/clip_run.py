@@ -1,4 +1,4 @@
-"""ClipRun: one clip in training as its project's owner sees it: the worker, what that said last, and the way of the
+"""ClipRun: one clip in training as its project's owner sees it: the worker, its last reports, and the way of the
 finished clip into the project."""
 
 from __future__ import annotations
@@ -85,9 +85,9 @@ class ClipRun:
 
     Attributes:
         number: In the names of live states: each worker counts its own from one.
-        step, n_steps, held_out_psnr, curves: What it has come to.
-        stage, last_step: What its worker said last.
-        pid: Process of the worker; None before it has said so.
+        step, n_steps, held_out_psnr, curves: Its progress.
+        stage, last_step: The worker's last reports.
+        pid: Process of the worker; None before it has reported it.
         ending: How it ended; None while it continues.
     """
 
@@ -110,7 +110,7 @@ class ClipRun:
 
     @property
     def clip_index(self) -> int:
-        """What is trained."""
+        """The clip in training."""
         return self.worker.job.clip_index
 
     @property
@@ -147,7 +147,7 @@ class ClipRun:
         return self.stage.message if self.ending is None else ""
 
     def take_up(self, record: ClipRecord) -> None:
-        """Begin with what an earlier run came to. record: Of the clip."""
+        """Begin with the progress of an earlier run. record: Of the clip."""
         if record.resume_step is None:
             return
         self.step, self.n_steps = record.resume_step, record.resume_n_steps
@@ -163,7 +163,7 @@ class ClipRun:
             self.worker.send(Pause())
 
     def resume(self) -> None:
-        """Go on after a pause."""
+        """Resume after a pause."""
         if self.is_paused:
             self.is_paused = False
             self.worker.send(Resume())
@@ -184,7 +184,7 @@ class ClipRun:
     # ---------------------------------------------------------------- events
 
     def poll(self, until_s: float) -> list[Event]:
-        """What is news, oldest first; an ending is the last. until_s: By time.monotonic, when to take no more."""
+        """New events, oldest first; an ending is the last. until_s: By time.monotonic, when to take no more."""
         if self._arrival is not None:
             return self._arrive(self._arrival)
         taken: list[Event] = []

@@ -1,4 +1,4 @@
-"""Which clips can be trained, and what has to be trained before them: from what lies on disk, without any queue."""
+"""Clips that can be trained, and those that must be trained before them: from the files on disk, without a queue."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def stale_clips(catalog: ClipCatalog) -> list[int]:
 
 
 def check_needed(project: Project, catalog: ClipCatalog, clip_index: int, coming: Set[int]) -> None:
-    """See that what a clip needs is trained, or comes before it.
+    """Check that the clips which a clip needs are trained, or come before it.
 
     Args:
         coming: Clips that train or wait.
@@ -54,12 +54,12 @@ def check_needed(project: Project, catalog: ClipCatalog, clip_index: int, coming
 def with_needed(
     project: Project, catalog: ClipCatalog, clip_indices: Iterable[int], coming: Set[int]
 ) -> tuple[Sequence[int], list[int]]:
-    """Those of these clips that are not finished, in the order of training, each after what it needs.
+    """The unfinished ones of these clips, in the order of training, each after the clips it needs.
 
     Args:
         coming: Clips that train or wait.
     Returns:
-        Them, and clips that were left out because they or what they need is damaged.
+        Them, and clips left out because they or clips they need are damaged.
     """
     due, order, left_out = set(due_clips(catalog)), dict[int, None](), list[int]()
     config = project.settings.config()

@@ -1,4 +1,4 @@
-"""What a worker is asked to do, made of a project as it is now."""
+"""The job of a worker, made of a project as it is now."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class TrainJob(Struct, frozen=True):
         holdout: Camera indices never trained on.
         frames: Of the capture, as in the project.
         exclusions, regions: As in the project.
-        backend: Name of what is computed with.
+        backend: Name of the back end.
         is_window_open: Leave a core, or at least right of way, to a window.
         live_view: How often snapshots are written, one of LIVE_VIEWS.
         n_beside: How many trainings share the cores, this one included.
@@ -70,7 +70,7 @@ class Pause(Struct, frozen=True, tag=True):
 
 
 class Resume(Struct, frozen=True, tag=True):
-    """Go on after Pause."""
+    """Resume after Pause."""
 
 
 class Stop(Struct, frozen=True, tag=True):
@@ -168,7 +168,7 @@ class TrainingResumed(Struct, frozen=True, tag=True):
 
 
 class ClipTrained(Struct, frozen=True, tag=True):
-    """The clip is finished, was read back and is in the store, from where the owner of the project takes it in."""
+    """The clip is finished, was read back and is in the store, from which the owner of the project takes it in."""
 
     step: int
     held_out_psnr: float | None = None
@@ -217,4 +217,4 @@ Event = (
     | WorkerDied
 )
 ENDINGS = (ClipTrained, TrainingStopped, TrainingFailed, WorkerDied)
-"""After one of these a worker says nothing more."""
+"""After one of these a worker sends nothing more."""

@@ -1,7 +1,7 @@
 """Settings that one clip of a project may have for itself: how long and how fast it learns, and what it adds.
 
-What clips share stays the project's: sizes of features and decoder, cameras, colours, the gate, and how clips inherit.
-A clip trained with settings of its own is a clip like any other; those that depend on it know it by its fingerprint.
+Shared settings stay the project's: sizes of features and decoder, cameras, colours, the gate, and how clips inherit.
+A clip trained with its own settings is a clip like any other; those that depend on it know it by its fingerprint.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from engine.errors import ProjectError
 from engine.training.config import LENGTH, LOSS, RATES, SETTINGS, TrainConfig, config_of
 
 _ADDED = ("max_static_points", "max_moving_points", "residual")
-"""What a clip adds of its own."""
+"""Settings of the anchors that a clip adds."""
 ALLOWED = tuple(name for name, setting in SETTINGS.items() if setting.group in (LENGTH, RATES, LOSS) or name in _ADDED)
 _OF_REFERENCE = ("static_steps", "joint_steps", "max_static_points", "max_moving_points")
 _OF_SOURCE = ("source_steps", "max_moving_points", "residual")
@@ -24,7 +24,7 @@ _OF_BOTH = ("ssim_weight", "volume_weight")
 
 
 def is_source(settings: ProjectSettings, config: TrainConfig, clip_index: int) -> bool:
-    """Whether a clip begins with what another one has learned. config: That of the settings."""
+    """Whether a clip starts from another trained clip. config: That of the settings."""
     if clip_index == settings.reference_clip:
         return False
     return not config.independent or config.start == "previous"
@@ -56,7 +56,7 @@ def with_own(project: Project, own: Mapping[str, Any]) -> dict[str, SettingValue
 
 
 def derived_value(config: TrainConfig, name: str, *, n_cameras: int, n_frames: int) -> SettingValue:
-    """What a setting amounts to in a clip of that many frames, where 0 derives it.
+    """The value of a setting in a clip of that many frames, derived where it is 0.
 
     Args:
         n_cameras: To train on.

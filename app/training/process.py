@@ -18,12 +18,12 @@ BUILD = "app.training.worker.build:build_training"
 
 
 class TrainTask(Struct, frozen=True):
-    """What a worker process is asked.
+    """The task of a worker process.
 
     Attributes:
         project: Folder of it, in which the worker's store lies.
         log: File for everything that the process prints.
-        make: "module:name" of what builds the training, a MakeTraining.
+        make: "module:name" of the function that builds the training, a MakeTraining.
     """
 
     job: TrainJob
@@ -48,7 +48,7 @@ class Worker(Protocol):
 
     @property
     def job(self) -> TrainJob:
-        """What it trains."""
+        """The job that it trains."""
         ...
 
     def send(self, command: Command) -> None:
@@ -65,10 +65,10 @@ class Worker(Protocol):
 
 
 class ProcessWorker:
-    """A process of its own. See `Worker`.
+    """A separate process. See `Worker`.
 
     Args:
-        job: What to train.
+        job: The training.
         project: Where it is read from and kept.
         make: See `TrainTask`.
 

@@ -19,7 +19,7 @@ class SmoothedRate:
         self._seconds = 0.0
 
     def update(self, done: float, now_s: float) -> None:
-        """Tell how much is done at a time; going backwards starts over."""
+        """Record how much is done at a time; going backwards starts over."""
         if self._last is None or done < self._last[0]:
             self._units = self._seconds = 0.0
         elif not self._is_paused and now_s > self._last[1]:
@@ -38,7 +38,7 @@ class SmoothedRate:
 
     @property
     def seconds(self) -> float:
-        """How much time is behind the rate; what has faded counts as far as it does."""
+        """How much time is behind the rate; faded time counts in part."""
         return self._seconds
 
     @property

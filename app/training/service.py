@@ -1,7 +1,7 @@
-"""TrainingService: which clips train, which wait, and what their workers said last. Status is derived, never stored.
+"""TrainingService: clips that train, clips that wait, and the workers' last reports. Status is derived, never stored.
 
-Owned by one thread. It knows no window and raises no notices: `poll` returns the events for whoever tells the user.
-What lies on disk is app.project.clips.clip_catalog's business; the trainings at hand never hide it.
+Owned by one thread. It knows no window and raises no notices: `poll` returns the events for the caller to report.
+Files on disk are left to app.project.clips.clip_catalog; running trainings never hide them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from engine.training.preparation.stages import remove_stages
 
 Launch = Callable[[TrainJob, Project], Worker]
 ClipEvent = tuple[int, Event]
-"""What was said, and of which clip."""
+"""A clip, and an event of its worker."""
 CLOSE_TIMEOUT_S = 5.0
 
 
@@ -47,7 +47,7 @@ class TrainingService:
         holdout: Camera indices never trained on.
         launch: Starts a worker; a process by default.
         is_window_open: Passed on to workers, which then leave room for it.
-        catalog: What lies on disk; read here, which takes a while in a long project, when None.
+        catalog: The clips on disk; read here, which takes a while in a long project, when None.
         curves: Reads the curves of clips that are looked at; stays open when the service is closed.
         n_workers: How many clips may train side by side. They share the cores.
 
@@ -82,7 +82,7 @@ class TrainingService:
         self.is_ending_after = False
         self.curves = CurveReader() if curves is None else curves
         self._owns_curves = curves is None
-        self._begun: dict[int, OwnSettings] = {}  # settings of their own that unfinished clips were begun with
+        self._begun: dict[int, OwnSettings] = {}  # own settings with which unfinished clips were begun
         self._dropped: list[int] = []
         self._n_runs = 0
 
@@ -98,7 +98,7 @@ class TrainingService:
 
     @property
     def shown_run(self) -> ClipRun | None:
-        """The run to tell of: the leading one, else the one that ended last."""
+        """The run to show: the leading one, else the one that ended last."""
         return self.leading or self.last
 
     @property
@@ -108,7 +108,7 @@ class TrainingService:
 
     @property
     def worker_pids(self) -> tuple[int, ...]:
-        """Processes of the workers, of those that have said so."""
+        """Processes of the workers that have reported theirs."""
         return tuple(run.pid for run in self.runs.values() if run.pid is not None)
 
     @property
@@ -121,8 +121,8 @@ class TrainingService:
         return 0 <= clip_index < len(self.clips) and self.catalog[clip_index].state in ("trained", "damaged")
 
     def shown_state(self, clip_index: int) -> ShownState | None:
-        """The state of a clip to look at: the newest snapshot while it trains, else what is on disk, if anything; None
-        for one that there is no more, since clips are cut otherwise now."""
+        """The state of a clip to look at: the newest snapshot while it trains, else the one on disk, if any; None for
+        a clip that no longer exists because clips are cut differently now."""
         if not 0 <= clip_index < len(self.clips):
             return None
         run = self.runs.get(clip_index)
@@ -131,7 +131,7 @@ class TrainingService:
         record = self.catalog[clip_index]
         return None if record.file is None else ShownState(record.file, record.revision)
 
-    # ---------------------------------------------------------------- what can be trained
+    # ---------------------------------------------------------------- choosing clips
 
     @property
     def next_clip_index(self) -> int | None:
@@ -157,7 +157,7 @@ class TrainingService:
         self.go_on()
 
     def add(self, clip_index: int, own: OwnSettings | None = None) -> None:
-        """Let a clip wait, without starting anything. Who trains a finished one has asked.
+        """Let a clip wait, without starting anything. The caller has confirmed training a finished one again.
 
         Args:
             own: Settings that differ from the project's; the training then begins afresh.
@@ -182,10 +182,10 @@ class TrainingService:
         self.queue.add(clip_index, own)
 
     def enqueue_all(self, clip_indices: Sequence[int]) -> list[int]:
-        """Train those of these clips that are not finished, in the order of training; what they need comes first.
+        """Train those of these clips that are not finished, in the order of training; clips they need come first.
 
         Returns:
-            Clips that were left out, because they or what they need is damaged.
+            Clips left out because they or clips they need are damaged.
         Raises:
             ProjectError: The project is read-only.
         """
@@ -199,7 +199,7 @@ class TrainingService:
     # ---------------------------------------------------------------- commands
 
     def go_on(self) -> None:
-        """Train what waits in a queue that was held."""
+        """Train the clips of a queue that was held."""
         self.queue.is_held = False
         self._start_waiting()
 
@@ -216,11 +216,11 @@ class TrainingService:
             run.worker.send(SetSnapshots(mode))
 
     def drop_hopeless(self) -> list[int]:
-        """Take out of the queue what cannot be trained any more. Returns it."""
+        """Take clips that can no longer be trained out of the queue. Returns them."""
         return drop_hopeless(self.queue, self.runs, self.project, self.catalog)
 
     def take_dropped(self) -> list[int]:
-        """Clips that left the queue because what they need cannot come, once."""
+        """Clips that left the queue because clips they need cannot come; each is given once."""
         dropped, self._dropped = self._dropped, []
         return dropped
 
@@ -233,7 +233,7 @@ class TrainingService:
             run.pause()
 
     def resume(self, clip_index: int | None = None) -> None:
-        """Let a clip that was paused go on; all of them when None."""
+        """Resume a paused clip; all of them when None."""
         for run in self._chosen(clip_index):
             run.resume()
 
@@ -319,7 +319,7 @@ class TrainingService:
         self.catalog.update(clip_index)
 
     def poll(self, *, budget_s: float = 0.002) -> list[ClipEvent]:
-        """Take what the workers said; start the next clip when one ended. Returns the events, oldest first of each."""
+        """Take in the workers' events; start the next clip when one ended. Returns the events, oldest first of each."""
         until_s = time.monotonic() + budget_s
         taken: list[ClipEvent] = []
         for clip_index, run in list(self.runs.items()):
@@ -333,7 +333,7 @@ class TrainingService:
         run.worker.close(timeout_s=0.5)
         del self.runs[clip_index]
         self.last = run
-        self.catalog.update(clip_index)  # also sees what is out of date by it
+        self.catalog.update(clip_index)  # also finds clips that are out of date by it
         self.queue.note_end(run.n_steps)
         if isinstance(run.ending, ClipTrained):
             self._begun.pop(clip_index, None)

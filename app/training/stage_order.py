@@ -24,7 +24,7 @@ def stage_number(stage: str, *, is_reference: bool) -> tuple[int, int]:
     """Which stage this is and how many there are before the first step, from 1.
 
     Returns:
-        Zeros for what is not always there, such as compiling at the first start.
+        Zeros for a stage that is not always there, such as compiling at the first start.
     """
     stages = REFERENCE_STAGES if is_reference else SOURCE_STAGES
     return (stages.index(stage) + 1, len(stages)) if stage in stages else (0, 0)

@@ -1,4 +1,4 @@
-"""ClipStore: what stands between a training and wherever its project lies. A worker knows no other way in or out.
+"""ClipStore: the interface between a training and its project, wherever that lies. A worker has no other access.
 
 Clips are named by keys, which follow from their frames (app.project.clips.clip_names). Bulk goes through the store,
 reports go as messages. `FolderStore` is the project folder itself; a worker on another machine needs another store and
@@ -17,8 +17,8 @@ from engine.clip_files.compact import CompactClip
 
 
 class ClipStore(Protocol):
-    """Reads and keeps what one training needs and leaves. For one thread; whatever it puts is there completely or not
-    at all. Every method that puts something may raise DiskError; nothing has changed then."""
+    """Reads the inputs of one training and keeps its results. For one thread; everything it puts is there completely or
+    not at all. Every method that puts something may raise DiskError; nothing has changed then."""
 
     def check(self) -> None:
         """See that it is there, so that nothing is put into another one of its name. Raises ProjectGone."""
@@ -34,25 +34,25 @@ class ClipStore(Protocol):
 
     @property
     def shared(self) -> Path:
-        """A folder of this machine with what clips share: backgrounds that the reference clip has left, and pieces of
-        preparations. What a training leaves in it is there for others once its clip was put."""
+        """A folder of this machine for files that clips share: backgrounds of the reference clip, and pieces of
+        preparations. Files that a training leaves there are for others once its clip was put."""
         ...
 
     def put_clip(self, key: str, clip: CompactClip) -> None:
-        """Hand the finished clip over: complete, and read back. What is in its place stays until the owner of the
-        project takes the new one in."""
+        """Hand the finished clip over: complete, and read back. The former one stays until the owner of the project
+        takes the new one in."""
         ...
 
     def put_snapshot(self, key: str, revision: int, state: ClipState) -> None:
-        """A state of the running training, for whoever looks at it."""
+        """A state of the running training, for viewing."""
         ...
 
     def drop_snapshot(self, key: str, revision: int) -> None:
-        """Nobody looks at it any more. Never fails."""
+        """Remove a snapshot that is no longer viewed. Never fails."""
         ...
 
     def checkpoint(self, key: str) -> Path | None:
-        """What was kept of an unfinished training, as a file of this machine; None without one."""
+        """The checkpoint of an unfinished training, as a file of this machine; None without one."""
         ...
 
     def put_checkpoint(self, key: str, write: Callable[[Path], None]) -> None:

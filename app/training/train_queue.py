@@ -1,4 +1,4 @@
-"""TrainQueue: the clips that wait to be trained, in their order, with what is known of each. Knows no worker.
+"""TrainQueue: the clips that wait to be trained, in their order, with their settings and failures. Knows no worker.
 
 A clip waits only while it can still be trained: one that needs another clip leaves when that one can no longer come.
 """
@@ -81,12 +81,12 @@ class TrainQueue:
         self._clips, self._waiting, self._own, self.is_held = [], set(), {}, False
 
     def note_end(self, n_steps: int) -> None:
-        """A clip ended, whichever way."""
+        """A clip ended, in any way."""
         self.n_done += 1
         self.steps_done += n_steps
 
     def forget_done(self) -> None:
-        """What comes from now on is another sequence."""
+        """Clips added from now on are another sequence."""
         self.n_done = self.steps_done = 0
 
 
@@ -106,7 +106,7 @@ def needed_clips(project: Project, clip_index: int, config: TrainConfig | None =
 
 
 def drop_hopeless(queue: TrainQueue, running: Iterable[int], project: Project, catalog: ClipCatalog) -> list[int]:
-    """Take out the clips that need one which is neither finished nor comes before them. Returns them.
+    """Take out the clips that need one that is neither finished nor comes before them. Returns them.
 
     Args:
         running: Clips that train.

@@ -1,4 +1,4 @@
-"""What is shown of the trainings of a project: values made of its service, one of the training, one of every clip."""
+"""Status of a project's trainings for display: values made of its service, one of the training, one of every clip."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
 
 
 def curves_of(service: TrainingService, clip_index: int) -> Curves | None:
-    """Of the training at hand once it has any; otherwise those on disk, None until they are read."""
+    """Those of the running training once it has any; otherwise those on disk, None until they are read."""
     run, last = service.runs.get(clip_index), service.last
     if run is None and last is not None and last.clip_index == clip_index and isinstance(last.ending, ClipTrained):
         run = last

@@ -1,9 +1,9 @@
 """Each camera's rendition of the scene's colours: its gain, and its exposure in each frame of a clip.
 
-Of a camera that was trained on both are known. One that was held out is shown at the gain of the median camera, and
+Both are known of a camera that was trained on. One that was held out is shown at the gain of the median camera, and
 with the exposure that its place and direction suggest: cameras that look at the same things from the same side change
 their exposure alike. Scenes are stored, exported and freely viewed in their own colours; this is for the comparison
-with what cameras took.
+with captured pictures.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class CameraColors:
         return np.ones(3, np.float32)
 
     def exposure(self, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
-        """Of one camera of a rig at a time of the clip, between frames interpolated. [3] float32
+        """Exposure of one camera of a rig at a time of the clip, interpolated between frames. [3] float32
 
         Args:
             rig: With the training cameras and this one.

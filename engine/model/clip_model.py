@@ -1,8 +1,8 @@
 """ClipModel: everything that is visible in one clip. Reference and source clip are this one class.
 
-What differs is data: which anchor sets there are, which of them are trainable, and whether decoder and static sets are
-inherited. Sets: "static", "moving" and "promoted" come from the reference clip; "residual" is what a source clip adds,
-"adapted" are moving ones that keep learning in a source clip and take the place of the inherited ones there.
+They differ in data only: which anchor sets there are, which of them are trainable, and whether decoder and static sets
+are inherited. Sets: "static", "moving" and "promoted" come from the reference clip; "residual" is added by a source
+clip, "adapted" are moving ones that keep learning in a source clip and take the place of the inherited ones there.
 "promoted" anchors stood still in space but changed in the reference clip, as under a lamp: they exist in all frames of
 all clips. "replacing" ones are the same for one source clip: they take the place of static anchors that the clip hides.
 """
@@ -129,7 +129,7 @@ class ClipModel(nn.Module):
         self._corners, self._frozen, self._lit, self.hidden = {}, {}, {}, {}
 
     def take_out(self, role: str, is_taken: Tensor) -> AnchorSet:
-        """Take rows out of a set; gives them. Those of an inherited set are hidden in this clip, and stored as such.
+        """Take rows out of a set; returns them. Those of an inherited set are hidden in this clip, and stored as such.
 
         Args:
             role: Of a static set.

@@ -74,7 +74,7 @@ def _check(part: ChosenAnchors, decoder: Decoder, field: SpatioTemporalField | N
             f"rows must be int64 [n] on {features.device} like the features, "
             f"got {rows.dtype} of shape {list(rows.shape)} on {rows.device}"
         )
-    if rows.device.type == "cpu":  # elsewhere a look would wait for the device, which checks by itself
+    if rows.device.type == "cpu":  # elsewhere a check would wait for the device, which has its own
         _check_values(rows.numpy(), n_anchors)
     if features.shape != (n_anchors, decoder.static_dim):
         wanted = [n_anchors, decoder.static_dim]
@@ -104,7 +104,7 @@ def _check(part: ChosenAnchors, decoder: Decoder, field: SpatioTemporalField | N
 
 
 def _check_values(rows: np.ndarray, n_anchors: int) -> None:
-    """By numpy, which takes a tenth of torch's time for a look at a few thousand numbers."""
+    """By numpy, which takes a tenth of torch's time to check a few thousand numbers."""
     if len(rows) == 0 or (rows[0] >= 0 and rows[-1] < n_anchors and (rows[1:] > rows[:-1]).all()):
         return
     if rows.min() < 0 or rows.max() >= n_anchors:  # the usual case is over; these may be good as well

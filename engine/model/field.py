@@ -33,7 +33,7 @@ class SpatioTemporalField(nn.Module):
             have them.
 
     Attributes:
-        keys: Per knot and level what entries are combined with; zeros where every knot has a table. [n_knots, L] int32
+        keys: Per knot and level, the number combined with entries; 0 where every knot has a table. [n_knots, L] int32
     """
 
     keys: Tensor

@@ -17,7 +17,7 @@ def derive_log2_entries(n_alive: int, *, n_shared_knots: int = 1, at_most: int =
     """log2 of the table entries per level for this many anchors alive in one frame, in a table of so many knots.
 
     A knot's own table has two entries per anchor; in a shared one half an anchor's entry per knot is enough, because
-    most of what moves stays near where it was. `at_most` limits a shared one.
+    most moving things stay near their place. `at_most` limits a shared one.
     """
     if n_shared_knots > 1:
         return min(max(math.ceil(math.log2(max(0.5 * n_alive * n_shared_knots, 1))), 12), at_most)

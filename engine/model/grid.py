@@ -2,9 +2,9 @@
 
 Anchors do not move, so the eight corners of every level and their weights are constants of an anchor; they are
 computed once (`corner_table`) and reused at every step. Time is the fourth axis, with its knots exactly on the frames
-of the clip, so a picture of a frame touches the eight spatial corners of one knot only. Either each knot has tables of
-its own, or all knots share one table, as in the published 4D hash: the hash is the XOR of the coordinates' products, so
-the entry at a knot is that of space XOR a key of that knot and level (`time_keys`), and the corners stay constants.
+of the clip, so a picture of a frame touches the eight spatial corners of one knot only. Either each knot has its own
+tables, or all knots share one, as in the published 4D hash: the hash is the XOR of the coordinates' products, so the
+entry at a knot is that of space XOR a key of that knot and level (`time_keys`), and the corners stay constants.
 
 Letters: n rows, L levels, T entries per level, C channels. `encode` is plain torch.
 """
@@ -113,7 +113,7 @@ def encode(table: Tensor, rows: Tensor, corners: CornerTable, keys: Tensor | Non
         table: [L, T, C]
         rows: Rows of the corner table. [n] int64
         corners: Constants of all anchors.
-        keys: Of this knot, from `time_keys`; None for a table of its own. [L] int32
+        keys: Of this knot, from `time_keys`; None where it has its own table. [L] int32
     Returns:
         [n, L * C], levels first. Differentiable in `table`.
     """

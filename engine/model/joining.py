@@ -28,8 +28,8 @@ def join_frozen(frozen: Gaussians, rows: Tensor, learning: Gaussians, *, backend
     require_tensor("rows", rows)
     if rows.dtype != torch.int64 or rows.ndim != 1:
         raise TypeError(f"rows must be int64 [n], got {rows.dtype} {list(rows.shape)}")
-    if rows.device.type == "cpu" and len(rows):  # elsewhere a look would wait for the device, which checks by itself
-        values = rows.numpy()  # numpy takes a tenth of torch's time for a look at a few thousand numbers
+    if rows.device.type == "cpu" and len(rows):  # elsewhere a check would wait for the device, which has its own
+        values = rows.numpy()  # numpy takes a tenth of torch's time to check a few thousand numbers
         if not 0 <= values.min() <= values.max() < len(frozen):
             raise ValueError(f"rows must lie in 0..{len(frozen) - 1}, got {values.min()}..{values.max()}")
     return backend.join(frozen, rows, learning)

@@ -58,8 +58,8 @@ def load_clip_model(
         state: The clip.
         reference: The clip it inherits from; not used for a reference clip.
         backend: The backend that decodes and draws it.
-        is_learning: Keep the clip's own parameters trainable. Otherwise nothing is, and what never changes over time
-            is decoded only once.
+        is_learning: Keep the clip's own parameters trainable. Otherwise nothing is, and constant Gaussians
+            are decoded only once.
     Raises:
         ProjectError: A source clip without its reference or with another one than it was trained on; arrays that are
             missing or do not fit together.

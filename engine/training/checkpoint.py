@@ -1,7 +1,7 @@
 """Checkpoints: a clip's state with all that its training needs to continue exactly, bit for bit.
 
-A checkpoint is a clip file like any other. Beside the state it holds the moments of the optimiser, the gains, the
-backgrounds as they are by now, and in its header where the training stands.
+A checkpoint is a clip file like any other. Besides the state it holds the moments of the optimiser, the gains,
+the present backgrounds, and in its header the place that the training has reached.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class Checkpoint:
         state: The clip, with the optimiser's arrays next to its own.
         gains: Of the training cameras, learned so far. [C, 3] float32
         backgrounds: Of the training cameras.
-        place: Where the training stands.
-        reaches: How far Gaussians of each anchor were expected when the phase began, scene units, by role; none in
+        place: The place that the training has reached.
+        reaches: The reach expected of each anchor's Gaussians when the phase began, scene units, by role; none in
             checkpoints of earlier versions. [A] float32 each
         cameras: The learned corrections of their poses and focal lengths; None where these do not learn. [C, 7] float32
     """
@@ -97,7 +97,7 @@ def read_checkpoint(
         raise damaged_checkpoint(error, path) from error
     floats = {name: array for name, array in kept.arrays.items() if np.issubdtype(array.dtype, np.floating)}
     odd = [name for name, array in floats.items() if not np.isfinite(array).all()]
-    if odd:  # training on from here could only fail again
+    if odd:  # continuing from here could only fail again
         raise damaged_checkpoint(ValueError(f"{odd[0]} holds numbers that are not finite"), path)
     reaches = {name.removeprefix(_REACH): array.copy() for name, array in floats.items() if name.startswith(_REACH)}
     cameras = kept.arrays.get("resume.cameras")

@@ -138,7 +138,7 @@ class ClipTraining:
         self._trained: ClipModel | None = None
         """The model before it took over the values that are stored."""
 
-    # ---------------------------------------------------------------- where we are
+    # ---------------------------------------------------------------- progress
 
     @property
     def n_steps(self) -> int:
@@ -215,13 +215,13 @@ class ClipTraining:
             self.phases[index] = (name, steps_in_phase)
 
     def _learn_positions(self) -> None:
-        """Positions of what learns are parameters from here on, if they learn at all."""
+        """Positions of learning anchors are parameters from here on, if they learn at all."""
         if self.config.position_lr:
             for role in self.model.roles():
                 self.model.anchor_set(role).learn_positions()
 
     def _items_of(self, phase: str) -> list[int]:
-        """Numbers of what a phase draws: cameras, or pictures camera by camera; without what is excluded altogether."""
+        """Numbers of the items a phase draws: cameras, or pictures camera by camera; without wholly excluded ones."""
         if phase == "static":
             out = self.capture.excluded_cameras
             return [row for row, camera in enumerate(self.camera_indices) if camera not in out]
@@ -271,7 +271,7 @@ class ClipTraining:
             n_clipped=sum(0.0 < limit < norm for norm in norms),
         )
 
-    # ---------------------------------------------------------------- what a phase asks for
+    # ---------------------------------------------------------------- inputs of a phase
 
     def place(self, item: int) -> tuple[int, float]:
         """See PhasePictures."""
@@ -297,7 +297,7 @@ class ClipTraining:
     def _tensor(self, array: np.ndarray) -> Tensor:
         return torch.from_numpy(array).to(self.backend.device)
 
-    # ---------------------------------------------------------------- what came of it
+    # ---------------------------------------------------------------- results
 
     def held_out_psnr(self, *, n_pictures: int = 3) -> float:
         """Mean PSNR of a few held-out pictures in raw colours, dB; NaN without held-out cameras."""
@@ -355,9 +355,9 @@ class ClipTraining:
         return ClipState(arrays, header)
 
     def finish(self) -> CompactClip:
-        """The trained clip as it is stored. The model takes its values over: what is measured from here on is that.
+        """The trained clip as it is stored. The model takes over its values: later measurements are of those.
 
-        A checkpoint that is written later still holds what was trained.
+        A checkpoint that is written later still holds the model as trained.
 
         Raises:
             NonFiniteLoss: An array holds numbers that are not finite.
@@ -393,14 +393,14 @@ class ClipTraining:
     ) -> None:
         """Continue from a finished clip instead of `prepare`: some steps more, on pictures that the caller chooses.
 
-        For a clip that inherits from another one. Settings say how fast it learns; rates fall over these steps.
+        For a clip that inherits from another one. Settings give the rates, which fall over these steps.
 
         Args:
             state: The clip, based on the same reference.
             pictures: To compare with, in the exposure of the reference clip; their truth may be any picture.
             items: The items drawn in a pass: camera row * frames of the clip + frame in the clip.
             n_steps: How many steps.
-            learning: How the names of what learns begin, as the model names its parameters.
+            learning: Prefixes of the names of parameters that learn, as the model names them.
         Raises:
             ProjectError: The state is incomplete, or is not of this reference.
         """
@@ -423,7 +423,7 @@ class ClipTraining:
         )
         self._learn_positions()
         for name, parameter in self.model.named_parameters():
-            if not name.startswith((DECODER, *learning)):  # heads that learn are stored, and are so ever after
+            if not name.startswith((DECODER, *learning)):  # heads that learn are stored from now on
                 parameter.requires_grad = False
         self.phases, self.steps_done = [("source", n_steps)], 0
         self._start_phase(0, 0)

@@ -19,7 +19,7 @@ RATES, LOSS, GATE, STEP, SHARING = "Learning rates", "Loss", "Gate", "Training s
 
 
 class StepRule(NamedTuple):
-    """How the steps of a phase follow from what there is to learn from.
+    """How the steps of a phase follow from the number of pictures or backgrounds.
 
     Attributes:
         per_item: Steps per picture, or per background.

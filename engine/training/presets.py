@@ -1,7 +1,7 @@
 """Presets: named sets of training settings, from a toy to the published sizes. Data, no behaviour.
 
-"small" is the default of every setting. "toy" and "medium" change sizes, "paper" also rates and weights; what follows
-from the data (levels, table entries, steps) stays derived unless the published method fixes it.
+"small" is the default of every setting. "toy" and "medium" change sizes, "paper" also rates and weights; values that
+follow from the data (levels, table entries, steps) stay derived unless the published method fixes them.
 Source: ClipGStream and its released configurations; the presets below "paper" are ours.
 """
 
@@ -22,7 +22,7 @@ PUBLISHED_SIZES: dict[str, Any] = {
     "field_levels": 16,
     "field_log2_entries": 17,
 }
-"""Of the model, without what depends on the capture."""
+"""Sizes of the model that do not depend on the capture."""
 
 PRESETS: dict[str, dict[str, Any]] = {
     "toy": {
@@ -42,8 +42,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "field_max_levels": 8,
         "passes": 16,
     },
-    # The published method: the paper where it speaks, the released code where it does not. What stays different, and
-    # why, is listed in docs/method.md.
+    # The published method: the paper where it speaks, the released code where it does not. Remaining
+    # differences are listed, with reasons, in docs/method.md.
     "paper": PUBLISHED_SIZES
     | {
         "max_static_points": 1_000_000,

@@ -1,5 +1,5 @@
 """Settings that projects of earlier versions store and this one does not have: they are dropped when such a project is
-read, so that it opens and trains on as it does without them, and what was kept with them is found again."""
+read, so that it opens and trains as it does without them, and files kept with them are found again."""
 
 from __future__ import annotations
 

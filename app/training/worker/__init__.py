@@ -1,1 +1,1 @@
-"""The worker's side of a training: the loop around it, and what that leaves in the store."""
+"""The worker's side of a training: the loop around it, and its files in the store."""

@@ -71,11 +71,11 @@ def clip_training(
 
     Args:
         holdout: Camera indices never trained on.
-        seed: Fixes what is random.
-        reference: What the clip inherits from.
-        prep_dir: Where what clips share is kept.
+        seed: Fixes random numbers.
+        reference: The clip to inherit from.
+        prep_dir: Folder for files that clips share.
         regions: Where the user overrules the gate.
-        report: Told how far a preparation is.
+        report: Receives the progress of a preparation.
         previous: The clip that it continues from.
     """
     from engine.training.clip_training import ClipTraining  # torch takes a second to import

@@ -22,5 +22,5 @@ class Cadence:
         return now_s >= self._next_s
 
     def done(self, started_s: float, now_s: float) -> None:
-        """Tell when it was done, from and until."""
+        """Record when it was done, from and until."""
         self._next_s = started_s + max(self._every_s, (now_s - started_s) / self._max_share)

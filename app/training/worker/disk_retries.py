@@ -1,4 +1,4 @@
-"""What a training leaves in its project when the disk refuses: tried again, told once, and never in another's place."""
+"""Files of a training that the disk refuses: tried again, reported once, and never written into another project."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from engine.errors import ProjectError, TrainingError
 RETRY_AFTER_S = (1.0, 2.0, 4.0, 10.0)
 """Waits between attempts to write a finished clip; the last one repeats."""
 PATIENCE_S = 7.0
-"""For so long a finished clip is tried again where no user is waiting and a checkpoint holds all of it."""
+"""How long a finished clip is tried again where no user is waiting and a checkpoint holds all of it."""
 PATIENCE_UNKEPT_S = 60.0
 """Likewise, where it exists in memory only."""
 
@@ -68,10 +68,10 @@ class FolderWatch:
 
 
 class Refusals:
-    """Tells that a kind of file cannot be written once, and not every two seconds for as long as the disk is full.
+    """Reports once that a kind of file cannot be written, not every two seconds for as long as the disk is full.
 
     Args:
-        title: Says what is not there because of it.
+        title: Names the missing feature.
         tell: Takes the warning.
     """
 
@@ -80,13 +80,13 @@ class Refusals:
         self._is_told = False
 
     def refused(self, error: ProjectError) -> None:
-        """It could not be written."""
+        """Record that it could not be written."""
         if not self._is_told:
             self._tell(WarningRaised(self._title, error.message, error.hint))
         self._is_told = True
 
     def written(self) -> None:
-        """It could: the next refusal is news again."""
+        """Record that it was written: the next refusal is reported again."""
         self._is_told = False
 
 
@@ -94,7 +94,7 @@ class Retries:
     """When a finished clip that could not be written is tried again, and when that is given up.
 
     Args:
-        is_endless: A window is open: whoever sits before it makes room, or stops the training.
+        is_endless: A window is open: its user makes room, or stops the training.
         clock: Seconds.
     """
 

@@ -20,7 +20,7 @@ def words_of(error: Exception) -> tuple[str, str]:
 
 
 def keep_last_good(training: Training, keeper: Keeper) -> str:
-    """Keep progress from before a failure, if it is any good. Says what is kept now."""
+    """Keep progress from before a failure, if it is valid. Says what is kept now."""
     try:
         is_good = _is_finite(training.state())
     except EngineError:

@@ -43,7 +43,7 @@ class FolderStore:
     def _files(self, key: str) -> ClipPaths:
         return ClipPaths(self.folder, key)
 
-    # ---------------------------------------------------------------- what a training needs
+    # ---------------------------------------------------------------- inputs
 
     def capture(self, *, scale: float, frames: tuple[int, int] | None) -> Capture:
         """See `ClipStore`."""
@@ -62,7 +62,7 @@ class FolderStore:
         """See `ClipStore`."""
         return self._project.prep_dir
 
-    # ---------------------------------------------------------------- what it leaves
+    # ---------------------------------------------------------------- results
 
     def put_clip(self, key: str, clip: CompactClip) -> None:
         """See `ClipStore`."""
@@ -91,7 +91,7 @@ class FolderStore:
         """See `ClipStore`."""
         discard(self._files(key).snapshot(revision))
 
-    # ---------------------------------------------------------------- what it can continue from
+    # ---------------------------------------------------------------- unfinished trainings
 
     def checkpoint(self, key: str) -> Path | None:
         """See `ClipStore`."""

@@ -1,4 +1,4 @@
-"""What the loop around a training needs of it: engine.training.ClipTraining has it, and the small ones of tests."""
+"""The interface of a training to the loop around it, as of engine.training.ClipTraining and the small ones of tests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from engine.progress import ReportProgress, StepStats
 
 
 class Training(Protocol):
-    """What the loop needs of engine.training.ClipTraining; tests bring a small one."""
+    """The part of engine.training.ClipTraining that the loop uses; tests bring a small one."""
 
     @property
     def n_steps(self) -> int:
@@ -32,7 +32,7 @@ class Training(Protocol):
         ...
 
     def prepare(self) -> None:
-        """Build what the first step needs; may take a minute and report often."""
+        """Build the inputs of the first step; may take a minute and report often."""
         ...
 
     def step(self, n: int = 1) -> StepStats:
@@ -44,9 +44,8 @@ class Training(Protocol):
         ...
 
     def finish(self) -> CompactClip:
-        """The model as it is stored; what is measured after that is what is stored. A checkpoint written later still
-        holds what was trained. Raises DiskError, before anything has changed, where what other clips share cannot be
-        kept."""
+        """The model as it is stored; later measurements are of that. A checkpoint written later still holds the model
+        as trained. Raises DiskError, before anything has changed, where files that clips share cannot be kept."""
         ...
 
     def write_checkpoint(self, path: Path | str) -> None:

@@ -1,4 +1,4 @@
-"""Keeper: what a training leaves in its store while it continues, each as often as time allows: snapshots, checkpoints,
+"""Keeper: writes the files of a running training to its store, each as often as time allows: snapshots, checkpoints,
 held-out figures and the rows of its curves. A disk that refuses costs these, never the training.
 """
 
@@ -40,7 +40,7 @@ class Keeper:
     """See the module docstring. At most one snapshot is unread at a time.
 
     Args:
-        job, store: What is trained, and where it is kept.
+        job, store: The training, and where it is kept.
         send: Takes events.
         watch: Knows how long each stage took.
         clock: Seconds.
@@ -67,7 +67,7 @@ class Keeper:
         self._revision = self._consumed = 0
         self._snapshots: set[int] = set()
         self._memory_before_mb = 0.0
-        """Most that earlier runs of the same training held."""
+        """Peak memory of earlier runs of the same training."""
 
     def keep_what_is_due(self, training: Training) -> None:
         """After some steps, which were not the last."""
@@ -83,7 +83,7 @@ class Keeper:
     # ---------------------------------------------------------------- snapshots
 
     def want_snapshot(self) -> None:
-        """Somebody wants to see it now: write one at the next chance."""
+        """Write one at the next chance, for immediate viewing."""
         self._is_snapshot_wanted = True
 
     def set_live_view(self, mode: str) -> None:
@@ -136,13 +136,13 @@ class Keeper:
         except ProjectError as error:
             is_written = False
             self._checkpoint_refusals.refused(error)
-        if is_written:  # beside the checkpoint, so that a run that continues from it knows what it took
+        if is_written:  # next to the checkpoint, so that a run that continues from it knows its costs
             self.note({"step": training.steps_done, **self._watch.document(), **self.memory()})
         self._checkpoint_cadence.done(started_s, self._clock())
         return is_written
 
     def write_last_checkpoint(self, training: Training) -> None:
-        """The same at the end, when it is said again if it is refused."""
+        """The same at the end, when a refusal is reported again."""
         self._checkpoint_refusals.written()
         self.write_checkpoint(training)
 
@@ -154,7 +154,7 @@ class Keeper:
         return None if header is None else header.step
 
     def recall(self, step: int) -> None:
-        """Add what earlier runs took up to the checkpoint that this one continues from, and the most that they held."""
+        """Add the times of earlier runs up to the checkpoint that this one continues from, and their peak memory."""
         noted = [row for row in self._store.rows(self._key) if row["step"] <= step and "stages_s" in row]
         for stage, seconds in (stages_of(noted[-1]) if noted else {}).items():
             self._watch.seconds[stage] = self._watch.seconds.get(stage, 0.0) + seconds
@@ -163,7 +163,7 @@ class Keeper:
     # ---------------------------------------------------------------- figures
 
     def memory(self) -> dict[str, float | None]:
-        """memory_mb: most that this process held, or an earlier one of the same training; None where not known."""
+        """memory_mb: Peak of this process, or an earlier one of the same training; None where not known."""
         memory_mb = peak_mb()
         return {"memory_mb": None if memory_mb is None else max(memory_mb, self._memory_before_mb)}
 

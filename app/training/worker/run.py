@@ -1,5 +1,5 @@
-"""TrainingRun: the loop around one clip's training, from the job to its end. Obeys commands, reports, and has kept what
-is due. It knows neither processes nor pipes: `worker` drives it in a process.
+"""TrainingRun: the loop around one clip's training, from the job to its end. Obeys commands, reports, and writes files
+when due. It knows neither processes nor pipes: `worker` drives it in a process.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class TrainingRun:
     """One clip, from the job to its end.
 
     Args:
-        job: What to train.
-        open_store: Opens what it is read from and kept in.
+        job: The training.
+        open_store: Opens the store that it is read from and kept in.
         receive: Source of commands.
         send: Takes events.
         make_training: Builds the training; its report function stays valid for the whole run.
@@ -116,7 +116,7 @@ class TrainingRun:
     # ---------------------------------------------------------------- the loop
 
     def advance(self) -> bool:
-        """Prepare, or do some steps and what is due after them. False when the run has ended and said so."""
+        """Prepare, or do some steps and the work due after them. False when the run has ended and reported it."""
         try:
             try:
                 return self._advance()
@@ -227,7 +227,7 @@ class TrainingRun:
         """
         assert self._store is not None
         self._kept.drop_snapshots()
-        if self._store.drop_pieces(self._job.key):  # of no more use, and often what fills a disk
+        if self._store.drop_pieces(self._job.key):  # no longer of use, and often the files that fill a disk
             return True
         is_first = self._retries.is_first
         is_kept = self._kept.checkpoint_step == training.steps_done or self._kept.write_checkpoint(training)
@@ -244,7 +244,7 @@ class TrainingRun:
         """The clip as it is stored, with its figures.
 
         Raises:
-            DiskError: What other clips share could not be kept.
+            DiskError: Files that clips share could not be kept.
         """
         clip = training.finish()
         value = self._kept.measure(training)

@@ -1,4 +1,4 @@
-"""StageWatch: how many seconds of wall time went into which stage of a training. Pauses are left out."""
+"""StageWatch: seconds of wall time of each stage of a training. Pauses are left out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class StageWatch:
 
     Args:
         clock: Seconds; tests bring their own.
-        seconds: What earlier runs of the same training took.
+        seconds: Times of earlier runs of the same training.
     """
 
     def __init__(self, clock: Callable[[], float], seconds: Mapping[str, float] | None = None) -> None:
@@ -34,7 +34,7 @@ class StageWatch:
         return before
 
     def reached(self, stage: str, done: float) -> None:
-        """A report of progress. It comes after the piece of work that it tells of, unless its share is 0."""
+        """A report of progress. It comes after the piece of work that it reports, unless its share is 0."""
         if done > 0 and self._stage is not None:
             self._stage = stage
         self.enter(stage)
@@ -42,8 +42,8 @@ class StageWatch:
     def document(self) -> dict[str, Any]:
         """JSON-able: stages_s by name in the order they were entered; preparation_s and training_s, together all of it.
 
-        Training is the steps with what is measured and kept between them; everything else prepares for them, also
-        where a step begins a new phase.
+        Training is the steps, with measuring and writing between them; everything else is preparation, also where a
+        step begins a new phase.
         """
         self.enter(self._stage)
         training_s = sum(self.seconds.get(stage, 0.0) for stage in (TRAINING, KEEPING))

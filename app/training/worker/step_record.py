@@ -1,4 +1,4 @@
-"""StepRecord: what a run knows of its steps: losses and gradients since the last report, and of all of them."""
+"""StepRecord: a run's figures of its steps: losses and gradients since the last report, and of all of them."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class StepRecord:
         self.rate = SmoothedRate()
         self.n_clipped = 0
         self._loss_sum, self._n_losses = 0.0, 0
-        """Of the steps since the last report."""
+        """Losses of the steps since the last report."""
         self._norms: list[float] = []
-        """Of the gradients of all steps."""
+        """Norms of the gradients of all steps."""
 
     def add(self, stats: StepStats) -> None:
-        """Some steps were done."""
+        """Record that some steps were done."""
         self._loss_sum += stats.loss * len(stats.gradient_norms)
         self._n_losses += len(stats.gradient_norms)
         self._norms += stats.gradient_norms
@@ -51,7 +51,7 @@ class StepRecord:
         )
 
     def figures(self) -> dict[str, Any]:
-        """What a clip stores of its gradients."""
+        """Figures of the gradients that a clip stores."""
         norms = self._norms
         return {
             "gradient_norm_median": statistics.median(norms) if norms else None,

@@ -67,8 +67,8 @@ def main(task: TrainTask, parent: Parent[Event]) -> None:
 
 
 def _redirect_output(path: Path) -> DiskError | None:
-    """Everything printed, by us, by libraries or by a crash, goes to the log file; nowhere where that cannot be, which
-    is returned."""
+    """Everything printed, by us, by libraries or by a crash, goes to the log file, or nowhere if that cannot be opened.
+    Returns the error then."""
     refused = None
     try:
         path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
@@ -93,7 +93,7 @@ def _point_output_to(descriptor: int) -> None:
 
 
 def _flush_output() -> None:
-    """Write what is left. What a full disk does not take is dropped: Python would end with an error because of it."""
+    """Write the rest of the output. A full disk is ignored: Python would end with an error because of it."""
     logging.shutdown()
     try:
         sys.stdout.flush()

@@ -129,7 +129,7 @@ class PhaseOptimizer:
         return self.steps_done, dict(self._adam.steps)
 
     def go_back(self, mark: Mark) -> None:
-        """Forget that steps which changed nothing were counted."""
+        """Undo the count of steps that changed nothing."""
         self.steps_done, self._adam.steps = mark[0], dict(mark[1])
 
     def arrays(self) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Forecast figures of a clip: what trained clips of the project took, else timed steps and rough sizes.
+"""Forecast figures of a clip: from trained clips of the project, else from timed steps and rough sizes.
 
 No torch, no clock, no files.
 """
@@ -21,11 +21,11 @@ _PROGRAM_MB, _CACHE_MB = 650.0, 537.0
 
 @dataclass(frozen=True, slots=True)
 class MeasuredClip:
-    """A trained clip of the same project, and what it took; None where that was not recorded.
+    """A trained clip of the same project, and its costs; None where not recorded.
 
     Attributes:
-        is_source: Whether it began with what another clip had learned.
-        is_still: Whether nothing moved, so that it says nothing of clips in which something may.
+        is_source: Whether it started from another trained clip.
+        is_still: Whether nothing moved, so that it does not count for clips in which something may.
         preparation_s: Without compiling kernels.
     """
 
@@ -40,7 +40,7 @@ class MeasuredClip:
 
     @property
     def step_s(self) -> float | None:
-        """Seconds of a step, with what is done between steps."""
+        """Seconds of a step, with the work between steps."""
         return None if self.training_s is None or not self.n_steps else self.training_s / self.n_steps
 
 

@@ -24,7 +24,7 @@ MOTION_SHARE = 0.4
 def measured_step_s(sizes: StepSizes, phase: str, backend: Backend) -> float:
     """Seconds of a step of a phase, the lower quartile of N_STEPS, on the threads of the kernels.
 
-    A quartile, as the median of a second or two says more about what else runs right now than about minutes of
+    A quartile, as the median of a second or two says more about other load right now than about minutes of
     training.
 
     Args:

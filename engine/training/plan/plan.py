@@ -204,7 +204,7 @@ def make_plan(
         footage: The footage to train on.
         clip: Which frames.
         config: All settings.
-        is_source: Whether the clip begins with what another one has learned, and so has one phase instead of two.
+        is_source: Whether the clip starts from another trained clip, and so has one phase instead of two.
         reference: Header of that other clip; None where it is not trained yet.
         history: Trained clips of the project, in any order; this one, when it is trained again, does not count.
         step_time: Asked where no clip of the same kind was measured.
@@ -260,7 +260,7 @@ def make_plan(
 
 
 def _timed_s(phases: Sequence[tuple[str, int]], step_s: Callable[[str], float | None]) -> float | None:
-    """Seconds of all steps, by what a step of each phase was timed to take; None where one could not be timed."""
+    """Seconds of all steps, from the timed step of each phase; None where one could not be timed."""
     total_s = 0.0
     for phase, n_steps in phases:
         if n_steps:
@@ -289,7 +289,7 @@ def _picture_lines(footage: Footage, clip: Clip, config: TrainConfig, *, is_sour
 
 
 def _anchor_lines(config: TrainConfig, reference: ClipHeader | None, *, is_source: bool) -> list[PlanLine]:
-    """Limits, and what a trained reference clip has; how many anchors a clip gets its pictures decide."""
+    """Limits, and the anchors of a trained reference clip; a clip's pictures decide how many it gets."""
     n_static, n_moving = f"<= {config.max_static_points:,}", f"<= {config.max_moving_points:,}"
     if config.cloud == "frames" and not is_source:
         return [PlanLine("anchors", f"<= {config.max_static_points + config.max_moving_points:,}")]

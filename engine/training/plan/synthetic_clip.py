@@ -55,7 +55,7 @@ def make_clip(
 ) -> ClipModel:
     """A clip with random features, so that no head is at its start. Same seed, same clip but for its dtype.
 
-    Without anything that moves it has no field. `config` gives the widths; the recipe's number of Gaussians counts.
+    Without moving anchors it has no field. `config` gives the widths; the recipe's number of Gaussians counts.
     """
     generator = torch.Generator().manual_seed(seed)
     config = config or TrainConfig(gaussians_per_anchor=recipe.gaussians_per_anchor)

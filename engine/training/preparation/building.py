@@ -1,4 +1,4 @@
-"""From clouds to the parts of a ClipModel: anchor sets, decoder, and what a source clip inherits.
+"""From clouds to the parts of a ClipModel: anchor sets, decoder, and inherited parts of a source clip.
 
 Sizes follow the data and the reasons are returned as lines to report. Nothing here trains or looks at pixels.
 """
@@ -103,7 +103,7 @@ def inheriting_model(reference: ClipState, clip: Clip, backend: ModelBackend, *,
         learns: Whether the anchors keep learning. The decoder is frozen.
     """
     presence = {
-        # promoted anchors are part of the still scene and exist at all times; what moves is not known yet
+        # promoted anchors are part of the still scene and exist at all times; moving parts are not known yet
         role: torch.full((len(record.own), clip.n_frames), role == "promoted")
         for role, record in reference.anchors.items()
         if record.own is not None and record.own.presence is not None
@@ -126,7 +126,7 @@ def moving_anchors(
 
 @dataclass(frozen=True, slots=True)
 class ResidualAnchors:
-    """Which moving points of a source clip become anchors of its own.
+    """The moving points of a source clip that become its own anchors.
 
     Attributes:
         rows: Points that do. [P] bool
@@ -213,7 +213,7 @@ def add_residual(
 
 
 def adapt_moving(model: ClipModel, *, all_of_them: bool = False) -> None:
-    """Inherited moving anchors that exist in this clip become its own, as they are, and learn on; others go.
+    """Inherited moving anchors that exist in this clip become its own, as they are, and keep learning; others go.
 
     Args:
         all_of_them: Also those that exist in none of its frames.

@@ -209,10 +209,10 @@ class ClipPreparation:
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
 
     def source_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
-        """A clip that takes over what another one has learned. Removes the pictures' drift.
+        """A clip that starts from another trained clip. Removes the pictures' drift.
 
         Raises:
-            PreparationError: It needs a static cloud of its own and no static point was found.
+            PreparationError: It needs its own static cloud and no static point was found.
             ProjectError: The reference was trained with other cameras, or the field before cannot continue.
         """
         parts = self._inherited_parts(reference, pictures)
@@ -241,7 +241,7 @@ class ClipPreparation:
         return ClipColors(parts.drift, None if parts.model.light is None else host_array(parts.model.light))
 
     def _inherited_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
-        """A clip that takes over what another one has learned, before it is known what moves."""
+        """A clip that starts from another trained clip, before its moving parts are known."""
         gains = self._gains(reference.arrays["gains"].copy(), is_learning=False)
         if reference.header.camera_names != list(self._cameras.rig.names):
             raise ProjectError(
@@ -264,7 +264,7 @@ class ClipPreparation:
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points):,} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
-        if "static" in self._method.covering(model):  # parts that can change learn their light by themselves
+        if "static" in self._method.covering(model):  # parts that can change learn their own light
             return parts
         measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
         return parts
@@ -308,7 +308,7 @@ class ClipPreparation:
         }
 
     def _keep_after(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> Keep:
-        """Keeps what follows from a model as it is now, the gains and the backgrounds."""
+        """Keeps pieces that follow from a model as it is now, the gains and the backgrounds."""
         arrays = model.own_arrays() | {"gains": host_array(gains), "backgrounds": backgrounds.images}
         name = fingerprint_of(arrays)
         return lambda piece, work: self._stages.keep(f"{name} {piece}", work)
@@ -317,7 +317,7 @@ class ClipPreparation:
         tensor = torch.from_numpy(values).to(self._backend.device, self._backend.dtype)
         return nn.Parameter(tensor, requires_grad=is_learning)
 
-    # ---------------------------------------------------------------- what does not move
+    # ---------------------------------------------------------------- still parts
 
     @property
     def _has_drift(self) -> bool:

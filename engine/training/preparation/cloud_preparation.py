@@ -1,7 +1,7 @@
 """From pixels to clouds: the inputs needed before a clip can be trained.
 
 Reference clip: backgrounds of the training cameras and a dense static cloud first; once the static part has been
-trained, its renders correct the backgrounds, and what differs from them is what moves. Source clip: the reference's
+trained, its renders correct the backgrounds, and pixels that differ from them are moving. Source clip: the reference's
 corrected backgrounds are reused, only the clip's own motion is looked at.
 """
 
@@ -102,7 +102,7 @@ def estimate_backgrounds(
         pictures = pictures if exposure is None else exposure.applied_to(pictures)
         background = estimate_background(pictures, capture.valid(camera))
         masks = [mask for frame in frames if (mask := capture.moving_mask(camera, frame)) is not None]
-        if masks:  # who stands still for most of the time looks like background, but a mask shows it
+        if masks:  # a person who stands still for most of the time looks like background, but a mask shows it
             background.is_stable[2 * np.sum(masks, axis=0) > len(masks)] = False
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
@@ -162,7 +162,7 @@ def _build_static_cloud(
         report(Progress("Building the static cloud", 0.5, line))
 
     def find_sparse() -> Arrays:
-        def alive() -> None:  # whoever wants to stop is heard here
+        def alive() -> None:  # a request to stop is noticed here
             report(Progress("Building the static cloud", 0.5))
 
         return {"points": triangulate(backgrounds.images, rig, is_valid=is_valid, report=say, alive=alive).points}
@@ -206,7 +206,7 @@ def correct_backgrounds(
     report: ReportProgress,
     keep: Keep = do_now,
 ) -> Backgrounds:
-    """Backgrounds after a look at the trained static part, which knows what other cameras saw behind a person.
+    """Backgrounds corrected by the trained static part, which knows what other cameras saw behind a person.
 
     Args:
         render_static: Camera row to the static render in that camera's colours. [H, W, 3] float
@@ -329,7 +329,7 @@ def stable_in_clip(backgrounds: Backgrounds, pictures: TrainingPictures, masks: 
 def filled_from_render(
     backgrounds: Backgrounds, render_static: Callable[[int], np.ndarray], is_valid: np.ndarray | None
 ) -> Backgrounds:
-    """Backgrounds of a trained clip: where nothing was seen to stand still, what its static anchors show instead.
+    """Backgrounds of a trained clip: where nothing was seen to stand still, the render of its static anchors.
 
     There a person stood, or a shadow lay, and the anchors may have taken on its darkness: clips that inherit them have
     to compare with that.
@@ -369,7 +369,7 @@ def frames_cloud(
         report(Progress("Building the cloud", 0.5, line))
 
     def sparse_points(images: np.ndarray, is_valid: np.ndarray | None) -> np.ndarray:
-        def alive() -> None:  # whoever wants to stop is heard here
+        def alive() -> None:  # a request to stop is noticed here
             report(Progress("Building the cloud", 0.5))
 
         return triangulate(images, rig, is_valid=is_valid, report=say, alive=alive).points

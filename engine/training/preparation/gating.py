@@ -1,9 +1,9 @@
-"""Which static anchors of a clip get a dynamic feature: what the user marked, done to the model.
+"""Gives static anchors of a clip a dynamic feature where the user marked them.
 
-Promoted anchors get a dynamic feature and continue from what they have learned; they exist in every frame, because an
+Promoted anchors get a dynamic feature and continue from their learned values; they exist in every frame, because an
 anchor that is there only while it changes would leave a hole while it does not. In the reference clip they become the
-set "promoted", which every source clip inherits and lets its own field change. A source clip cannot touch what it
-inherits: it hides the static anchor, in this clip alone, and puts one that learns in its place, in the set
+set "promoted", which every source clip inherits and lets its own field change. A source clip cannot change
+inherited anchors: it hides the static anchor, in this clip alone, and puts one that learns in its place, in the set
 "replacing". Every other static anchor stays as it is in all clips, bit for bit.
 """
 

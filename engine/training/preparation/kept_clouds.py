@@ -1,6 +1,6 @@
-"""Clouds of all frames of a clip as files: they take minutes, and depend on nothing that is learned but the gains.
+"""Clouds of all frames of a clip as files: they take minutes, and of all learned values depend on the gains alone.
 
-prep/cloud-000010-1f0c9a3e.safetensors    of the clip that begins with frame 10, and of what the key says
+prep/cloud-000010-1f0c9a3e.safetensors    of the clip that begins with frame 10, and of the inputs in the key
 
 A file of another key has another name, so that variants of one training, and trainings anew, find theirs.
 """
@@ -23,7 +23,7 @@ from engine.storage.array_files import ArraysError, read_arrays, write_arrays
 logger = logging.getLogger(__name__)
 
 CLOUD_FILES = "cloud-*.safetensors"
-"""Of all such files of a folder."""
+"""Pattern of all such files of a folder."""
 _VERSION = 1
 """Grows when the same pictures give another cloud."""
 _ARRAYS = {"points": np.float32, "colors": np.float32, "gains": np.float32, "n_of_frames": np.int64}
@@ -33,7 +33,7 @@ def kept_cloud(prep_dir: Path, start: int, key: dict[str, Any], build: Callable[
     """The cloud of a clip from its file, or built and kept.
 
     Args:
-        prep_dir: Folder of what clips share.
+        prep_dir: Folder of files that clips share.
         start: First frame of the clip.
         key: JSON-able: everything that the cloud depends on.
         build: Makes it.

@@ -1,4 +1,4 @@
-"""The light of a source clip: on its static anchors where it meets its neighbours, and in what cameras see of them."""
+"""The light of a source clip: on its static anchors where it meets its neighbours, and in pictures of them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Method: the decisions by which a clip is prepared and trained; this class is the method of the product.
 
-What a clip begins with, what of that learns, which anchors it adds, which of its anchors exist when, which field it
-has, and what a step looks at. A variant overrides single decisions (engine.training.variants); whoever prepares and
-trains a clip asks here and does not know which it is.
+They are about a clip's start, the parts that learn, the anchors it adds, the frames in which its anchors exist, its
+field, and the pixels of a step. A variant overrides single decisions (engine.training.variants); preparation and
+training ask here and do not know which it is.
 """
 
 from __future__ import annotations
@@ -59,13 +59,13 @@ class Method:
         model.decoder.requires_grad_(requires_grad=False)
 
     def covering(self, model: ClipModel) -> list[str]:
-        """Roles of the inherited anchors that cover what is new: those that can change, and so show it."""
+        """Roles of the inherited anchors that cover new points: those that can change, and so show them."""
         return ["moving"]
 
     def choose_residual(
         self, cloud: MovingCloud, is_new: np.ndarray, n_used: int, config: TrainConfig
     ) -> ResidualAnchors:
-        """Which moving points of a source clip become anchors: those that inherited anchors do not cover.
+        """The moving points of a source clip that become anchors: those that inherited anchors do not cover.
 
         Args:
             cloud: The clip's moving points.
@@ -76,7 +76,7 @@ class Method:
         return uncovered_points(cloud, is_new, n_used, config)
 
     def adapt(self, model: ClipModel, config: TrainConfig) -> None:
-        """Which inherited moving anchors become the clip's own: with inherit=moving those that exist in it."""
+        """The inherited moving anchors that become the clip's own: with inherit=moving those that exist in it."""
         if config.inherit == "moving":
             adapt_moving(model)
 
@@ -103,7 +103,7 @@ class Method:
         previous: ClipState | None,
         generator: torch.Generator,
     ) -> str:
-        """Give a clip its field, a fresh one of its own; says its size.
+        """Give a clip its own fresh field; reports its size.
 
         Args:
             spacing: Distance between moving anchors, scene units.
@@ -112,7 +112,7 @@ class Method:
         return fit_field(model, spacing=spacing, config=config, generator=generator)
 
     def final_ratios(self, names: Iterable[str], config: TrainConfig) -> dict[str, float]:
-        """Where rates of parameters end that do not end at `config.final_lr_ratio`, as shares of their start.
+        """Final rates of parameters that do not end at `config.final_lr_ratio`, as shares of their start.
 
         Args:
             names: Of all parameters that learn.

@@ -2,8 +2,8 @@
 
 prep/clip-0000-3.safetensors    some pieces of clip 0, as arrays "piece/array"
 
-The pieces depend on nothing but what the key names; a file with another key, or a damaged one, is removed with a word.
-Everything goes when the clip is finished.
+The pieces depend on nothing but the inputs in the key; a file with another key, or a damaged one, is removed with a
+note. All are removed when the clip is finished.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from engine.storage.files import discard
 from engine.training.retired_settings import without_retired
 
 VERSION = 3
-"""To be raised whenever the code of any preparation step changes what it gives."""
+"""To be raised whenever the code of any preparation step changes its result."""
 WRITE_AFTER_S = 3.0
-"""Pieces are written when so much work has gathered: what takes less is done again rather than written."""
+"""Pieces are written when so much work has gathered: shorter work is repeated rather than written."""
 STAGE = "Starting"
 
 
@@ -111,7 +111,7 @@ class Stages:
         try:
             write_arrays(path, pieces, {"key": self._key}, what="A finished step of the preparation")
             self._is_refused = False
-        except DiskError as error:  # costs time when it is stopped, and nothing else
+        except DiskError as error:  # costs only time when it is stopped
             if not self._is_refused:
                 self._say(f"{error.message} Preparation continues, but stopping it would lose all of it")
             self._is_refused = True
@@ -125,7 +125,7 @@ class Stages:
 
 
 def _current(key: str) -> str:
-    """A key as it would be written now: settings that are retired say nothing."""
+    """A key as it would be written now: retired settings are left out."""
     try:
         values = json.loads(key)
         return json.dumps({**values, "config": without_retired(values["config"])}, sort_keys=True)

@@ -21,7 +21,7 @@ class Point:
         paper: The paper's statement; empty where it is silent.
         released: The behaviour of the released code; empty where it does as the paper says.
         here: The behaviour here; empty where that is as `follows` says.
-        reason: Why the paper or the released code has it otherwise; empty where neither has.
+        reason: Why this differs from the paper or the released code; empty where it does not.
         settings: Values in the preset that make it so.
     """
 

@@ -1,8 +1,8 @@
 """Every point of the published method, in one tuple.
 
-The preset follows the paper where the paper says something, and the released code where it does not. What comes out
-differently all the same is a point with a reason. The tables of docs/method.md are generated from here, and tests
-compare every point with the preset and with the code.
+The preset follows the paper where the paper says something, and the released code where it does not. Each remaining
+difference is a point with a reason. The tables of docs/method.md are generated from here, and tests compare every point
+with the preset and with the code.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Points about the training: what learns, how long, how fast, and against what."""
+"""Points about the training: learning parameters, steps, rates, and losses."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Active tiles: the part of a picture that a source clip's learning Gaussians touch, and the rest as it always is.
 
-Static anchors under frozen heads never change, so what a camera sees of them alone is one picture for the whole clip,
-or, where the light on them changes, a mean of two: what a picture shows is linear in their colours.
-A tile under no learning Gaussian shows that picture whatever is learned, and nothing flows back from it; it need not be
-drawn, compared or differentiated, whether or not the truth changed there. Tiles are found anew at every step, from the
+Static anchors under frozen heads never change, so a camera's picture of them alone is the same for the whole clip, or,
+where the light on them changes, a mean of two: pictures are linear in their colours.
+A tile under no learning Gaussian always shows that picture, and no gradient flows back from it; it need not be drawn,
+compared or differentiated, whether or not the truth changed there. Tiles are found anew at every step, from the
 boxes by which the rasterizer itself bins the learning Gaussians: none is ever missed, and there is nothing to keep in
 step with learning. Parameters learn bit for bit as they do with all tiles.
 """

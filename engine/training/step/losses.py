@@ -27,15 +27,15 @@ def photometric_loss(
 ) -> PhotometricLoss:
     """(1 - w) L1 + w (1 - SSIM) of one picture.
 
-    What does not count is right: where `is_counted` is false or the tile is not active, the truth stands in the place
-    of image * gain, whatever the image holds (background, NaN), and no gradient arises. The loss is that of the whole
+    Other pixels are taken as right: where `is_counted` is false or the tile is not active, the truth replaces
+    image * gain, whatever the image holds (background, NaN), and no gradient arises. The loss is that of the whole
     picture after this replacement: divided by all its pixels, with SSIM also in the 5 px of a replaced region whose
     windows reach into a counted one. So it equals the full loss where the replaced pixels really are right.
 
     With `rest`, tiles that are not active hold a picture that cannot change, and it stands there in place of the truth.
     The gradient by the image is that of the loss of both together, in active tiles, because SSIM sees `rest` up to 5 px
-    beyond them. The value leaves out what depends on rest, truth, gain and mask alone: of two images under one mask,
-    the losses differ by what the losses of the whole pictures differ by.
+    beyond them. The value leaves out terms that depend on rest, truth, gain and mask alone: the losses of two images
+    under one mask differ as much as those of the whole pictures.
 
     Args:
         image: Rendered. [H, W, 3]

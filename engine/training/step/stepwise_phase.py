@@ -1,7 +1,7 @@
 """StepwisePhase: a phase whose steps are done one by one, by the operations of any back end.
 
 Numbers of a step (loss, mean square, norm) stay on the device until the last of a run. Where a step is not finite, the
-device leaves everything as it is from there on; after the run it is done once more, with a look at what went wrong.
+device leaves everything as it is from there on; after the run it is done once more to find the fault.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class StepwisePhase:
         norm = self.optimizer.step(is_sound)
         is_sound = is_sound & norm.isfinite()
         if (gains.requires_grad or cameras.is_learning) and is_sound.item():  # settled on the host
-            if gains.requires_grad:  # a step moves all cameras a little together; what is unseen stays at gain 1
+            if gains.requires_grad:  # a step moves all cameras a little together; unseen ones stay at gain 1
                 with torch.no_grad():
                     gains.copy_(torch.from_numpy(in_gauge(host_array(gains))))
             cameras.settle()
@@ -135,7 +135,7 @@ class StepwisePhase:
             rest=active.rest,
         )
         mean_square, volume = compared.mean_square, compared.loss.new_zeros(())
-        if self.tiles is not None and pixels.dtype == torch.uint8:  # sums of what was taken are kept, no others
+        if self.tiles is not None and pixels.dtype == torch.uint8:  # sums are kept of captured pictures alone
             mean_square = mean_square + self.tiles.square_outside(active, item, pixels, gain)
         loss = compared.loss
         if plan.volume_weight and active.n_all:

@@ -2,7 +2,7 @@
 
 Moving a camera is the same as moving the scene in front of it, so the gradient of a pose follows from the gradients of
 the Gaussians: no kernel knows of it. Where the focal length is concerned, the footprint of a Gaussian is taken to grow
-evenly; what its slant adds away from the picture's centre is left out.
+evenly; the effect of its slant away from the picture's centre is left out.
 
 The learned numbers are counted in pixels: by how much the picture moves at its middle and at a typical depth. So one
 rate suits all seven numbers of all cameras, and their gradients are no larger than others.
@@ -33,7 +33,7 @@ from engine.raster.gaussians import Gaussians
 class TrainingCameras:
     """Cameras of one training. Their corrections learn, or stay as they are.
 
-    The gauge is fixed: what moves, turns or scales all cameras together, or changes all focal lengths alike, is taken
+    The gauge is fixed: a common movement, turn or scale of all cameras, and a common change of focal lengths, are taken
     out of the corrections, to first order. So cameras that were not trained on still fit the scene.
 
     Args:
@@ -56,7 +56,7 @@ class TrainingCameras:
         self._start = start
         self._views: dict[int, View] = {}
         self.first_views = self.views
-        """Views of all cameras, as they were at first: what they may see of the scene is looked up once."""
+        """Views of all cameras, as they were at first: the anchors that they may see are looked up once."""
         self._watched: Gaussians | None = None
 
     @property
@@ -108,7 +108,7 @@ class TrainingCameras:
             self._watched = gaussians
 
     def take_gradient(self, row: int) -> None:
-        """After the backward pass of a picture of one camera: what it says of that camera."""
+        """Take one camera's gradient, after the backward pass of a picture of it."""
         watched, self._watched = self._watched, None
         if watched is None or watched.means.grad is None:
             return
@@ -161,7 +161,7 @@ def correction_gradient(gaussians: Gaussians, pose: np.ndarray, values: np.ndarr
 
 
 def _gradient(tensor: Tensor) -> np.ndarray:
-    """Of a tensor that was drawn; zeros where no pixel showed it. float64"""
+    """Gradient of a tensor that was drawn; zeros where no pixel showed it. float64"""
     return np.zeros(tensor.shape) if tensor.grad is None else host_array(tensor.grad).astype(np.float64)
 
 

@@ -22,18 +22,18 @@ def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
 
 
 MAX_BYTES = 256 << 20
-"""Memory for rows of moving anchors, of each camera and frame; what does not fit is found at every step."""
+"""Memory for rows of moving anchors, of each camera and frame; rows that do not fit are found at every step."""
 
 
 class Sight:
-    """Rows to decode, camera by camera. What a camera can see of anchors that stay in place is found once.
+    """Rows to decode, camera by camera. Visible anchors that stay in place are found once.
 
     Args:
         model: Its sets must stay as they are; another one is needed where anchors come, go or become dynamic.
         views: Of the training cameras.
         reach: How far beyond its anchor a Gaussian may lie, scene units; farther where anchors are larger.
-        reaches: The same anchor by anchor, where that was decided before: sizes are learned, and what a camera can see
-            stays as it was when a phase began. By role, [A] each; those that do not fit the model are decided anew.
+        reaches: The same anchor by anchor, where that was decided before: sizes are learned, and the visible anchors
+            stay those at the beginning of a phase. By role, [A] each; those that do not fit the model are decided anew.
     """
 
     def __init__(

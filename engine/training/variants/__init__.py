@@ -1,1 +1,1 @@
-"""Other decisions than those of the product's method: what ablations, baselines and the published scheme train."""
+"""Other decisions than those of the product's method, for ablations, baselines and the published scheme."""

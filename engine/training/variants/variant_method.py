@@ -82,7 +82,7 @@ class VariantMethod(Method):
         return f"inherited anchors {anchors[self._inherit]}, decoder {heads[self._decoder]}"
 
     def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
-        """New heads have a generator of their own: what else starts at random is the same for any choice."""
+        """New heads have their own generator: other random starts are the same for any choice."""
         if self._decoder == "new":
             model.decoder = Decoder(
                 **asdict(decoder_shape(model.decoder)),
@@ -152,7 +152,7 @@ class VariantMethod(Method):
 
 
 class StreamingMethod(VariantMethod):
-    """start=previous: a clip continues from everything that the clip before has learned, and all of it learns on."""
+    """start=previous: a clip continues from the whole clip before, and all of it keeps learning."""
 
     def __init__(self, config: TrainConfig) -> None:
         super().__init__(config.going_on())
@@ -177,7 +177,7 @@ def merged(state: ClipState) -> ClipState:
 
 
 def _continue_field(model: ClipModel, previous: ClipState, clip: Clip) -> str:
-    """Attach the field that the clip before has learned; it learns on. Says so.
+    """Attach the field of the clip before, which keeps learning; reports it.
 
     Raises:
         ProjectError: It has fewer frames than this clip.
