@@ -1,4 +1,4 @@
-"""Figures that others have published of data that can be trained here too, with their sources and what to beware of.
+"""Figures that others have published of data that can be trained here too, with their sources and caveats.
 
 All are of the Panoptic Sports sequences as Dynamic 3D Gaussians cut them: 150 frames, 640 x 360 px, 27 cameras trained
 on and cameras 0, 10, 15 and 30 tested, colours taken to be as rendered. None was read in the papers themselves, whose
@@ -29,7 +29,7 @@ class Published:
         ssim, lpips: None where not printed. LPIPS is the authors' own.
         source: Where it is printed.
         caveat: Why it is hard to compare; may be empty.
-        n_frames: Of the sequence that it is of; None where that is not said.
+        n_frames: Frames of the sequence that it covers; None where not stated.
     """
 
     method: str
@@ -43,9 +43,9 @@ class Published:
 
 
 CAVEATS = (
-    "Published figures are of all 150 frames where a number stands beside them; S4D's text does not say. "
+    "Published figures are of all 150 frames where a number stands next to them; S4D's text does not say. "
     "That their colours are raw follows from the authors' training code and "
-    "is not said by them: it learns a gain and an offset of each training camera at the first frame, and none of a "
+    "is not stated by them: it learns a gain and an offset of each training camera at the first frame, and none of a "
     "test camera. No code of their evaluation was ever published; re-runs by others differ from the printed figures by "
     "up to 1.7 dB per sequence. Copied from texts that copy the papers' tables. Compare raw PSNR, of all 150 frames; "
     "never PSNR after the colour fit. The highest mean over the six sequences that is known here is 29.83 dB "
@@ -97,7 +97,7 @@ def is_protocol(layout: str, holdout: Collection[str], sizes: Collection[tuple[i
     """Whether a project is of this kind of data and held out the same cameras at the same size.
 
     Args:
-        layout: Of the capture, as `clipgstream inspect` says it.
+        layout: Of the capture, as `clipgstream inspect` prints it.
         holdout: Names of held-out cameras.
         sizes: Of the pictures that were worked with, px, of all cameras.
     """

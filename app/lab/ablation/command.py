@@ -29,7 +29,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("capture", type=path_argument, nargs="?", help="capture folder")
     command.add_argument("--project", type=path_argument, help="folder for one project per variant and the table")
     command.add_argument("--variants", metavar="NAMES", help="separated by commas (default: all; --list names them)")
-    command.add_argument("--list", action="store_true", help="say what the variants are and end")
+    command.add_argument("--list", action="store_true", help="list the variants and exit")
     command.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
     command.add_argument(
         "--source-steps",

@@ -1,8 +1,8 @@
 """Quality over time of variants whose source clips were trained with several numbers of steps.
 
-Every point is a training of its own with rates that fall to their end, not a look at a longer one on its way. Two
-variants are compared at equal PSNR: the best that both reach; times in between are interpolated on the logarithm of
-time along what a curve has reached so far.
+Every point is a separate training whose rates fall to their end, not a point along a longer one. Two variants are
+compared at equal PSNR: the best that both reach; times in between are interpolated on the logarithm of time along the
+best values that a curve has reached so far.
 """
 
 from __future__ import annotations

@@ -33,15 +33,15 @@ MEASURED_FILE = "measured.json"
 
 @dataclass(frozen=True, slots=True)
 class VariantFigures:
-    """Figures of a trained variant, None where one does not exist; on how many frames of each camera; and how fast it
-    is rendered, None where nobody measured that."""
+    """Figures of a trained variant, None where one does not exist; on how many frames of each camera; and its frame
+    rates, None where not measured."""
 
     figures: dict[str, float | None]
     n_frames: int
     rates: FrameRates | None = None
 
     def with_rates(self, rates: FrameRates | None) -> VariantFigures:
-        """The same with how fast it is rendered, which no file of figures holds: times differ from run to run."""
+        """The same with its frame rates, which no file of figures holds: times differ from run to run."""
         return self if rates is None else replace(self, figures=self.figures | rates.figures(), rates=rates)
 
 
@@ -111,7 +111,7 @@ def kept_figures(place: Path, settings: ProjectSettings, scope: VariantScope) ->
     """Figures that an earlier call has measured with these settings; None where there are none."""
     try:
         project = open_project(place, is_writable=False)
-    except ProjectError:  # damaged, or something else of that name
+    except ProjectError:  # damaged, or another file of that name
         return None
     if project.settings != settings:
         return None

@@ -64,7 +64,7 @@ def ablation_section(document: dict[str, Any], seed: int) -> Section:
     keys = [key for name in COLUMNS for key in (name, f"{name}_std") if any(line[key] is not None for line in lines)]
     columns = [
         TableColumn("variant", "Variant"),
-        TableColumn("words", "What it is"),
+        TableColumn("words", "Description"),
         TableColumn("n_seeds", "Seeds"),
         TableColumn("n_frames", "Frames"),
         *(_column(key) for key in keys),

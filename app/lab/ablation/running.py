@@ -1,4 +1,4 @@
-"""Trains and measures the variants of an ablation, each in a project folder of its own; resumes where it stopped.
+"""Trains and measures the variants of an ablation, each in its own project folder; resumes where it stopped.
 
 FOLDER/full-seed0/ and so on are ordinary projects, to be opened, reported or compared like any other. Variants that
 only change source clips take over the reference clip of "full" instead of training the same again.
@@ -74,10 +74,10 @@ def run_ablation(
     callbacks: Callbacks,
     rates_of: RatesOf = lambda opened: None,
 ) -> dict[str, Any]:
-    """Train what is not trained yet, measure what is not measured yet, and write the table after every variant.
+    """Train and measure what is missing, and write the table after every variant.
 
-    What an earlier call has finished in the folder with the same settings, other variants and seeds too, is in the
-    table from the start. Its lines are in the order of VARIANTS, results of a variant in that of the seeds.
+    Results of earlier calls in the folder with the same settings, of other variants and seeds too, are in the table
+    from the start. Its lines are in the order of VARIANTS, results of a variant in that of the seeds.
 
     Args:
         folder: Gets one project per variant and seed, ablation.json and ablation.csv.
@@ -198,7 +198,7 @@ class _Task:
 def _measured(
     place: Path, task: _Task, first: Path, scope: VariantScope, launch: Launch, callbacks: Callbacks, rates_of: RatesOf
 ) -> VariantFigures:
-    """Train what is missing and measure. first: the project whose reference clip this one takes over."""
+    """Train missing clips and measure. first: the project whose reference clip this one takes over."""
     variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
     project = _open(place, settings)
     try:
@@ -242,7 +242,7 @@ def _open(place: Path, settings: ProjectSettings) -> Project:
 
 
 def _take_clouds(project: Project) -> None:
-    """Copy clouds of frames that other variants and seeds have made; their names say what they are of."""
+    """Copy clouds of frames that other variants and seeds have made; their names identify them."""
     project.prep_dir.mkdir(parents=True, exist_ok=True)
     for path in sorted(project.folder.parent.glob(f"*/{project.prep_dir.name}/{CLOUD_FILES}")):
         if (project.prep_dir / path.name).exists():
@@ -255,7 +255,7 @@ def _take_clouds(project: Project) -> None:
 
 
 def _take_reference(project: Project, first: Path) -> None:
-    """Copy the reference clip, and what clips share, of a finished project."""
+    """Copy the reference clip, and files that clips share, of a finished project."""
     source = open_project(first, is_writable=False)
     if project.is_trained(project.settings.reference_clip) or not source.reference_path.is_file():
         return

@@ -62,7 +62,7 @@ VARIANTS = (
     Variant("residual-none", "without residual anchors: inherited anchors only", {"residual": "none"}),
     Variant(
         "residual-full",
-        "without residual anchor compensation (RAC): all points of a clip beside the inherited anchors, however many",
+        "without residual anchor compensation (RAC): all points of a clip next to the inherited anchors, however many",
         {"residual": "full"},
     ),
     Variant("inherit-moving", "inherited moving anchors keep learning, static ones stay", {"inherit": "moving"}),
@@ -137,7 +137,7 @@ VARIANTS = (
         shares_reference=False,
     ),
     # from the published scheme to "full", one part after the other; only time changes where the tiles do. Rates and
-    # lengths are those of "full": what costs is compared at equal rates
+    # lengths are those of "full": costs are compared at equal rates
     *(
         Variant(
             name,
@@ -265,7 +265,7 @@ def settings_of(
 
 
 def _other_length(clip_length: int, n_frames: int, *, is_shorter: bool, is_end: bool) -> int:
-    """Half or twice a clip length, or what comes nearest beyond that and cuts the frames without a remainder."""
+    """Half or twice a clip length, or the nearest one beyond that which cuts the frames without a remainder."""
     lengths = [length for length in range(1, n_frames + 1) if is_end or n_frames % length == 0]
     if is_shorter:
         return max((length for length in lengths if length <= clip_length / 2), default=1)

@@ -1,7 +1,7 @@
 """Adds tOF and LPIPS to the document of an evaluation, which has neither: they take optional packages and long.
 
-They are of held-out cameras, all where none is held out, and of evaluations with all metrics. What was measured is
-kept in the project (PROJECT/evaluations/lab-*.json) until a clip changes.
+They are of held-out cameras, all where none is held out, and of evaluations with all metrics. They are kept in the
+project (PROJECT/evaluations/lab-*.json) until a clip changes.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from engine.errors import EngineError
 from engine.metrics.pictures.colors import to_levels
 
 BLOCK_PX, MARGIN_PX = 32, 16
-"""Sides of what counts are multiples of the first, and shorter than the picture by at least the second."""
+"""Sides of the part that counts are multiples of the first, and shorter than the picture's by at least the second."""
 MIN_SIDE_PX = BLOCK_PX + MARGIN_PX
 """Pictures with a shorter side have no tOF."""
 PYRAMID_SCALE, N_LEVELS, WINDOW_PX, N_ITERATIONS, RADIUS_PX, SIGMA_PX = 0.5, 3, 15, 3, 5, 1.2
@@ -86,7 +86,7 @@ def tof(before: Motion, after: Motion) -> float | None:
 
 
 def optical_flow(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """How far what a pixel shows moves to the right and down until the later picture, px. [H, W, 2] float32
+    """Motion of each pixel's content to the right and down until the later picture, px. [H, W, 2] float32
 
     Args:
         before, after: Grey levels. [H, W] uint8

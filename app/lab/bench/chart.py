@@ -41,7 +41,7 @@ def draw_speed_error(marks: Sequence[SpeedError], path: Path, *, footer: str) ->
         _draw(left, chosen, [mark.value_error for mark in chosen], value_label)
         _draw(right, chosen, [mark.gradient_error for mark in chosen], _GRADIENT_LABEL)
         left.set_ylabel("whole step, ms" if operation == "step" else "forward + backward pass, ms")
-        left.set_title(f"{title}: speed beside error", loc="left", fontsize=11, fontweight="bold")
+        left.set_title(f"{title}: speed against error", loc="left", fontsize=11, fontweight="bold")
         right.set_title("lower left is better", loc="right", fontsize=9, color=FAINT_COLOR)
         right.legend(handles=_legend(right, chosen), fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5))
     figure.supxlabel(footer, fontsize=7, color=FAINT_COLOR)
@@ -49,7 +49,7 @@ def draw_speed_error(marks: Sequence[SpeedError], path: Path, *, footer: str) ->
 
 
 def _draw(axes: Any, marks: Sequence[SpeedError], errors: Sequence[float], label: str) -> None:
-    """Marks of one operation; a line joins the back ends of a scene, whose slope is what speed costs in accuracy."""
+    """Marks of one operation. A line joins the back ends of a scene; its slope is the cost of speed in accuracy."""
     from matplotlib.ticker import NullFormatter
 
     scenes = list(dict.fromkeys(mark.scene for mark in marks))

@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream bench: measure the kernels; prints the table. Returns the exit code."""
     chart = options.out / CHART_FILE
     table_file = None if options.json in (None, "-") else Path(options.json)
-    for path in (chart, table_file):  # said before a minute is spent
+    for path in (chart, table_file):  # before a minute is spent
         if path is not None:
             check_target(path)
     if options.threads is not None and options.threads < 1:

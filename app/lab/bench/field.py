@@ -50,7 +50,7 @@ SCENES = {
 
 
 class DecodeRun:
-    """One back end on one scene: a model with leaves of its own and a fixed upstream gradient."""
+    """One back end on one scene: a model with its own leaves and a fixed upstream gradient."""
 
     def __init__(self, scene: DecodeScene, backend: Backend) -> None:
         self.model: ClipModel = make_clip(scene.recipe, backend=backend)
@@ -83,7 +83,7 @@ class DecodeRun:
         )
 
     def gradients(self) -> dict[str, Tensor]:
-        """Of everything that learns and took part in the last pass, by name."""
+        """Gradients of everything that learns and took part in the last pass, by name."""
         named = self.model.named_parameters()
         return {name: parameter.grad for name, parameter in named if parameter.grad is not None}
 
@@ -96,7 +96,7 @@ def measure_decode(
     Args:
         name: A name of SCENES, or any with `scene`.
         n_runs: Runs that count.
-        has_memory: Also measure peak memory, in a process of its own.
+        has_memory: Also measure peak memory, in a separate process.
     Returns:
         The row of the table, and the marks of the chart. The value error is relative to the largest value of a tensor.
     """

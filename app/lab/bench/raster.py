@@ -83,7 +83,7 @@ def measure_raster(
     Args:
         name: A name of RECIPES, or any with `recipe`.
         n_runs: Runs that count at full size.
-        has_memory: Also measure peak memory, in a process of its own.
+        has_memory: Also measure peak memory, in a separate process.
     Returns:
         The row of the table, and the marks of the chart.
     """

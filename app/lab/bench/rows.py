@@ -128,7 +128,7 @@ class StepErrors:
         loss_error: Of the loss, relative.
         gradient_error: Largest relative error of a gradient over all trainable tensors, as in SpeedError.
         worst_gradient: Name of that tensor.
-        update_error: Largest relative error of what Adam adds to a parameter, given the same gradients.
+        update_error: Largest relative error of Adam's change to a parameter, given the same gradients.
     """
 
     checked_at: str

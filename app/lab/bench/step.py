@@ -1,7 +1,7 @@
-"""One training step on a synthetic clip: whole, cut into its stages, or with everything kept that errors show in.
+"""One training step on a synthetic clip: whole, cut into its stages, or with its values kept to find errors.
 
-Stages are timed by cutting the graph at their boundaries: what a stage yields becomes a leaf of the next one, whose
-gradient is then handed back. The whole step is timed without cuts; it also holds what autograd adds between stages.
+Stages are timed by cutting the graph at their boundaries: a stage's output becomes a leaf of the next one, whose
+gradient is then handed back. The whole step is timed without cuts; it includes autograd's work between stages.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ STAGES = ("decode forward", "raster forward", "loss", "raster backward", "decode
 
 @dataclass(frozen=True, slots=True)
 class StepWindow:
-    """A part of the picture, pixels: what a step draws and compares instead of all of it."""
+    """The part of the picture that a step draws and compares, pixels."""
 
     left: int
     top: int
@@ -44,7 +44,7 @@ class StepOutcome:
         image: Picture before the gain. [H, W, 3]
         loss: Photometric loss and volume term.
         gradients: By name, of every trainable tensor that took part.
-        updates: By name, what Adam added to each of these.
+        updates: By name, Adam's change to each of these.
     """
 
     image: Tensor

@@ -80,7 +80,7 @@ def _by_name(actual: dict[str, Tensor], expected: dict[str, Tensor]) -> dict[str
 def _update_error(recipe: ClipRecipe, window: StepWindow, fast: Backend) -> float:
     """Adam of the fast path compared with float64 given the very same gradients.
 
-    From gradients of its own float64 would differ without meaning: the first step of Adam is the sign of a gradient,
+    With its own gradients float64 would differ without meaning: the first step of Adam is the sign of a gradient,
     and there are entries whose gradient is all rounding.
     """
     run, exact = StepRun(recipe, backend=fast, window=window), StepRun(recipe, backend=EXACT, window=window)

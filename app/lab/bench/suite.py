@@ -19,7 +19,7 @@ class Plan:
     Attributes:
         raster, decode: Scenes.
         iterations: Sizes, each as "joint" and as "source".
-        with_memory: Scenes whose peak memory is measured as well, in a process of its own.
+        with_memory: Scenes whose peak memory is measured as well, in a separate process.
         n_runs: Runs of the kernels that count.
         n_steps: Training steps that count.
     """
@@ -106,7 +106,7 @@ def run_plan(plan: Plan, *, n_threads: int | None = None, say: Say = lambda what
             step, marks = measure_iteration(name, is_source=is_source, n_runs=plan.n_steps)
             report.iterations.append(step)
             report.marks += marks
-    report.fma_per_s = max(report.fma_per_s, measure_fma_limit())  # whoever disturbed the first may be gone
+    report.fma_per_s = max(report.fma_per_s, measure_fma_limit())  # a disturbance of the first may be over
     say("done", 1.0)
     return report
 

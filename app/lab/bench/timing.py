@@ -35,7 +35,7 @@ class Timing:
 def interleaved(
     candidates: Mapping[str, Callable[[], Sequence[float]]], n_runs: int, *, n_warm: int = 2
 ) -> dict[str, list[Timing]]:
-    """Time several candidates in turn, so that what else happens on the machine hits all of them alike.
+    """Time several candidates in turn, so that other load on the machine hits all of them alike.
 
     Args:
         candidates: Each runs once and returns milliseconds of its stages.
@@ -71,7 +71,7 @@ PEAK: ChildKind[PeakJob, Progress, float] = ChildKind(
 
 
 def peak_extra_mb(prepare: Callable[[Argument], Callable[[], object]], argument: Argument) -> float | None:
-    """How far a call pushes the memory of a fresh process beyond what it held before, MB. None if that fails.
+    """Memory that a call adds to a fresh process at its peak, MB. None if that fails.
 
     Args:
         prepare: Importable function that makes everything ready, warms kernels up and returns the call to measure.

@@ -17,7 +17,7 @@ from app.lab.report.page.tables import Table, TableColumn
 from app.project.project_facts import ClipFacts, ProjectFacts
 from engine.training.config import SETTINGS
 
-_PAIR = (TableColumn("what", "What"), TableColumn("value", "Value"))
+_PAIR = (TableColumn("what", "Name"), TableColumn("value", "Value"))
 
 
 def program_version() -> str:
@@ -82,12 +82,12 @@ def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int)
             TableColumn("clip", "Clip"),
             TableColumn("n_points", "Moving points"),
             TableColumn("n_inherited", "On inherited anchors"),
-            TableColumn("n_residual", "Anchors of its own"),
+            TableColumn("n_residual", "Residual anchors"),
             TableColumn("n_left_out", "Beyond the budget"),
             TableColumn("share", "Within reach of an anchor", 3),
             TableColumn("reason", "Budget"),
         )
-        parts.append(Table("coverage", "What moves in later clips, and the anchors that reach it", columns, covered))
+        parts.append(Table("coverage", "Moving points of later clips, and anchors near them", columns, covered))
     if len(measured) < n_clips:
         left = [index for index in range(n_clips) if index not in measured]
         parts.append(f"Not trained, and so in no figure of this page: clip {spans_text(left)}.")

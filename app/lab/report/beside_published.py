@@ -43,7 +43,7 @@ def published_section(compared: Sequence[Compared], capture: Mapping[str, Any]) 
             "The name of the capture's folder says none of the sequences, so all of them are listed: compare with the "
             "one that was filmed."
         )
-    return Section("published", "Beside published figures", [*said, Table("published", "Held out", _COLUMNS, rows)])
+    return Section("published", "Next to published figures", [*said, Table("published", "Held out", _COLUMNS, rows)])
 
 
 def _is_alike(one: Compared, first: Compared) -> bool:

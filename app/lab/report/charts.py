@@ -221,7 +221,7 @@ def draw_stacked(parts: Mapping[str, Sequence[float]], names: Sequence[str], lab
 def draw_speed_error(
     names: Sequence[str], times: Sequence[float], panels: Sequence[SpeedPanel], own: int | None, time_label: str
 ) -> bytes:
-    """Figures against wall time, a mark with a label per result, and the front of those that nobody beats.
+    """Figures against wall time, a mark with a label per result, and the Pareto front.
 
     Args:
         names, times: One per result.

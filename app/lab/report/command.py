@@ -22,7 +22,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="OTHER",
-        help="project folders, or folders of projects, to set beside it",
+        help="project folders, or folders of projects, to compare with it",
     )
     command.add_argument(
         "--out", type=path_argument, metavar="DIR", help="folder for the page (default: PROJECT/reports)"
@@ -31,9 +31,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--boundary",
         type=int,
         metavar="FRAME",
-        help="maps of what changes where the clip that begins at this frame begins (default: where it is worst)",
+        help="maps of changes at the start of the clip that begins at this frame (default: where they are worst)",
     )
-    command.add_argument("--camera", metavar="NAME", help="camera of these maps (default: where it is worst)")
+    command.add_argument("--camera", metavar="NAME", help="camera of these maps (default: where they are worst)")
     command.add_argument(
         "--crop",
         action="append",

@@ -84,12 +84,12 @@ class Compared:
 
     @property
     def megabytes(self) -> float:
-        """Of all clip files."""
+        """Size of all clip files."""
         return self.facts.n_bytes / 1e6
 
     @property
     def mb_per_frame(self) -> float:
-        """The same for each frame that is trained."""
+        """Size per trained frame."""
         return self.megabytes / sum(clip.n_frames for clip in self.facts.clips)
 
 
@@ -163,7 +163,7 @@ def comparability(first: Compared, other: Compared) -> str:
         reasons.append("has figures of other kinds of cameras: held out here, trained on there or the other way round")
     if not reasons:
         return ""
-    return f"{other.facts.name} {' and '.join(reasons)}; its figures cannot be set beside the first one's as they are."
+    return f"{other.facts.name} {' and '.join(reasons)}; its figures cannot be compared with the first one's directly."
 
 
 def _settings_text(first: Compared, one: Compared) -> str:
@@ -175,7 +175,7 @@ def _settings_text(first: Compared, one: Compared) -> str:
 
 
 def speed_section(compared: Sequence[Compared]) -> Section:
-    """PSNR and flicker against wall time, with the results that nobody beats."""
+    """PSNR and flicker against wall time, with the Pareto front."""
     timed = [(one, one.minutes) for one in compared if one.minutes is not None]
     unknown = [one.facts.name for one in compared if one.minutes is None]
     parts: list = []

@@ -43,7 +43,7 @@ def storage_section(facts: ProjectFacts) -> Section:
             [f"clip {clip.clip_index}" for clip in facts.clips],
             "megabytes",
         ),
-        "Bytes of each clip file by what they describe. A source clip stores what it owns, not what it inherits.",
+        "Bytes of each clip file by component. A source clip stores its own parts, not the inherited ones.",
         f"Stacked bars of {len(facts.clips)} clip files by component; {said}",
     )
     return Section("storage", "Storage", [said, chart, Table("storage", "Bytes per component", columns, rows)])
@@ -82,7 +82,7 @@ def times_section(facts: ProjectFacts) -> Section:
         )
     parts: list = [
         "Wall time, pauses left out. Kernels are compiled once on every machine, so that time is not counted; "
-        "preparation includes what a step builds when it begins a new phase."
+        "preparation includes the work with which a step begins a new phase."
     ]
     unknown = [clip.clip_index for clip in facts.clips if clip.wall_s is None]
     if unknown:

@@ -140,7 +140,7 @@ def _cost_charts(rows: Sequence[dict[str, Any]]) -> list[Figure]:
         panels.append(CurvePanel("memory, MB", [ChartLine("most held", _column(rows, "memory_mb"), is_main=True)]))
     if not panels:
         return []
-    caption = "What each clip took on the machine that trained it, kernels compiled before."
+    caption = "Time and memory of each clip on the machine that trained it, kernels compiled before."
     return [_chart("length_costs", rows, panels, caption)]
 
 

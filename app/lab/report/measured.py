@@ -84,7 +84,7 @@ def clips_section(evaluation: dict[str, Any]) -> Section:
     table = Table("clip_metrics", "Figures per clip", columns, rows)
     definitions = Table("columns", "Columns", meaning_columns, meaning)
     rows_table = _rows_table("pictures", "Every picture that was measured", evaluation["rows"])
-    parts_shown = [said, table, Folded("What each figure is", definitions), _cameras(evaluation), rows_table]
+    parts_shown = [said, table, Folded("Definitions of the figures", definitions), _cameras(evaluation), rows_table]
     return Section("clips", "Figures per clip", parts_shown)
 
 
@@ -208,7 +208,7 @@ def worst_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) ->
         words = "PSNR" if name == "psnr" else "PSNR of moving pixels"
         what = f"Camera {row['camera']}, frame {row['frame_index']}, clip {row['clip_index']}"
         caption = f"{what}: worst in {words}, {row[name]:.2f} dB."
-        alt = f"Truth, render and error beside each other. {caption}"
+        alt = f"Truth, render and error side by side. {caption}"
         parts.append(Figure(f"worst_{number:02d}", draw_pictures(truth, image, ERROR_RANGE), caption, alt))
         tick()
     for name, listed in evaluation["means"]["worst"][group].items():

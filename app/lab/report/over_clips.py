@@ -1,8 +1,8 @@
-"""The section on quality over the clips: what a clip loses against its reference clip, and by what.
+"""The section on quality over the clips: how much a clip loses against its reference clip, and why.
 
-Colour is what the colour fit gets back, light what a fit of smooth local brightness gets back beyond that; the rest is
-shape and texture, and grows with the distance in time. Next to it the exposure of the cameras, which is measured and
-removed before training.
+Colour is the part that the colour fit recovers, light the part that a fit of smooth local brightness recovers beyond
+that; the rest is shape and texture, and grows with the distance in time. The section also shows the exposure of the
+cameras, which is measured and removed before training.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class ClipExposure:
 
 
 def exposures_of(opened: TrainedProject, clip_indices: Sequence[int]) -> dict[int, ClipExposure]:
-    """Of trained clips, by index.
+    """Exposures of trained clips, by index.
 
     Raises:
         ProjectError: A clip is damaged.
@@ -63,16 +63,16 @@ def exposures_of(opened: TrainedProject, clip_indices: Sequence[int]) -> dict[in
 
 
 def over_clips_section(evaluation: dict[str, Any], exposures: Mapping[int, ClipExposure]) -> Section:
-    """PSNR of every clip by three measures, what is lost by what, and the exposure of the cameras."""
+    """PSNR of every clip by three measures, its losses by cause, and the exposure of the cameras."""
     group = main_group(evaluation)
     means = {int(index): found[group] for index, found in evaluation["means"]["clips"].items()}
     rows = [_row(index, means, exposures[index]) for index in means]
     said = (
-        f"Means over the {GROUP_WORDS[group].replace(' ', '-')} cameras. Against the clip it inherits from, a clip "
-        "loses by colour what a gain and an offset per channel get back, by light what a smooth local factor gets back "
-        "beyond that, and the rest by distance: what has moved since. A negative loss is a gain. Exposure is how far "
-        "the training cameras are from their exposure in the reference clip, on average; it was removed from the "
-        "pictures that the clip was trained on."
+        f"Means over the {GROUP_WORDS[group].replace(' ', '-')} cameras. Losses are against the clip that a clip "
+        "inherits from: colour is the part that a gain and an offset per channel recover, light the part that a smooth "
+        "local factor recovers beyond that, and the rest is due to changes since. A negative loss is a gain. Exposure "
+        "is how far the training cameras are from their exposure in the reference clip, on average; it was removed "
+        "from the pictures that the clip was trained on."
     )
     chart = Figure(
         "psnr_over_clips",
@@ -89,7 +89,7 @@ def over_clips_section(evaluation: dict[str, Any], exposures: Mapping[int, ClipE
         TableColumn("lost_light", "Lost by light", 2, unit="dB"),
         TableColumn("lost_rest", "Lost by the rest", 2, unit="dB"),
     )
-    table = Table("over_clips", "What each clip loses against the clip it inherits from", columns, rows)
+    table = Table("over_clips", "Loss of each clip against the clip it inherits from", columns, rows)
     return Section("over_clips", "Quality over clips", [said, chart, table, *_exposure_parts(exposures)])
 
 

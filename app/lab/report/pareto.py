@@ -1,4 +1,4 @@
-"""Which of several results nobody else beats in both respects."""
+"""The Pareto front: results that no other one beats in both respects."""
 
 from __future__ import annotations
 

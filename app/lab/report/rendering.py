@@ -41,7 +41,7 @@ def rendering_section(compared: Sequence[Compared]) -> Section | None:
     if not rows:
         return None
     said = (
-        f"{DEFINITION} The rasterizer leaves out what the camera cannot see, as eval and render do; the window decodes "
-        "and draws all of the clip. Measured on the machine that wrote this page, whatever else it did meanwhile."
+        f"{DEFINITION} The rasterizer leaves out anchors that the camera cannot see, as eval and render do; the window "
+        "decodes and draws all of the clip. Measured on the machine that wrote this page, under any load it had then."
     )
     return Section("rendering", "Rendering", [said, Table("rendering", "Pictures per second", _COLUMNS, rows)])

@@ -24,7 +24,7 @@ _LETTERS = {"change": "R", "truth_change": "G", "excess": "E"}
 
 
 def seams_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) -> Section:
-    """Scores and ratios of every boundary, maps of its worst camera, and what is normal inside the clips."""
+    """Scores and ratios of every boundary, maps of its worst camera, and normal values inside the clips."""
     seams = evaluation["seams"]
     parts: list[Any] = []
     if not seams["boundaries"]:
@@ -32,9 +32,9 @@ def seams_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) ->
     else:
         parts += [
             "R is the change of the render from one frame to the next, G that of the truth, E = max(R - G, 0). The "
-            "score is E on static pixels at the boundary less what is normal inside the two clips; 0: no seam. A "
-            "ratio is mean R at the boundary / mean R inside; 1: no seam. Moving pixels may move more at a boundary "
-            "than elsewhere; the ratio of the truth says by how much.",
+            "score is E on static pixels at the boundary minus its normal value inside the two clips; 0: no seam. "
+            "A ratio is mean R at the boundary / mean R inside; 1: no seam. Moving pixels may move more at a boundary "
+            "than elsewhere; the ratio of the truth shows by how much.",
             _boundaries(seams),
             *_two_clips(seams["rows"]),
         ]
@@ -50,7 +50,7 @@ def seams_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) ->
         parts.append(_by_camera(seams))
     parts += [
         Folded(
-            "What these figures are",
+            "Definitions",
             Table(
                 "seam_definitions",
                 "Definitions of the seam figures",
@@ -105,8 +105,8 @@ def _two_clips(rows: Sequence[dict[str, Any]]) -> list[Part]:
     frames = sorted({row["frame_index"] for row in borders if not row["is_held"]})
     n_held = len({row["frame_index"] for row in borders if row["is_held"]})
     held = (
-        f"At {n_held} of the borders the field of the clip before ends with its last frame: asked for the first frame "
-        "of the next clip it answers with that one, so what two clips say of one instant differs by R there."
+        f"At {n_held} of the borders the field of the clip before ends with its last frame and gives that one for "
+        "the first frame of the next clip too, so the two clips differ by R there at one instant."
     )
     if not frames:
         return [held] if n_held else []
@@ -216,5 +216,5 @@ def _maps(boundary: dict[str, Any], pictures: Pictures) -> Figure:
         f"{score:.2f}/255. Drawn from {MAP_RANGE[0]:g} to {MAP_RANGE[1]:g} in every map; grey pixels belong to the "
         "other part."
     )
-    alt = f"Four maps beside each other: R, G, E on static and E on moving pixels. {caption}"
+    alt = f"Four maps side by side: R, G, E on static and E on moving pixels. {caption}"
     return Figure(f"seam_{frame:06d}", draw_maps(panels, MAP_RANGE, "colours in 0..1"), caption, alt)

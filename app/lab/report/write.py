@@ -51,7 +51,7 @@ PAGE_FILE, NUMBERS_FILE = "report.html", "report.json"
 FIGURES, TABLES = "figures", "tables"
 _OWN_FILE = re.compile(rf"(?:{FIGURES}|{TABLES})/[\w-]+\.(?:png|csv)")
 OnStage = Callable[[str, int, int], None]
-"""Gets what is done at the moment, and how many of how many pieces of it are finished."""
+"""Receives the present stage, and how many of how many pieces of it are finished."""
 
 
 def write_report(

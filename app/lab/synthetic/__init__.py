@@ -1,6 +1,6 @@
 """The synthetic sample capture: a textured room that Open3D ray-casts, so that its truth is not made of Gaussians.
 
-`python -m app.lab.synthetic --out assets/sample` regenerates what the project ships. Tests call `write_capture` with
+`python -m app.lab.synthetic --out assets/sample` regenerates the shipped sample. Tests call `write_capture` with
 small sizes. Ground truth: `make_truth` (depth, object and motion masks) and `SceneCamera` (pictures, coverage).
 """
 

@@ -1,9 +1,9 @@
 """Pictures and truth of the sample scene by ray casting triangles with Open3D. No Gaussian is involved.
 
 A picture takes supersampling^2 rays per pixel, shades each hit (Lambert with an area lamp, ambient light) in linear
-light, averages and encodes. What stands still is cast once per camera and set of present parts; moving parts are
-cast per frame inside the rectangle they can cover, and win where they are nearer. Standing parts cast shadows; moving
-ones receive them but cast none, which keeps what is static in the pictures truly static.
+light, averages and encodes. Still parts are cast once per camera and set of present parts; moving parts are cast
+per frame inside the rectangle they can cover, and win where they are nearer. Still parts cast shadows; moving ones
+receive them but cast none, which keeps static pixels truly static.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from app.lab.synthetic.meshes import Mesh
 from app.lab.synthetic.scene import LIGHT_POSITION, LIGHT_RADIUS, Part, SyntheticScene
 
 AMBIENT = 0.42
-"""Light that reaches a surface whatever its direction."""
+"""Light that reaches a surface in any direction."""
 LAMP = 0.85
 """Light of the lamp on a surface that faces it at LAMP_DISTANCE."""
 LAMP_DISTANCE = 2.2

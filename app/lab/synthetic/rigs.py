@@ -16,15 +16,15 @@ RING_HEIGHTS = (1.05, 1.85)
 FOCUS = np.array([0.0, 0.0, 0.62])
 """The point that the cameras look at, give or take some centimetres."""
 FORWARD_WIDTH = 3.2
-"""From the leftmost to the rightmost camera of a forward-facing rig."""
+"""Width of a forward-facing rig, from the leftmost to the rightmost camera."""
 FORWARD_DISTANCE = 2.7
-"""Of a forward-facing rig from the middle of the room."""
+"""Distance of a forward-facing rig from the middle of the room."""
 FORWARD_FOCUS = np.array([0.0, 0.9, 0.8])
 """The point that forward-facing cameras look at: behind the middle, so that their axes are not far from parallel."""
 DOME_RADIUS = 2.4
 """Distance of the lowest cameras of the half dome from the middle of the room."""
 DOME_HEIGHTS = (0.55, 2.55)
-"""Of the lowest and of the highest camera of the half dome."""
+"""Heights of the lowest and of the highest camera of the half dome."""
 
 
 def make_rig(n_cameras: int, size: tuple[int, int]) -> CameraRig:

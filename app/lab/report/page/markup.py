@@ -15,7 +15,7 @@ class Markup(str):
 
 
 def escaped(text: object) -> Markup:
-    """Text as HTML that shows it; Markup as it is. What UTF-8 cannot hold becomes a question mark."""
+    """Text as HTML that shows it; Markup as it is. Characters that UTF-8 cannot hold become question marks."""
     if isinstance(text, Markup):
         return text
     return Markup(html.escape(str(text).encode("utf-8", "replace").decode("utf-8"), quote=True))

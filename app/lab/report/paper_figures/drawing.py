@@ -18,7 +18,7 @@ _DPI = 150
 
 @dataclass(frozen=True, slots=True)
 class ChangeColumn:
-    """R and E of one project. change_said, excess_said: their means.  change, excess: [H, W] in 0..1."""
+    """R and E of one project. change_said, excess_said: their means. change, excess: [H, W] in 0..1."""
 
     title: str
     change_said: str
@@ -53,7 +53,7 @@ def draw_change_maps(
             axes.set_axis_off()
         options = map_options(value_range)
         shown = _show(grid[0, 0], truth_change, f"capture\nG {truth_said}", options)
-        _show(grid[1, 0], truth, "what the camera took", {})
+        _show(grid[1, 0], truth, "captured picture", {})
         for i, column in enumerate(columns, start=1):
             band, place = divmod(i, n_columns)
             name = shortened(column.title)
@@ -88,7 +88,7 @@ def draw_picture_rows(titles: Sequence[str], rows: Sequence[tuple[str, Sequence[
 
 
 def as_8bit(picture: np.ndarray) -> np.ndarray:
-    """A picture for the screen: bytes as they are, colours in 0..1 rounded, what is not a number black. uint8"""
+    """A picture for the screen: bytes as they are, colours in 0..1 rounded, NaN black. uint8"""
     if picture.dtype == np.uint8:
         return picture
     return np.rint(255.0 * np.clip(np.nan_to_num(picture), 0.0, 1.0)).astype(np.uint8)
