@@ -14,7 +14,7 @@ from engine.progress import Progress
 
 
 def main(job: MendJob, parent: Parent[Progress]) -> MendResult:
-    """Mend what the job names; leave drafts of clips."""
+    """Carry out the job; leaves drafts of clips."""
     if job.is_window_open:
         lower_process()  # before any thread computes, since threads take over the priority
     start_logging()

@@ -23,7 +23,7 @@ N_SEAMS_PER_CALL = 20
 
 @dataclass(frozen=True, slots=True)
 class RowFigures:
-    """Of one picture. None where a figure does not exist.
+    """Figures of one picture. None where a figure does not exist.
 
     Attributes:
         psnr: dB
@@ -40,7 +40,7 @@ class RowFigures:
 
 @dataclass(frozen=True, slots=True)
 class PairFigures:
-    """Of two neighbouring frames of one camera, by the later one. None where a figure does not exist.
+    """Figures of two neighbouring frames of one camera, by the later one. None where a figure does not exist.
 
     Attributes:
         excess: Mean E over all pixels, 0..1

@@ -89,5 +89,5 @@ class CurveReader:
         return known
 
     def close(self) -> None:
-        """End the thread, without waiting for what it reads."""
+        """End the thread, without waiting for a read."""
         self.worker.close(timeout_s=0.1)

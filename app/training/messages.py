@@ -58,7 +58,7 @@ class TrainJob(Struct, frozen=True):
 
     @property
     def clip_index(self) -> int:
-        """Of the clip."""
+        """Index of the clip."""
         return self.clip.clip_index
 
 
@@ -191,7 +191,7 @@ class TrainingFailed(Struct, frozen=True, tag=True):
 
 
 class WorkerDied(Struct, frozen=True, tag=True):
-    """The process ended without an ending of its own. Made on the window's side, never sent.
+    """The process ended without sending an ending. Made on the window's side, never sent.
 
     Attributes:
         reason: Without a full stop.

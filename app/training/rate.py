@@ -47,5 +47,5 @@ class SmoothedRate:
         return self._units / self._seconds if self._seconds > 0 else 0.0
 
     def eta_s(self, left: float) -> float | None:
-        """Seconds for what is left; None when unknown."""
+        """Seconds for the rest; None when unknown."""
         return left / self.per_s if self.per_s > 0 else None

@@ -93,7 +93,7 @@ class TrainingService:
 
     @property
     def leading(self) -> ClipRun | None:
-        """Of the clips that train, the one that began first; None while none does."""
+        """The clip in training that began first; None without one."""
         return next(iter(self.runs.values()), None)
 
     @property

@@ -21,7 +21,7 @@ class Decoder(nn.Module):
     """The heads: [f_s; f_d] of anchors to raw values of K Gaussians per anchor. `engine.model.decoding` runs
     them.
 
-    The four first layers are one matrix and the four second layers a block each; each head has parameters of its own
+    The four first layers are one matrix and the four second layers a block each; each head has its own parameters
     so that its learning rate can differ.
 
     Args:

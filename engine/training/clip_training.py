@@ -153,7 +153,7 @@ class ClipTraining:
     # ---------------------------------------------------------------- preparation
 
     def prepare(self) -> None:
-        """Load pictures and build what the first phase needs.
+        """Load pictures and build the inputs of the first phase.
 
         Raises:
             PreparationError, CaptureError: Clouds cannot be built or pictures cannot be read.

@@ -74,7 +74,7 @@ def run_ablation(
     callbacks: Callbacks,
     rates_of: RatesOf = lambda opened: None,
 ) -> dict[str, Any]:
-    """Train and measure what is missing, and write the table after every variant.
+    """Train and measure missing variants; writes the table after every one.
 
     Results of earlier calls in the folder with the same settings, of other variants and seeds too, are in the table
     from the start. Its lines are in the order of VARIANTS, results of a variant in that of the seeds.

@@ -44,7 +44,7 @@ COLUMNS: dict[str, tuple[str, int]] = {
 """Figure to its heading and decimals. Held-out cameras, raw colours unless the name says fit. PSNR in dB. "later" ones
 are means over the clips that inherit, their time that of preparation and training."""
 DEFINITION = definition_of('the borders are those of the clips of "full" for every line')
-"""Of flicker and seam ratios."""
+"""Definition of flicker and seam ratios."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,7 +54,7 @@ class Variant:
 
 FULL = "full"
 MIN_STEPS_PER_FRAME = 20
-"""Of a stream, also where the clips of "full" have fewer."""
+"""Least number for a stream, also where the clips of "full" have fewer."""
 VARIANTS = (
     Variant(FULL, "the settings as they are"),
     Variant("decoder-new", "without decoder inheritance (DI): new heads in every source clip", {"decoder": "new"}),

@@ -21,7 +21,7 @@ _LABEL_OFFSETS = ((7, 5), (7, -12), (-7, 5), (-7, -12), (7, 17), (7, -24), (-7, 
 """Places of a label next to its mark, points of the typeface; the first that is free is taken."""
 _LABEL_LENGTH = 28
 MAX_NAMED_MARKS = 6
-"""Of more results the marks are numbered, and the names stand next to the panels."""
+"""Above so many results the marks are numbered, and the names stand next to the panels."""
 MANY_VALUES = 100
 """Values over which lines are drawn thinner and without marks."""
 MANY_BORDERS, MAX_BORDERS = 15, 120

@@ -23,7 +23,7 @@ def evaluation_of(
     say: Callable[[str], None],
     measuring: Measuring | None = None,
 ) -> dict[str, Any]:
-    """The evaluation document of a project's trained clips; measures what is not kept in the project.
+    """The evaluation document of a project's trained clips; measures figures that the project lacks.
 
     Args:
         choices: Metrics that will do, the best first; the last is measured where none is there completely.
@@ -32,7 +32,7 @@ def evaluation_of(
         on_progress, say, measuring: See app.evaluation.evaluation.evaluate_project.
     Raises:
         ProjectError: A clip is damaged or does not fit.
-        KeyboardInterrupt: With what is kept, in a sentence.
+        KeyboardInterrupt: With the progress kept, in a sentence.
     """
     held_out = opened.capture.camera_indices(opened.project.settings.holdout) if is_held_out_enough else []
     cameras = held_out or range(len(opened.capture.rig))

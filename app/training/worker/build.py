@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def build_training(job: TrainJob, store: ClipStore, report: ReportProgress) -> Training:
-    """Compile what is not compiled yet, open the capture, read the reference clip if needed, set the training up.
+    """Compile missing kernels, open the capture, read the reference clip if needed, set the training up.
 
     Raises:
         CaptureError, ProjectError: Files are missing, damaged or do not fit together.

@@ -15,7 +15,7 @@ RETRY_AFTER_S = (1.0, 2.0, 4.0, 10.0)
 PATIENCE_S = 7.0
 """How long a finished clip is tried again where no user is waiting and a checkpoint holds all of it."""
 PATIENCE_UNKEPT_S = 60.0
-"""Likewise, where it exists in memory only."""
+"""The same where it exists in memory only."""
 
 
 class ProjectGone(TrainingError):

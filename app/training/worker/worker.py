@@ -47,7 +47,7 @@ def main(task: TrainTask, parent: Parent[Event]) -> None:
     logger.info("worker %d trains clip %d with %d threads", os.getpid(), job.clip_index, n_threads)
 
     def send(event: Event) -> None:
-        with suppress(Unwanted):  # nobody listens any more; `receive` says so too and ends the run
+        with suppress(Unwanted):  # the window is gone; `receive` notices that too and ends the run
             parent.report(event)
 
     if refused is not None:

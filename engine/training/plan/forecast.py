@@ -14,7 +14,7 @@ from engine.clip_files.clip_header import ClipHeader
 _START_S, _CAMERA_S, _PICTURE_S = {True: 2.5, False: 3.5}, 0.45, 5e-3
 """Rough preparation: of a source clip or not; of a camera whose depths are found; of a picture."""
 _DEPTHS_S = 0.15
-"""Of a picture whose depths are found with those of the frame before as a start."""
+"""Likewise of a picture whose depths start from those of the frame before."""
 _PROGRAM_MB, _CACHE_MB = 650.0, 537.0
 """Python, torch, numba and compiled kernels; decoded pictures that a capture keeps at most."""
 

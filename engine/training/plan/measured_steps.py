@@ -18,7 +18,7 @@ from engine.training.step.losses import photometric_loss
 
 N_WARM, N_STEPS = 10, 40
 MOTION_SHARE = 0.4
-"""Of width and height: moving parts are mostly in the middle of a picture, so that source clips draw a part of it."""
+"""Share of width and height: moving parts are mostly in the middle of a picture, so source clips draw part of it."""
 
 
 def measured_step_s(sizes: StepSizes, phase: str, backend: Backend) -> float:

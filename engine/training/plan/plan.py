@@ -24,9 +24,9 @@ Value = int | float | str | None
 _STATIC_PER_PIXEL, _ALIVE_PER_PIXEL = 0.19, 0.035
 """Anchors per pixel of one picture where nothing better is known: static ones, and moving ones alive in a frame."""
 _KEEPING_SHARE = 0.03
-"""Of the steps' time: held-out figures, snapshots and checkpoints between them."""
+"""Share of the steps' time that held-out figures, snapshots and checkpoints add."""
 SEEN_SHARE = 0.6
-"""Of the static anchors, those that one camera sees."""
+"""Share of the static anchors that one camera sees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class PlanLine:
 
     Attributes:
         name: As shown to the user.
-        value: Number or words; None where nobody can know yet.
+        value: Number or words; None where not known yet.
         unit: "" where there is none.
     """
 
@@ -85,7 +85,7 @@ class TrainingPlan:
         preparation_s, training_s: Forecast; together the wall time, compiling of kernels left out.
         memory_mb: Most that the training process will hold, 10^6 bytes.
         disk_mb: The finished clip, 10^6 bytes.
-        steps_done: Of n_steps, where a stopped training resumes; the times are of what is left.
+        steps_done: Of n_steps, where a stopped training resumes; the times are of the rest.
     """
 
     clip_index: int
@@ -160,7 +160,7 @@ class Footage:
 
     @property
     def n_pixels(self) -> int:
-        """Of one picture."""
+        """Pixels of one picture."""
         return self.width * self.height
 
 

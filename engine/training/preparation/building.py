@@ -31,7 +31,7 @@ _REACH_SPACINGS = 1.05
 """How far an anchor stands in for points that did not become anchors: the voxels that share a face with its own."""
 
 _MIN_SQUARE = 1e-7
-"""Of a distance to neighbours, scene units squared, as released: points that coincide."""
+"""Least distance to neighbours, scene units squared, as released: for points that coincide."""
 
 
 def static_model(

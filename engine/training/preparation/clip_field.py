@@ -15,7 +15,7 @@ from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
 
 _MOST_LOG2 = 20
-"""Of table entries where every anchor is in the field, so that each has as many of them as with the gate."""
+"""log2 of the most table entries where every anchor is in the field, so that each has as many as with the gate."""
 
 
 def fit_field(

@@ -28,7 +28,7 @@ class Method:
 
     Attributes:
         learns_inherited: Whether all inherited anchors keep learning; they are stored with the clip then.
-        builds_static: Whether a source clip has static anchors of its own in place of all inherited ones.
+        builds_static: Whether a source clip has its own static anchors in place of all inherited ones.
         obeys_regions: Whether regions that the user marks count.
         has_active_tiles: Whether a step of a source clip may leave out tiles that nothing learning touches.
         keeps_unread_entries: Whether entries of the field that no anchor of the clip reads are stored.

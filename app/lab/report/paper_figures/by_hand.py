@@ -65,8 +65,8 @@ def checked_places(wishes: FigureOptions, capture: Capture, projects: Sequence[P
         capture: Of the first project.
         projects: All that are compared, the page's own first.
     Raises:
-        ProjectError: There is no such camera, no clip begins at that frame, or a window lies outside of the picture or
-            of what is trained.
+        ProjectError: There is no such camera, no clip begins at that frame, or a window lies outside of the picture
+            or of the trained frames.
     """
     camera = None if wishes.camera is None else _camera(wishes.camera, capture, "--camera")
     fingerprint = projects[0].settings.fingerprint

@@ -19,7 +19,7 @@ _WAYS: dict[Features, str] = {"both": "full render", "static": "f_s only", "dyna
 
 
 def features_section(own: Pictured) -> Section:
-    """Of the page's own project: a picture of the reference clip and one of the last clip that inherits."""
+    """Pictures of the page's own project: one of the reference clip and one of the last clip that inherits."""
     rows: list[tuple[str, list]] = []
     table: list[dict[str, Any]] = []
     for row in chosen_pictures(own):
