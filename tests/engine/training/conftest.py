@@ -25,6 +25,16 @@ def depth_maps_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def small_backdrop() -> Iterator[None]:
+    """A twentieth of the points behind everything: enough where brute force draws them."""
+    from engine.cloud.stereo import unseen
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(unseen, "N_BACKDROP", unseen.N_BACKDROP // 20)
+        yield
+
+
 @pytest.fixture(scope="session")
 def tiny(tmp_path_factory: pytest.TempPathFactory, built_once: BuiltOnce) -> Tiny:
     """See tests.engine.training.tiny_training."""

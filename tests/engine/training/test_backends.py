@@ -62,7 +62,7 @@ def train(
 
 
 @pytest.fixture(scope="module")
-def by_kernels(tiny, tmp_path_factory) -> list[tuple[list[float], ClipState]]:
+def by_kernels(tiny, small_backdrop, tmp_path_factory) -> list[tuple[list[float], ClipState]]:
     """Clips 0 and 1 by the compiled kernels."""
     folder = tmp_path_factory.getbasetemp() / "by_kernels"
     first = train(tiny, backend_called("cpu"), 0, None, folder)

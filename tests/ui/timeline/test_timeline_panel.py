@@ -416,19 +416,24 @@ ROWS = [
 ]
 
 
-@pytest.mark.parametrize("name", [*ROWS, "timeline.seam3", "timeline.seam7", "timeline.marker128", "quality", "stale"])
-def test_whatever_the_pointer_rests_on_says_what_it_is(open_pilot: Callable[..., Pilot], name: str) -> None:
+def test_whatever_the_pointer_rests_on_says_what_it_is(open_pilot: Callable[..., Pilot]) -> None:
     session = long_session(300, 10)
     session.clip_states[1] = ClipStatus("stale", reason="Its reference was trained again: 100 % ## %s.")
     pilot = open_pilot(session)
     pilot.move(5, 5)
     pilot.draw(60)
     before = pilot.picture()
-    row = pilot.rects["timeline.fold quality"]
-    places = {"quality": (x_of(pilot, 40.0), row.center[1]), "stale": pilot.rects["timeline.clip1"].center}
-    pilot.move(*(places.get(name) or pilot.rects[name].center))
-    pilot.draw(60)
-    assert (pilot.picture() != before).any(axis=2).sum() > 1_500, "a note covers that many pixels"
+    names = [*ROWS, "timeline.seam3", "timeline.seam7", "timeline.marker128"]
+    places = {name: pilot.rects[name].center for name in names}
+    places["quality"] = (x_of(pilot, 40.0), pilot.rects["timeline.fold quality"].center[1])
+    places["stale"] = pilot.rects["timeline.clip1"].center
+    for name, place in places.items():
+        pilot.move(*place)
+        pilot.draw(60)
+        assert (pilot.picture() != before).any(axis=2).sum() > 1_500, f"the note of {name} covers that many pixels"
+        pilot.move(5, 5)
+        pilot.draw(4)
+        assert (pilot.picture() != before).any(axis=2).sum() < 200, f"the note of {name} goes with the pointer"
     assert len(session.notices) == 0
 
 

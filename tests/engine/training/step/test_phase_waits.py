@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,7 +19,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 
 from engine.backends.backend import Backend
 from engine.backends.table import backend_called
-from tests.engine.training.tiny_training import Tiny, stepwise
+from tests.engine.training.tiny_training import Tiny, finish, stepwise
 
 pytestmark = pytest.mark.slow
 SIZES: dict[str, Any] = {"static_steps": 2, "joint_steps": 4, "source_steps": 60, "max_static_points": 60,
@@ -120,18 +120,21 @@ def waits(monkeypatch) -> Waits:
 
 
 @pytest.fixture(scope="module")
-def prep_dir(tmp_path_factory) -> Path:
-    """What both back ends prepare: the same."""
-    return tmp_path_factory.mktemp("prep")
+def small(tiny: Tiny, small_backdrop: None, tmp_path_factory) -> Tiny:
+    """With a reference clip of few anchors, in a folder of its own: what both back ends prepare is the same."""
+    own = replace(tiny, prep_dir=tmp_path_factory.mktemp("prep"))
+    training = own.prepared(0, is_source=False, **SIZES)
+    reference = finish(training)
+    training.finish()
+    return replace(own, reference=reference)
 
 
 @pytest.mark.parametrize("name", ["cpu", "reference"])
 @pytest.mark.parametrize("stage", ["source", "joint", "static"])
-def test_a_phase_waits_once_a_report(tiny: Tiny, waits, name, stage, prep_dir):
+def test_a_phase_waits_once_a_report(small: Tiny, waits, name, stage):
     backend: Backend = Watched(backend_called(name), waits)  # type: ignore[assignment]
-    training = tiny.prepared(
-        1 if stage == "source" else 0, is_source=stage == "source", backend=backend, prep_dir=prep_dir, **SIZES
-    )
+    is_source = stage == "source"
+    training = small.prepared(int(is_source), is_source=is_source, backend=backend, **SIZES)
     if stage == "joint":
         training.step(2)
     phase, items = stepwise(training), training._items[:2]
