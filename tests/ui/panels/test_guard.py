@@ -175,9 +175,8 @@ def _look_through_a_camera_in_four_views(pilot: Pilot) -> None:
 
 
 def test_every_mode_is_drawn_in_every_view_however_it_is_compared(
-    open_pilot: Callable[..., Pilot], told: Callable[[Pilot], list[str]]
+    pilot: Pilot, told: Callable[[Pilot], list[str]]
 ) -> None:
-    pilot = open_pilot(size=(800, 500))
     _look_through_a_camera_in_four_views(pilot)
     for n_views, compare, mode in itertools.product((2, 4), ("wipe", "side", "blink"), MODES):
         pilot.session.dispatch(ShowViews(n_views))

@@ -429,7 +429,7 @@ def test_whatever_the_pointer_rests_on_says_what_it_is(open_pilot: Callable[...,
     places["stale"] = pilot.rects["timeline.clip1"].center
     for name, place in places.items():
         pilot.move(*place)
-        pilot.draw(60)
+        pilot.draw(40)
         assert (pilot.picture() != before).any(axis=2).sum() > 1_500, f"the note of {name} covers that many pixels"
         pilot.move(5, 5)
         pilot.draw(4)

@@ -23,9 +23,9 @@ N_STEPS = 12
 
 
 @pytest.fixture(scope="module")
-def larger(tmp_path_factory, built_once) -> Tiny:
-    """The sample at three eighths of its size: 4 x 3 tiles."""
-    return make_tiny(tmp_path_factory.mktemp("larger"), built_once, scale=0.375)
+def half(tmp_path_factory, built_once) -> Tiny:
+    """The sample at half size: 5 x 4 tiles."""
+    return make_tiny(tmp_path_factory.mktemp("half"), built_once, scale=0.5)
 
 
 def pictures_of(training: ClipTraining) -> list[tuple[int, float, ActivePicture]]:
@@ -48,9 +48,9 @@ def pixels_of(tile_mask: torch.Tensor, height: int, width: int) -> torch.Tensor:
     [{}, {"residual": "none"}, {"field_tables": "per_frame", "volume_weight": 0.0}],
     ids=str,
 )
-def test_the_same_is_learned_bit_for_bit(larger, settings):
-    every = larger.prepared(1, tiles="all", source_steps=N_STEPS, **settings)
-    active = larger.prepared(1, tiles="active", source_steps=N_STEPS, **settings)
+def test_the_same_is_learned_bit_for_bit(half, settings):
+    every = half.prepared(1, tiles="all", source_steps=N_STEPS, **settings)
+    active = half.prepared(1, tiles="active", source_steps=N_STEPS, **settings)
     for _ in range(N_STEPS):
         slow, fast = every.step(), active.step()
         assert fast.train_psnr == pytest.approx(slow.train_psnr, abs=1e-4)
@@ -69,9 +69,9 @@ def lit(training: ClipTraining) -> ClipTraining:
     return training
 
 
-def test_in_changing_light_pictures_are_those_of_all_tiles(larger):
+def test_in_changing_light_pictures_are_those_of_all_tiles(half):
     """Up to rounding: what lies outside is the mean of two pictures instead of the picture of mean colours."""
-    training = lit(larger.prepared(1, source_steps=N_STEPS))
+    training = lit(half.prepared(1, source_steps=N_STEPS))
     take_steps(training, 3)
     for camera_row, clip_time, part in pictures_of(training):
         view = training._views[training.camera_indices[camera_row]]
@@ -86,10 +86,10 @@ def test_in_changing_light_pictures_are_those_of_all_tiles(larger):
         torch.testing.assert_close(found, image, rtol=0.0, atol=2e-6)
 
 
-def test_loss_and_gradient_are_those_of_the_whole_picture_up_to_a_constant(larger):
+def test_loss_and_gradient_are_those_of_the_whole_picture_up_to_a_constant(half):
     changes = {}
     for tiles in ("all", "active"):
-        training = larger.prepared(1, tiles=tiles, source_steps=N_STEPS)
+        training = half.prepared(1, tiles=tiles, source_steps=N_STEPS)
         first = training.step().loss
         take_steps(training, 3)
         training._order = ShuffledOrder(len(training.pictures), training.seed)  # the first picture again
@@ -99,8 +99,8 @@ def test_loss_and_gradient_are_those_of_the_whole_picture_up_to_a_constant(large
     assert changes["active"] == pytest.approx(changes["all"], abs=2e-6)
 
 
-def test_no_touched_tile_is_missed_by_a_trained_clip(larger):
-    training = larger.prepared(1, source_steps=40)
+def test_no_touched_tile_is_missed_by_a_trained_clip(half):
+    training = half.prepared(1, source_steps=40)
     take_steps(training, 40)
     n_inactive = 0
     for camera_row, clip_time, part in pictures_of(training):
@@ -146,10 +146,10 @@ def test_a_reference_clip_draws_all_tiles(tiny, tmp_path):
     assert stepwise(training).tiles is None
 
 
-def test_cameras_beyond_the_memory_are_drawn_with_all_tiles(larger):
-    whole = larger.prepared(1, source_steps=N_STEPS)
-    bounded = larger.prepared(1, source_steps=N_STEPS)
-    one_camera = 120 * 90 * 3 * 4
+def test_cameras_beyond_the_memory_are_drawn_with_all_tiles(half):
+    whole = half.prepared(1, source_steps=N_STEPS)
+    bounded = half.prepared(1, source_steps=N_STEPS)
+    one_camera = 160 * 120 * 3 * 4
     stepwise(bounded).tiles = ActiveTiles(bounded.model, backend=bounded.backend, max_bytes=3 * one_camera)
     take_steps(whole, N_STEPS)
     take_steps(bounded, N_STEPS)
