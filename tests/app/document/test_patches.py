@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from msgspec import structs
 
@@ -29,6 +29,8 @@ def exact(value: Any) -> str:
 
 @settings(max_examples=150)
 @given(plain, plain)
+@example([{"a": 0.0}], [{"a": -0.0}])
+@example({"a": 1}, {"a": 1.0})
 def test_a_patch_makes_one_value_of_another_to_the_last_sign(before: Any, after: Any) -> None:
     kept = exact(before)
     patch = difference(before, after)
