@@ -102,6 +102,7 @@ def test_a_new_edit(project, monkeypatch, tmp_path, stack, edit):
     assert ("--put" in said) == (not edit.is_on)
 
 
+@pytest.mark.slow
 @HEALTH
 @given(STACKS.filter(bool), EDITS, st.integers(0, 3), st.integers(0, 3))
 def test_a_changed_stack(project, monkeypatch, tmp_path, stack, edit, which, place):
@@ -122,6 +123,7 @@ def test_a_changed_stack(project, monkeypatch, tmp_path, stack, edit, which, pla
         assert not said or option is None or option in said
 
 
+@pytest.mark.slow
 @HEALTH
 @given(NAMES)
 def test_a_name_may_hold_anything(project, monkeypatch, tmp_path, name):

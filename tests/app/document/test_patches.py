@@ -54,6 +54,7 @@ def test_a_patch_for_something_else_is_refused(patch: Any) -> None:
         patched({"a": [1, 2, 3]}, patch)
 
 
+@pytest.mark.slow
 def test_patches_between_documents_give_them_back_byte_for_byte_both_ways() -> None:
     before = EMPTY
     for _, history in random_events(random.Random(5), 300):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shutil
 
+import pytest
+
 from app.project.opening.opening_answers import LastAnswers, OpeningAnswers
 from app.project.opening.project_access import read_settings
 from app.session.commands import CloseQuestion
@@ -51,6 +53,7 @@ def test_answers_make_the_project_and_are_offered_the_next_time(make_session, ca
     assert Settings(tmp_path / "settings.json").last_answers == LastAnswers(16, 2, is_holding_out=True)
 
 
+@pytest.mark.slow
 def test_frames_that_were_chosen_are_those_that_are_trained(make_session, capture_folder, tmp_path):
     jobs = []
     session = make_session(is_open=False, launch=None)

@@ -147,6 +147,7 @@ def test_undistorted_pictures_are_the_same_in_every_layout(tmp_path: Path, layou
             assert (difference != 0).mean() < 0.001
 
 
+@pytest.mark.slow
 def test_pictures_without_loss_are_what_image_layouts_get(tmp_path: Path, sample: CopiedScene) -> None:
     """The check itself: a lossy copy would not be the same."""
     picture = sample.picture(0, 0)

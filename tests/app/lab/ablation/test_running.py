@@ -22,6 +22,7 @@ from tests.app.fakes import make_fake
 from tests.app.lab.ablation.runs import BASE, BY_NAME
 
 
+@pytest.mark.slow
 def test_every_variant_is_a_project_and_a_line_of_the_table(runner):
     document = runner.run(list(BY_NAME))
     assert [line["variant"] for line in document["lines"]] == list(BY_NAME)
