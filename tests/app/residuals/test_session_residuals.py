@@ -97,7 +97,7 @@ def test_a_clip_that_cannot_be_read_is_told_once_and_marked(open_session, launch
 
 @pytest.mark.slow
 def test_a_clip_has_heat_while_it_trains_and_what_is_gone_is_no_fault(make_session, monkeypatch):
-    monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.0)
+    monkeypatch.setattr(keeper, "SNAPSHOT_EVERY_S", 0.3)  # sooner than that, the heat of each may come too late
     monkeypatch.setattr(keeper, "SNAPSHOT_SHARE", 1.0)
     session = make_session(make_training=make_slow)
     session.dispatch(TrainNextClip())
@@ -106,6 +106,7 @@ def test_a_clip_has_heat_while_it_trains_and_what_is_gone_is_no_fault(make_sessi
     def is_another_shown() -> bool:
         session.shown_gaussians()  # the window reads it, so that the next one comes
         heat = session.residuals.heat(session.timeline, 1, "error")
+        session.residuals._heat.worker.wait_idle(1.0)  # the training runs on this thread, and would leave it no time
         if heat is not None and heat.values is not None and heat.key not in seen:
             seen.append(heat.key)
         return len(seen) >= 3
