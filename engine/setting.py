@@ -167,7 +167,7 @@ class Setting:
         return self.none if self.default is None else self.text(self.default)
 
     def check(self, value: object) -> None:
-        """See that it may have this value. Raises ProjectError if it may not."""
+        """Check that it may have this value. Raises ProjectError if it may not."""
         if not (self._allows(value) or (value is None and self.default is None)):
             name = self.name if self.group else self.label or self.name
             raise ProjectError(f"{name} is {value!r:.60}; it has to be {self.allowed}.")

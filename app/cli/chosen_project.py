@@ -134,7 +134,7 @@ def _unlocked(folder: Path, settings: ProjectSettings, document: ProjectDocument
 
 
 def _check_changes(project: Project, capture: Capture, settings: ProjectSettings) -> None:
-    """See that no clip is finished with other settings."""
+    """Check that no clip is finished with other settings."""
     stored = project.settings
     names = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
     changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]

@@ -96,7 +96,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def check_options(options: argparse.Namespace) -> None:
-    """See that something is to be written somewhere, and that every option applies to it. Raises ProjectError."""
+    """Check that something is to be written somewhere, and that every option applies to it. Raises ProjectError."""
     name, out = _what(options)
     if out is None:
         raise ProjectError("--out is missing.", hint="Name a new folder: --out DIR.")

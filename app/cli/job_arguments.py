@@ -111,7 +111,7 @@ def _given(options: argparse.Namespace, setting: Setting, dest: str, opened: Tra
 
 
 def check_given(options: argparse.Namespace, jobs: Sequence[type[ExportJob]], job: type[ExportJob]) -> None:
-    """See that nothing was given that would be passed over. Raises ProjectError."""
+    """Check that nothing was given that would be passed over. Raises ProjectError."""
     unused = {
         setting.flag_of(value).name: None
         for other in jobs

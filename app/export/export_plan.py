@@ -101,7 +101,7 @@ def _untrained(runs: list[tuple[int, int]]) -> list[str]:
 
 
 def _check_name(answers: Answers) -> None:
-    """See that a name does not say that something else is written. Raises ProjectError."""
+    """Check that a name does not say that something else is written. Raises ProjectError."""
     suffix, given = answers.suffix, answers.out.suffix.lower()
     if suffix and _SAME.get(given, given) != suffix:
         raise ProjectError(f"The name of this file has to end in {suffix}.")

@@ -110,7 +110,7 @@ def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[int]]])
 
 
 def _check_folder(folder: Path) -> None:
-    """See that the folder of data is new or empty: clips of two pages are never mixed. Its place was looked at."""
+    """Check that the folder of data is new or empty: clips of two pages are never mixed. Its place was looked at."""
     try:
         check_target(folder, is_folder=True)
     except ProjectError as error:

@@ -79,7 +79,7 @@ class SceneFrames:
         return [frame for frame, clip in enumerate(self._clip_of) if clip.clip_index in trained]
 
     def check(self, frames: Iterable[float]) -> None:
-        """See that all of these can be made, before anything is. Reads every clip once; keeps one at a time.
+        """Check that all of these can be made, before anything is. Reads every clip once; keeps one at a time.
 
         Raises:
             ProjectError: There are none, one lies outside of the capture, or in a clip that is not trained or damaged.
@@ -88,7 +88,7 @@ class SceneFrames:
             self.opened.load(clip_index)
 
     def check_trained(self, frames: Iterable[float]) -> list[int]:
-        """See that all of these are trained, without reading a clip. Returns the indices of their clips.
+        """Check that all of these are trained, without reading a clip. Returns the indices of their clips.
 
         Raises:
             ProjectError: There are none, one lies outside of the capture, or in a clip that is not trained.

@@ -24,7 +24,7 @@ LEAST_SPARE_BYTES = 256 << 10
 def check_target(
     path: Path, *, opened: TrainedProject | None = None, n_bytes: int = 0, is_folder: bool = False
 ) -> None:
-    """See that an export can be written, before the work that leads to it. Makes nothing.
+    """Check that an export can be written, before the work that leads to it. Makes nothing.
 
     Args:
         opened: The open project; nothing is written into it or its capture, where a file could take the place

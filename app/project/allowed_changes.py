@@ -22,7 +22,7 @@ class SettingsFixed(ProjectError):
 def check_change(
     project: Project, capture: Capture, before: ProjectDocument, after: ProjectDocument, *, is_training: bool = False
 ) -> None:
-    """See that settings fit the capture, and that no clip is finished with those that change.
+    """Check that settings fit the capture, and that no clip is finished with those that change.
 
     Args:
         is_training: Whether a clip trains now.

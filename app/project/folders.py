@@ -29,7 +29,7 @@ FOLDERS = (
 
 
 def check_folders(folder: Path, doing: str = "written to") -> None:
-    """See that a project may be written to, or copied.
+    """Check that a project may be written to, or copied.
 
     Args:
         folder: Of the project, which may be a link itself.

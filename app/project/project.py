@@ -196,7 +196,7 @@ class Project:
         return self.training_order(clip_index)[-1]
 
     def check_writable(self) -> None:
-        """See that this process may change the project.
+        """Check that this process may change the project.
 
         Raises:
             ProjectError: It may not.

@@ -21,7 +21,7 @@ class ClipStore(Protocol):
     not at all. Every method that puts something may raise DiskError; nothing has changed then."""
 
     def check(self) -> None:
-        """See that it is there, so that nothing is put into another one of its name. Raises ProjectGone."""
+        """Check that it is there, so that nothing is put into another one of its name. Raises ProjectGone."""
         ...
 
     def capture(self, *, scale: float, frames: tuple[int, int] | None) -> Capture:

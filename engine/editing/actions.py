@@ -273,7 +273,7 @@ ACTIONS: dict[str, type[Action]] = {kind.called(): kind for kind in get_args(Act
 
 
 def check_quat(quat: Quat) -> None:
-    """See that it is a rotation. Raises ValueError."""
+    """Check that it is a rotation. Raises ValueError."""
     length = math.sqrt(sum(number * number for number in quat))
     if not abs(length - 1.0) <= 1e-3:
         raise ValueError(f"the quaternion {quat} is not a rotation: its length is {length:g}")

@@ -193,7 +193,7 @@ def open_to_append(path: Path | str) -> int:
 
 
 def check_folder(path: Path | str) -> None:
-    """See that a folder, if there is one, lies where its name is.
+    """Check that a folder, if there is one, lies where its name is.
 
     Raises:
         OSError: There is something else, such as a symbolic link, or it cannot be looked at. `strerror` says which, in
@@ -228,7 +228,7 @@ def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
 
 
 def check_regular(path: Path | str) -> int:
-    """See that libraries which open by name will open a regular file. Returns its size in bytes.
+    """Check that libraries which open by name will open a regular file. Returns its size in bytes.
 
     Raises:
         OSError: It is missing or something else; `strerror` says what.

@@ -61,7 +61,7 @@ def _change(project: Project, n_frames: int, options: argparse.Namespace) -> Non
     if document == project.document:
         return
     if options.dry_run:
-        project.history = replace(project.history, present=document)  # so that what is said is of it
+        project.history = replace(project.history, present=document)  # the report describes this state
     else:
         project.change(document, "change the clips")
 

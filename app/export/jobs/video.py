@@ -288,7 +288,7 @@ class VideoJob(ExportJob, frozen=True):
         return entries | ({"background": (0, 0, 0), "is_transparent": True} if is_clear else {})
 
     def check(self) -> None:
-        """See that its entries go together, whatever the project.
+        """Check that its entries go together, whatever the project.
 
         Raises:
             ProjectError: Two of them do not.

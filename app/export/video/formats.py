@@ -70,7 +70,7 @@ def format_of(out: Path) -> str:
 
 
 def check_codecs(name: str, *, needs_sound: bool = False) -> None:
-    """See that this machine can encode a format.
+    """Check that this machine can encode a format.
 
     Raises:
         MissingCodecError: It cannot; says what is missing, and what can be written here.

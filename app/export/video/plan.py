@@ -70,7 +70,7 @@ def _path_named(scene: SceneFrames, name: str) -> CameraPath:
 
 
 def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
-    """See that a job can be done, and how. Writes nothing.
+    """Check that a job can be done, and how. Writes nothing.
 
     Raises:
         MissingCodecError: This machine cannot encode the format.
@@ -156,7 +156,7 @@ def _frames_of(path: CameraPath, n_frames: int | None) -> range:
 
 
 def _check_size(size: tuple[int, int], supersampling: int) -> None:
-    """See that pictures of this size can be drawn."""
+    """Check that pictures of this size can be drawn."""
     width, height = (side * supersampling for side in size)
     if max(width, height) > MAX_SIDE_PX or width * height > MAX_PIXELS:
         raise ProjectError(

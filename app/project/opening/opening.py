@@ -344,7 +344,7 @@ def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
 
 
 def check_capture(capture: Capture, settings: ProjectSettings, folder: Path) -> None:
-    """See that the capture is the one the project was made for.
+    """Check that the capture is the one the project was made for.
 
     Raises:
         ProjectError: It is another one.

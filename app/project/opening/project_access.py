@@ -69,7 +69,7 @@ def default_settings(
 
 
 def check_settings(settings: ProjectSettings, capture: Capture) -> None:
-    """See that the settings fit the capture.
+    """Check that the settings fit the capture.
 
     Raises:
         ProjectError: They do not; says which and what is allowed.

@@ -36,7 +36,7 @@ class FolderWatch:
         self._known = self._look()
 
     def check(self) -> None:
-        """See that it is there.
+        """Check that it is there.
 
         Raises:
             ProjectGone: It is not, or another folder is in its place.

@@ -34,7 +34,7 @@ def kind(name: str) -> Format:
 
 
 def check(found: Splats, splats: Splats, name: str) -> None:
-    """See that each row is as near as the format promises."""
+    """Check that each row is as near as the format promises."""
     assert len(found) == len(splats)
     splats = splats[order_of(found, splats)]
     mean, scale, opacity, color, angle = NEAR[name]
