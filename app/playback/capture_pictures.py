@@ -15,14 +15,11 @@ from app.playback.modes.hatching import hatched
 from app.playback.picture_source import PictureSource
 from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture
-from engine.images.exposure_curve import to_reference
+from engine.images.rendition import Rendition
 
 CACHE_BYTES = 96 << 20
 THUMBNAIL_WIDTH_PX = 200
 """Requests up to this width are thumbnails: answered exactly or not at all, on a separate thread."""
-
-
-Gain = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +28,8 @@ class PictureRequest:
 
     Attributes:
         generation: Of the open project. Two takes with the same cameras have the same fingerprint.
-        scene_gain: By which the camera's colours differ from the scene's, to be taken out; None for the picture as it
-            was taken. The picture depends on a clip's state through this alone.
+        rendition: The camera's, to be undone for a picture in the scene's colours; None for the picture as it was
+            taken. The picture depends on a clip's state through this alone.
     """
 
     generation: int
@@ -41,7 +38,7 @@ class PictureRequest:
     frame_index: int
     max_width: int
     capture: Capture = field(compare=False)
-    scene_gain: Gain | None = None
+    rendition: Rendition | None = None
 
     @property
     def is_thumbnail(self) -> bool:
@@ -65,14 +62,14 @@ class CapturedPictures:
         camera_index: int,
         frame_index: int,
         max_width: int,
-        scene_gain: Gain | None = None,
+        rendition: Rendition | None = None,
     ) -> Picture | None:
         """The picture if it was decoded; otherwise it is asked for.
 
         Meanwhile the last picture of the same camera is returned as stale, except for thumbnails: None.
         """
         request = PictureRequest(
-            generation, capture.fingerprint, camera_index, frame_index, max_width, capture, scene_gain
+            generation, capture.fingerprint, camera_index, frame_index, max_width, capture, rendition
         )
         known = self._cache.get(request)
         if known is None:
@@ -110,15 +107,15 @@ class CapturedPictures:
         if known is not None:  # it was asked for and planned
             return known
         image = downsized(request.capture.frame(request.camera_index, request.frame_index), request.max_width)
-        if request.scene_gain is not None:
-            image = to_reference(image, np.array(request.scene_gain))
+        if request.rendition is not None:
+            image = request.rendition.to_scene(image)
         valid = request.capture.valid(request.camera_index)
         if valid is not None and not request.is_thumbnail:
             image = hatched(image, valid)
         source = PictureSource(
             frame_index=request.frame_index,
             camera_index=request.camera_index,
-            has_scene_colors=request.scene_gain is not None,
+            has_scene_colors=request.rendition is not None,
         )
         picture = Picture(image, request_key(request), source=source)
         if self._worker(request).is_still_wanted:
@@ -126,7 +123,7 @@ class CapturedPictures:
         return picture
 
 
-def request_key(request: PictureRequest) -> tuple[int, str, int, int, int, Gain | None]:
+def request_key(request: PictureRequest) -> tuple[int, str, int, int, int, Rendition | None]:
     """Identity of a picture."""
     return (
         request.generation,
@@ -134,7 +131,7 @@ def request_key(request: PictureRequest) -> tuple[int, str, int, int, int, Gain 
         request.camera_index,
         request.frame_index,
         request.max_width,
-        request.scene_gain,
+        request.rendition,
     )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
 from app.playback.ahead import Ahead, AskedLook, RequestOf, n_ahead
-from app.playback.capture_pictures import CapturedPictures, Gain, PictureRequest
+from app.playback.capture_pictures import CapturedPictures, PictureRequest
 from app.playback.clouds import CloudRequest, Clouds
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame
 from app.playback.modes.arrays import AnchorArrays, Picture, PointArrays
@@ -30,6 +30,7 @@ from app.training.clip_run import ShownState
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
 from engine.editing.effects import EditStack
+from engine.images.rendition import Rendition
 
 StateOf = Callable[[int], ShownState | None]
 """The state of a clip to look at; None where it has none."""
@@ -258,9 +259,9 @@ class Playback:
         opened, requests = self._opened, []
         for frame in course.ahead(n_ahead(course)) if wanted is not None else ():
             for camera, max_width in compared:
-                gain = self._scene_gain(opened, timeline, frame, camera)
+                rendition = self._rendition(opened, timeline, frame, camera)
                 capture = opened.capture
-                key = (opened.generation, capture.fingerprint, camera, frame, max_width, capture, gain)
+                key = (opened.generation, capture.fingerprint, camera, frame, max_width, capture, rendition)
                 requests.append(PictureRequest(*key))
         self.captured.plan(requests)
 
@@ -359,22 +360,21 @@ class Playback:
         if opened is None:
             return None
         self._compared[camera_index, max_width] = True
-        gain = self._scene_gain(opened, timeline, timeline.frame_index, camera_index)
+        rendition = self._rendition(opened, timeline, timeline.frame_index, camera_index)
         return self.captured.picture(
-            opened.capture, opened.generation, camera_index, timeline.frame_index, max_width, gain
+            opened.capture, opened.generation, camera_index, timeline.frame_index, max_width, rendition
         )
 
-    def _scene_gain(
+    def _rendition(
         self, opened: OpenedProject, timeline: Timeline, frame_index: int, camera_index: int
-    ) -> Gain | None:
-        """By which a camera's colours differ from the scene's at a frame; None where they do not, or nobody
-        knows."""
+    ) -> Rendition | None:
+        """What a camera makes of the scene's colours at a frame; None where that is unknown, or no difference."""
         request = self._request_at(timeline, frame_index, PLAIN)
         colors = None if request is None else self.decoder.colors(request)
         if request is None or colors is None:
             return None
-        gain = colors.whole_gain(opened.rig, camera_index, request.clip.clip_time(request.frame_index))
-        return None if (gain == 1.0).all() else (float(gain[0]), float(gain[1]), float(gain[2]))
+        rendition = colors.rendition(opened.rig, camera_index, request.clip.clip_time(request.frame_index))
+        return None if rendition.is_plain else rendition
 
     # ---------------------------------------------------------------- threads
 

@@ -11,6 +11,8 @@ GAINS = "gains"
 """Of the training cameras, in a clip that inherits nothing."""
 CORRECTIONS = "camera_corrections"
 """Of the training cameras, in a clip that inherits nothing; missing where they were not refined."""
+VIGNETTING = "vignetting"
+"""Of the training cameras' lenses, in a clip that inherits nothing; missing where none was found."""
 LOG_DRIFT = "log_drift"
 """Log of the training cameras' exposure against the reference clip's, frame by frame; missing where none changes."""
 

@@ -23,7 +23,7 @@ from msgspec.structs import replace
 
 from engine.camera.corrections import N_VALUES
 from engine.clip_files.anchor_record import AnchorRecord, RecordError, read_records
-from engine.clip_files.array_names import CORRECTIONS, LOG_DRIFT
+from engine.clip_files.array_names import CORRECTIONS, LOG_DRIFT, VIGNETTING
 from engine.clip_files.clip_header import ClipHeader, NewerSchema, header_text, parse_header
 from engine.clip_files.coding import CodedArray, CodingError, decode_array
 from engine.errors import ProjectError
@@ -32,6 +32,7 @@ from engine.storage.json_files import JsonError, parse_object
 from engine.storage.typed_json import EntryError
 
 _MAX_LOG_DRIFT = 3.0
+_MAX_VIGNETTING = 100.0
 """Gains of a camera beyond a factor of 20 are damage."""
 _ENTRIES = ("header", "coding")
 """Texts of a file apart from its checksum."""
@@ -89,6 +90,25 @@ class ClipState:
             raise ProjectError(
                 f"The corrections of the cameras in clip {self.header.clip_index} are {values.dtype} "
                 f"{list(values.shape)}, not float32 {list(shape)} and finite.",
+                hint="Train this clip again.",
+            )
+        return values
+
+    @property
+    def vignetting(self) -> np.ndarray | None:
+        """Of the training cameras, see engine.images.rendition; None where they have none. [C, 2] float32
+
+        Raises:
+            ProjectError: The array does not fit the clip.
+        """
+        values = self.arrays.get(VIGNETTING)
+        if values is None:
+            return None
+        shape = (len(self.header.camera_names), 2)
+        if values.shape != shape or values.dtype != np.float32 or not (np.abs(values) < _MAX_VIGNETTING).all():
+            raise ProjectError(
+                f"The vignetting of the cameras in clip {self.header.clip_index} is {values.dtype} "
+                f"{list(values.shape)}, not float32 {list(shape)} within {_MAX_VIGNETTING}.",
                 hint="Train this clip again.",
             )
         return values

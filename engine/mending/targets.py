@@ -15,7 +15,7 @@ import numpy as np
 from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.images.exposure_curve import to_reference
+from engine.images.rendition import Rendition
 from engine.metrics.clips.seams import change_of, stands_still
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_view import render_model
@@ -58,10 +58,13 @@ class Looks:
         return found
 
     def truth(self, row: int, frame: int) -> np.ndarray:
-        """The camera's own picture, in 0..1 and the same exposure. [H, W, 3] float32"""
+        """The camera's own picture, in 0..1, the same exposure and without vignetting. [H, W, 3] float32"""
         pixels, trained = self._capture.frame(self._cameras[row], frame), self.clip_of(frame)
-        if trained is not None and trained.drift is not None:
-            pixels = to_reference(pixels, trained.drift[row, frame - trained.clip.start])
+        if trained is not None:
+            rig, camera, lenses = self._capture.rig, self._cameras[row], trained.base.vignetting
+            gain = np.ones(3) if trained.drift is None else trained.drift[row, frame - trained.clip.start]
+            lens = None if lenses is None else lenses[row]
+            pixels = Rendition.of(gain, lens, rig.Ks[camera], rig.image_sizes[camera]).to_scene(pixels)
         return pixels.astype(np.float32) / np.float32(255.0)
 
     def still_between(self, row: int, first: int, last: int) -> np.ndarray:

@@ -1,9 +1,9 @@
-"""Each camera's rendition of the scene's colours: its gain, and its exposure in each frame of a clip.
+"""Each camera's rendition of the scene's colours: its gain, its vignetting, and its exposure in each frame of a clip.
 
-Both are known of a camera that was trained on. One that was held out is shown at the gain of the median camera, and
-with the exposure that its place and direction suggest: cameras that look at the same things from the same side change
-their exposure alike. Scenes are stored, exported and freely viewed in their own colours; this is for the comparison
-with captured pictures.
+They are known of a camera that was trained on. One that was held out is shown with the gain and the vignetting of the
+median camera, and with the exposure that its place and direction suggest: cameras that look at the same things from the
+same side change their exposure alike. Scenes are stored, exported and freely viewed in their own colours; this is for
+the comparison with captured pictures.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.images.exposure_curve import to_camera
+from engine.images.rendition import Rendition, typical_vignetting
 
 RIDGE = 0.3
 """Weight of the penalty on slopes, in cameras: chosen on the training cameras of a real capture, each left out once,
@@ -29,12 +29,14 @@ class CameraColors:
         gains: camera_colour = gain * scene_colour in the reference clip. [C, 3]
         drift: Exposure in each frame against the reference clip; None where it does not change. [C, M, 3]
         clip_length: M that clip times count in.
+        vignetting: Of the lenses, see engine.images.rendition; None where they have none. [C, 2]
     """
 
     camera_names: tuple[str, ...]
     gains: np.ndarray
     drift: np.ndarray | None
     clip_length: int
+    vignetting: np.ndarray | None = None
 
     def gain(self, camera_name: str) -> np.ndarray:
         """The gain of one camera in the reference clip; ones for a held-out camera. [3] float32"""
@@ -61,11 +63,17 @@ class CameraColors:
 
     def in_camera(self, image: np.ndarray, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
         """A picture in the scene's colours as the camera takes it, white staying white. [H, W, 3] float"""
-        return to_camera(image, self.whole_gain(rig, camera, clip_time))
+        return self.rendition(rig, camera, clip_time).to_camera(image)
 
-    def whole_gain(self, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
-        """Gain and exposure together, for engine.images.exposure_curve. [3] float32"""
-        return self.gain(rig.names[camera]) * self.exposure(rig, camera, clip_time)
+    def rendition(self, rig: CameraRig, camera: int, clip_time: float) -> Rendition:
+        """Gain, exposure and vignetting together."""
+        gain = self.gain(rig.names[camera]) * self.exposure(rig, camera, clip_time)
+        return Rendition.of(gain, self._vignetting_of(rig.names[camera]), rig.Ks[camera], rig.image_sizes[camera])
+
+    def _vignetting_of(self, camera_name: str) -> np.ndarray | None:
+        if self.vignetting is None or camera_name not in self.camera_names:
+            return None if self.vignetting is None else typical_vignetting(self.vignetting)
+        return self.vignetting[self.camera_names.index(camera_name)]
 
 
 def exposure_elsewhere(rig: CameraRig, known: list[int], exposures: np.ndarray, camera: int) -> np.ndarray:

@@ -21,7 +21,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, exclusion_key
 from engine.clip_files.anchor_record import AnchorRecord
-from engine.clip_files.array_names import CORRECTIONS, DECODER, GAINS, LOG_DRIFT
+from engine.clip_files.array_names import CORRECTIONS, DECODER, GAINS, LOG_DRIFT, VIGNETTING
 from engine.clip_files.clip_header import SCHEMA, ClipHeader, Place
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.clip_files.compact import CompactClip, compact_clip
@@ -170,13 +170,15 @@ class ClipTraining:
 
     def _add_moving(self) -> None:
         """Between the phases of a reference clip: corrected backgrounds, motion, moving anchors, field."""
-        parts = ClipParts(self.model, self.gains, self.drift, self.backgrounds, self.spacing)
+        parts = ClipParts(
+            self.model, self.gains, self.drift, self.backgrounds, self.spacing, vignetting=self.vignetting
+        )
         self._take(self._preparation.with_motion(parts, self.pictures))
 
     def _take(self, parts: ClipParts) -> None:
         self.model, self.gains, self.drift, self.backgrounds = parts.model, parts.gains, parts.drift, parts.backgrounds
         self.spacing, self.moving_spacing = parts.spacing, parts.moving_spacing
-        self._reasons, self._coverage = parts.reasons, parts.coverage
+        self._reasons, self._coverage, self.vignetting = parts.reasons, parts.coverage, parts.vignetting
 
     def _say(self, stage: str, message: str) -> None:
         self.report(Progress(stage, 1.0, message))
@@ -301,7 +303,8 @@ class ClipTraining:
 
     def held_out_psnr(self, *, n_pictures: int = 3) -> float:
         """Mean PSNR of a few held-out pictures in raw colours, dB; NaN without held-out cameras."""
-        colors = CameraColors(self.rig.names, host_array(self.gains), self.drift, self.clip.clip_length)
+        gains = host_array(self.gains)
+        colors = CameraColors(self.rig.names, gains, self.drift, self.clip.clip_length, self.vignetting)
         values = []
         for i, camera in enumerate(self.holdout[:n_pictures]):
             frame = self.clip.start + (i * self.clip.n_frames) // max(len(self.holdout[:n_pictures]), 1)
@@ -323,6 +326,8 @@ class ClipTraining:
             arrays |= AnchorRecord(reasons=codes).arrays(role)
         if self.reference is None:
             arrays[GAINS] = host_array(self.gains).copy()
+            if self.vignetting is not None:
+                arrays[VIGNETTING] = self.vignetting.copy()
             if self._cameras.corrections is not None:
                 arrays[CORRECTIONS] = self._cameras.corrections
         if (self.drift != 1.0).any():
@@ -419,6 +424,7 @@ class ClipTraining:
                 moving_spacing=header.moving_spacing,
                 reasons=_reasons_in(state),
                 coverage=header.coverage,
+                vignetting=base.vignetting,
             )
         )
         self._learn_positions()
@@ -480,7 +486,10 @@ class ClipTraining:
         drift = kept.state.drift
         if drift is None:
             drift = np.ones((len(self.rig), self.clip.n_frames, 3), np.float32)
-        self.pictures.remove_drift(drift)
+        vignetting = (kept.state if self._base is None else self._base).vignetting
+        removed = [(drift, None), (None, vignetting)]  # one after the other, as preparations do: to the bit
+        for drifts, lenses in removed if self._base is None else reversed(removed):
+            self.pictures.remove(drifts, lenses)
         self._cameras.restore(kept.cameras)
         parts = ClipParts(
             load_clip_model(kept.state, self.reference, backend=self.backend, is_learning=True),
@@ -491,6 +500,7 @@ class ClipTraining:
             moving_spacing=header.moving_spacing,
             reasons=_reasons_in(kept.state),
             coverage=header.coverage,
+            vignetting=vignetting,
         )
         self._take(parts)
         self.phases = list(place.phases)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.camera.rig import CameraRig
+from engine.cloud.background.vignetting import measure_vignetting, point_radii
 from engine.cloud.fusion import fuse_tiers, keep_inliers
 from engine.cloud.kept_results import Keep, do_now
 from engine.cloud.stereo.coloring import balance, colored_by_neighbors, observe
@@ -44,6 +45,7 @@ class StaticCloud:
             looks. [P] float32
         gains: camera_colour = gain * scene_colour. [C, 3] float32, median 1; all 1 where cameras do not differ.
         spacing: Distance between neighbouring points, scene units.
+        vignetting: Of the cameras' lenses, see engine.images.rendition; zeros where there is none. [C, 2] float32
     """
 
     points: np.ndarray
@@ -51,6 +53,7 @@ class StaticCloud:
     sizes: np.ndarray
     gains: np.ndarray
     spacing: float
+    vignetting: np.ndarray
 
 
 def build_static_cloud(
@@ -65,7 +68,7 @@ def build_static_cloud(
     report: Report,
     keep: Keep = do_now,
 ) -> StaticCloud:
-    """Points, colours and per-camera gains of the static scene.
+    """Points, colours, per-camera gains and vignetting of the static scene.
 
     Args:
         backgrounds: One picture per camera without what moves. [C, H, W, 3] uint8
@@ -118,6 +121,13 @@ def build_static_cloud(
     )
     points, colors = points[is_kept], colors[is_kept]
     log_colors = observe(points, backgrounds, is_stable, rig, maps)
+    vignetting = np.zeros((len(rig), 2), np.float32)
+    if color != "off":
+        lenses = measure_vignetting(points, log_colors, rig)
+        vignetting = lenses.coefficients
+        squared = point_radii(points, rig)
+        log_colors -= (squared * vignetting[:, :1] + squared**2 * vignetting[:, 1:])[..., None]
+        report(f"Vignetting: {lenses.text}")
     gains, seen_colors, decision = balance(points, log_colors, first_gains, color)
     n_colored = int(np.isfinite(seen_colors).all(axis=1).sum())
     colors = colored_by_neighbors(points, colors, seen_colors)
@@ -137,4 +147,5 @@ def build_static_cloud(
         sizes=sizes.astype(np.float32),
         gains=gains.astype(np.float32),
         spacing=float(spacing),
+        vignetting=vignetting,
     )

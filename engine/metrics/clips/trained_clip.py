@@ -10,7 +10,7 @@ import numpy as np
 from engine.camera.corrections import corrected
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
-from engine.clip_files.array_names import CORRECTIONS, GAINS
+from engine.clip_files.array_names import CORRECTIONS, GAINS, VIGNETTING
 from engine.clip_files.clip_state import ClipState
 from engine.model.camera_colors import CameraColors
 from engine.model.clip_model import ClipModel
@@ -25,8 +25,8 @@ class TrainedClip:
     Attributes:
         clip: Its frames.
         model: Its model.
-        base: State with the colour gains, near plane and spacing: of the reference clip, or the clip's own where it
-            inherits nothing.
+        base: State with the colour gains, vignetting, near plane and spacing: of the reference clip, or the clip's
+            own where it inherits nothing.
         drift: Exposure of the training cameras, see engine.model.camera_colors.
     """
 
@@ -48,14 +48,15 @@ class TrainedClip:
         gains = base.arrays.get(GAINS)
         if gains is None or len(gains) != len(base.header.camera_names):
             return None
-        needed = {name: base.arrays[name] for name in (GAINS, CORRECTIONS) if name in base.arrays}
+        needed = {name: base.arrays[name] for name in (GAINS, CORRECTIONS, VIGNETTING) if name in base.arrays}
         return cls(clip, model, ClipState(needed, base.header), state.drift)
 
     @property
     def colors(self) -> CameraColors:
         """The cameras' renditions of the scene's colours in this clip."""
         header = self.base.header
-        return CameraColors(tuple(header.camera_names), self.base.arrays[GAINS], self.drift, self.clip.clip_length)
+        names, gains = tuple(header.camera_names), self.base.arrays[GAINS]
+        return CameraColors(names, gains, self.drift, self.clip.clip_length, self.base.vignetting)
 
     @property
     def beyond(self) -> float:

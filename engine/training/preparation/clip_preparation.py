@@ -54,6 +54,7 @@ from engine.training.preparation.cloud_preparation import (
     read_backgrounds,
     stable_in_clip,
     static_cloud,
+    without_vignetting,
     write_backgrounds,
 )
 from engine.training.preparation.drift import exposures_in, exposures_of, no_drift, remove_drift
@@ -74,11 +75,12 @@ class ClipParts:
         model: Everything that is visible in the clip.
         gains: Of the training cameras. [C, 3] float32
         drift: Exposure of each training camera in each frame against the reference clip's. [C, M, 3] float32
-        backgrounds: The training cameras' pictures when nothing moves.
+        backgrounds: The training cameras' pictures when nothing moves, without vignetting.
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
         reasons: Of the gate, by role; empty without a decision.
         coverage: How many moving points of a source clip have an anchor near them; None for a reference clip.
+        vignetting: Of the lenses, taken out of pictures and backgrounds; None where they have none. [C, 2] float32
     """
 
     model: ClipModel
@@ -89,6 +91,7 @@ class ClipParts:
     moving_spacing: float | None = None
     reasons: dict[str, np.ndarray] = field(default_factory=dict)
     coverage: Coverage | None = None
+    vignetting: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +167,8 @@ class ClipPreparation:
         return pictures
 
     def static_parts(self, pictures: TrainingPictures) -> ClipParts:
-        """A reference clip before its motion is known: static anchors and a fresh decoder. Removes the pictures' drift.
+        """A reference clip before its motion is known: static anchors and a fresh decoder. Removes the pictures' drift
+        and vignetting.
 
         Raises:
             PreparationError: No static point was found.
@@ -172,12 +176,15 @@ class ClipPreparation:
         drift, exposures = self._without_drift(pictures)
         backgrounds = self._estimated(self._clip, exposures)
         cloud = self._static_cloud(backgrounds, self._stages.keep)
-        gains = self._gains(cloud.gains)
+        gains, vignetting = self._gains(cloud.gains), cloud.vignetting if cloud.vignetting.any() else None
+        if vignetting is not None:
+            pictures.remove(None, vignetting)
+            backgrounds = without_vignetting(backgrounds, vignetting, self._cameras.rig)
         model = static_model(cloud, self._clip, self._config, self._backend, self._generator)
         self._say(
             "Building the static cloud", f"{len(cloud.points):,} static anchors, {cloud.spacing:.3g} scene units apart"
         )
-        return ClipParts(model, gains, drift, backgrounds, float(cloud.spacing))
+        return ClipParts(model, gains, drift, backgrounds, float(cloud.spacing), vignetting=vignetting)
 
     def whole_parts(self, pictures: TrainingPictures) -> ClipParts:
         """A reference clip with cloud=frames, complete: one cloud, and all of it changes. Removes the pictures' drift.
@@ -189,7 +196,8 @@ class ClipPreparation:
         backgrounds = self._estimated(self._clip, exposures) if self._config.needs_backgrounds else blank(pictures)
         cloud = self._frames_cloud(pictures, drift)
         sizes = np.full(len(cloud.points), cloud.spacing, np.float32)
-        static = StaticCloud(cloud.points, cloud.colors, sizes, cloud.gains, cloud.spacing)
+        lenses = np.zeros((len(cloud.gains), 2), np.float32)
+        static = StaticCloud(cloud.points, cloud.colors, sizes, cloud.gains, cloud.spacing, lenses)
         model = static_model(static, self._clip, self._config, self._backend, self._generator)
         parts = ClipParts(model, self._gains(cloud.gains), drift, backgrounds, cloud.spacing)
         return replace(parts, reasons=self._make_dynamic(parts, cloud.spacing))
@@ -209,7 +217,7 @@ class ClipPreparation:
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
 
     def source_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
-        """A clip that starts from another trained clip. Removes the pictures' drift.
+        """A clip that starts from another trained clip. Removes the pictures' drift and vignetting.
 
         Raises:
             PreparationError: It needs its own static cloud and no static point was found.
@@ -232,7 +240,8 @@ class ClipPreparation:
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
     def measured_colors(self, reference: ClipState, pictures: TrainingPictures) -> ClipColors:
-        """The colours that `source_parts` measures of a clip, without the parts it builds. Removes the pictures' drift.
+        """The colours that `source_parts` measures of a clip, without the parts it builds. Removes the pictures' drift
+        and vignetting.
 
         Raises:
             ProjectError: The reference was trained with other cameras.
@@ -250,6 +259,8 @@ class ClipPreparation:
             )
         model = inheriting_model(reference, self._clip, self._backend, learns=self._method.learns_inherited)
         self._say("Taking over the reference", self._method.words(self._config))
+        if reference.vignetting is not None:
+            pictures.remove(None, reference.vignetting)
         backgrounds = blank(pictures)
         if self._config.needs_backgrounds:
             kept = read_backgrounds(self._prep_dir, self._key_of_corrected())
@@ -263,7 +274,7 @@ class ClipPreparation:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points):,} static anchors of the clip's own")
-        parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
+        parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing, vignetting=reference.vignetting)
         if "static" in self._method.covering(model):  # parts that can change learn their own light
             return parts
         measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
@@ -374,6 +385,9 @@ class ClipPreparation:
         pictures = TrainingPictures(self._capture, clip, self._camera_indices)
         _, exposures = self._without_drift(pictures)
         estimated = self._estimated(clip, exposures)
+        if reference.vignetting is not None:
+            pictures.remove(None, reference.vignetting)
+            estimated = without_vignetting(estimated, reference.vignetting, self._cameras.rig)
         keep = self._keep_after(model, gains, estimated)
         backgrounds = self._corrected(estimated, model, gains, pictures, keep)
         seen = stable_in_clip(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))

@@ -34,6 +34,7 @@ from engine.cloud.stereo.given_points import true_points
 from engine.cloud.stereo.sparse import triangulate
 from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud
 from engine.errors import CaptureError
+from engine.images.rendition import Rendition
 from engine.parallel import map_ordered
 from engine.progress import Progress, ReportProgress
 from engine.storage.array_files import ArraysError, read_arrays, write_arrays
@@ -142,7 +143,7 @@ def static_cloud(
 
     def build() -> Arrays:
         cloud = _build_static_cloud(backgrounds, rig, is_valid, config, report, keep, layout)
-        return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "sizes", "gains", "spacing")}
+        return {name: np.asarray(getattr(cloud, name)) for name in StaticCloud.__slots__}
 
     arrays = keep("static cloud", build)
     return StaticCloud(**{**arrays, "spacing": float(arrays["spacing"])})
@@ -197,6 +198,22 @@ def _given_points(layout: Layout, backgrounds: Backgrounds, rig: CameraRig, say:
     numbers = f"neighbouring cameras agree in {100 * found.share:.0f} % of its {found.n_seen} points that they see"
     say(f"The capture's point cloud is {'used' if found.is_used else 'not used'}: {numbers}")
     return found.points
+
+
+def without_vignetting(backgrounds: Backgrounds, vignetting: np.ndarray, rig: CameraRig) -> Backgrounds:
+    """Backgrounds as lenses would show them that lose nothing towards the rim.
+
+    Args:
+        vignetting: See engine.images.rendition. [C, 2]
+        rig: Of the training cameras.
+    """
+    plain = np.ones(3)
+
+    def correct(row: int) -> np.ndarray:
+        seen = Rendition.of(plain, vignetting[row], rig.Ks[row], rig.image_sizes[row])
+        return seen.to_scene(backgrounds.images[row])
+
+    return Backgrounds(np.stack(map_ordered(correct, range(len(rig)))), backgrounds.is_stable)
 
 
 def correct_backgrounds(
@@ -445,6 +462,7 @@ def key_of_corrected(capture: Capture, clip: Clip, camera_indices: Sequence[int]
         "size": [int(side) for side in rig.image_sizes[0]],
         "frames": config.background_frames,
         "is_corrected": True,
+        "is_without_vignetting": True,
         **({"excluded": excluded} if excluded else {}),
         **({"of": [clip.start, clip.stop]} if config.backgrounds == "clip" else {}),
     }

@@ -45,7 +45,7 @@ def remove_drift(pictures: TrainingPictures, exposures: Sequence[Exposure], repo
 
     n_cameras = pictures.n_cameras
     drift = np.stack(map_ordered(gains_of, range(n_cameras)))
-    pictures.remove_drift(drift)
+    pictures.remove(drift, None)
     means = 100 * (drift.mean((1, 2)) - 1.0)
     n_changed = int((drift != 1.0).any((1, 2)).sum())
     said = f"{means.min():+.1f} to {means.max():+.1f} % against the reference clip, {n_changed} of {n_cameras} cameras"

@@ -21,7 +21,7 @@ from engine.storage.array_files import ArraysError, read_arrays, read_metadata, 
 from engine.storage.files import discard
 from engine.training.retired_settings import without_retired
 
-VERSION = 3
+VERSION = 4
 """To be raised whenever the code of any preparation step changes its result."""
 WRITE_AFTER_S = 3.0
 """Pieces are written when so much work has gathered: shorter work is repeated rather than written."""

@@ -1,4 +1,5 @@
-"""Training pictures: the pixels of one clip's training cameras, all in the exposure of the reference clip.
+"""Training pictures: the pixels of one clip's training cameras, all in the exposure of the reference clip, and without
+vignetting.
 
 Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them like that.
 """
@@ -11,7 +12,7 @@ import numpy as np
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.images.exposure_curve import to_reference
+from engine.images.rendition import Rendition
 from engine.parallel import map_ordered
 
 
@@ -71,16 +72,22 @@ class TrainingPictures:
         """All pictures of one camera. [M, H, W, 3] uint8"""
         return self._pixels[camera_row]
 
-    def remove_drift(self, drift: np.ndarray) -> None:
-        """Bring the pictures, as they were decoded, into the exposure of the reference clip.
+    def remove(self, drift: np.ndarray | None, vignetting: np.ndarray | None) -> None:
+        """Take out of the pictures how the cameras' exposure changes, what their lenses lose towards the rim, or both.
 
         Args:
-            drift: Gains of the cameras against it, frame by frame. [C, M, 3]
+            drift: Gains of the cameras against the reference clip, frame by frame. [C, M, 3]
+            vignetting: Of the lenses, see engine.images.rendition. [C, 2]
         """
+        rig = self.capture.rig
 
         def correct(row: int) -> np.ndarray:
-            if (drift[row] == 1.0).all():
-                return self._pixels[row]
-            return np.stack([to_reference(*pair) for pair in zip(self._pixels[row], drift[row], strict=True)])
+            camera, pictures = self.camera_indices[row], self._pixels[row]
+            gains = np.ones((len(pictures), 3)) if drift is None else drift[row]
+            lens = None if vignetting is None else vignetting[row]
+            seen = [Rendition.of(gain, lens, rig.Ks[camera], rig.image_sizes[camera]) for gain in gains]
+            if all(rendition.is_plain for rendition in seen):
+                return pictures
+            return np.stack([one.to_scene(picture) for one, picture in zip(seen, pictures, strict=True)])
 
         self._pixels = map_ordered(correct, range(len(self._pixels)))

@@ -14,7 +14,7 @@ from app.playback.capture_pictures import CapturedPictures, downsized
 from app.playback.modes.hatching import DARK, LIGHT
 from app.playback.picture_source import PictureSource
 from engine.capture.capture import Capture, open_capture
-from engine.images.exposure_curve import to_reference
+from engine.images.rendition import Rendition
 from tests.app.fakes import write_capture
 
 WAIT_S = 20.0
@@ -44,19 +44,19 @@ def test_a_picture_says_what_it_is_of(takes: tuple[Capture, Capture]):
 
 
 def test_a_picture_in_the_scenes_colours_is_another_one_than_as_it_was_taken(takes: tuple[Capture, Capture]):
-    pictures, gain = CapturedPictures(), (1.25, 1.0, 0.8)
+    pictures, seen = CapturedPictures(), Rendition((1.25, 1.0, 0.8), (-0.2, 0.05))
     found = {}
-    for scene_gain in (None, gain):
-        assert pictures.picture(takes[0], 1, 1, 1, 400, scene_gain) is None or scene_gain is not None
+    for rendition in (None, seen):
+        assert pictures.picture(takes[0], 1, 1, 1, 400, rendition) is None or rendition is not None
         assert pictures.viewing.wait_idle(WAIT_S)
-        found[scene_gain] = pictures.picture(takes[0], 1, 1, 1, 400, scene_gain)
-    taken, evened = found[None], found[gain]
+        found[rendition] = pictures.picture(takes[0], 1, 1, 1, 400, rendition)
+    taken, evened = found[None], found[seen]
     assert taken is not None
     assert evened is not None
     assert (taken.source.has_scene_colors, evened.source.has_scene_colors) == (False, True)
     assert taken.key != evened.key
     assert np.array_equal(taken.image, takes[0].frame(1, 1))
-    assert np.array_equal(evened.image, to_reference(taken.image, np.array(gain)))
+    assert np.array_equal(evened.image, seen.to_scene(taken.image))
     assert evened.image[..., 0].mean() < taken.image[..., 0].mean() - 10
     again = pictures.picture(takes[0], 1, 1, 1, 400)
     assert again is not None

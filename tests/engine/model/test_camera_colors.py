@@ -1,10 +1,11 @@
 """Colours of cameras: known for those trained on, suggested by place and direction for those held out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from engine.camera.rig import CameraRig
-from engine.images.exposure_curve import to_reference
 from engine.model.camera_colors import CameraColors, exposure_elsewhere
 
 N = 12
@@ -65,9 +66,19 @@ def test_pictures_come_back_into_the_scenes_colours():
     own, image = colors(drift()), np.random.default_rng(0).random((48, 64, 3)) * 0.8
     camera = own.in_camera(image, ring(), 3, 0.9)
     pixels = np.floor(np.clip(camera, 0, 1) * 255 + 0.5).astype(np.uint8)
-    np.testing.assert_allclose(to_reference(pixels, own.whole_gain(ring(), 3, 0.9)) / 255.0, image, atol=0.01)
+    np.testing.assert_allclose(own.rendition(ring(), 3, 0.9).to_scene(pixels) / 255.0, image, atol=0.01)
 
 
 @pytest.mark.parametrize("camera", [0, 5])
 def test_without_drift_exposure_is_one(camera):
     assert (colors(None).exposure(ring(), camera, 0.3) == 1.0).all()
+
+
+def test_a_held_out_camera_has_the_vignetting_of_the_median_camera():
+    lenses = np.array([[-0.1 * i, 0.01] for i in range(N - 1)], np.float32)
+    own = replace(colors(None), vignetting=lenses)
+    rig = ring()
+    assert own.rendition(rig, 1, 0.0).vignetting == (0.0, np.float32(0.01))
+    assert own.rendition(rig, 0, 0.0).vignetting == tuple(float(v) for v in lenses[(N - 1) // 2])
+    center = own.rendition(rig, 2, 0.0).center
+    assert center == (rig.Ks[2, 0, 2] / rig.image_sizes[2, 0], rig.Ks[2, 1, 2] / rig.image_sizes[2, 1])
