@@ -31,7 +31,7 @@ class StepStats:
         loss: Mean training loss of the pictures; with active tiles without the part that nothing can change.
         train_psnr: PSNR of the picture that was trained on last, dB.
         n_gaussians: Gaussians rendered last.
-        stage: "static", "joint" or "source".
+        stage: "static", "joint", "moving" or "source".
         gradient_norms: Of every step, over all gradients, before `max_gradient_norm` clips them.
         n_clipped: How many steps it clipped.
     """

@@ -10,6 +10,7 @@ from app.background.kernels import COMPILING
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.status import PlanStatus, SettingStatus
+from app.training.own_settings import derived_steps
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.text import duration_text, figure_text
@@ -127,11 +128,7 @@ def plan_status(
     settings, config = project.settings, project.settings.config()
     capture = capture.without(project.document.exclusions)
     n_cameras = len(capture.training_cameras(capture.camera_indices(settings.holdout)))
-    derived: dict[str, int] = {
-        "static_steps": config.n_static_steps(n_cameras),
-        "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),
-        "source_steps": config.n_source_steps(n_cameras * clip.n_frames),
-    }
+    derived = derived_steps(config, n_cameras, clip.n_frames, capture.picture_size)
     lines = () if plan is None else (*plan.lines, *plan.forecast)
     return PlanStatus(
         clip_index=clip.clip_index,

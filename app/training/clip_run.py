@@ -41,6 +41,7 @@ from engine.errors import ProjectError
 STAGE_WORDS = {
     "static": "Learning the static scene",
     "joint": "Learning motion",
+    "moving": "Learning motion alone",
     "source": "Learning new content",
 }
 

@@ -14,6 +14,7 @@ from app.project.project import Project
 from engine.clip_files.clip_header import SettingValue
 from engine.errors import ProjectError
 from engine.training.config import LENGTH, LOSS, RATES, SETTINGS, TrainConfig, config_of
+from engine.training.windows import Windows
 
 _ADDED = ("max_static_points", "max_moving_points", "residual")
 """Settings of the anchors that a clip adds."""
@@ -55,16 +56,16 @@ def with_own(project: Project, own: Mapping[str, Any]) -> dict[str, SettingValue
     return config_of({**project.settings.overrides, **own}).difference()
 
 
-def derived_value(config: TrainConfig, name: str, *, n_cameras: int, n_frames: int) -> SettingValue:
-    """The value of a setting in a clip of that many frames, derived where it is 0.
+def derived_steps(config: TrainConfig, n_cameras: int, n_frames: int, picture_size: tuple[int, int]) -> dict[str, int]:
+    """The values of settings that follow from a clip's pictures where they are 0, by name.
 
     Args:
         n_cameras: To train on.
+        picture_size: Width and height, pixels.
     """
-    n_pictures = n_cameras * n_frames
-    derived = {
-        "static_steps": lambda: config.n_static_steps(n_cameras),
-        "joint_steps": lambda: config.n_joint_steps(n_pictures),
-        "source_steps": lambda: config.n_source_steps(n_pictures),
+    n_pictures, n_windows = n_cameras * n_frames, len(Windows(*picture_size))
+    return {
+        "static_steps": config.n_static_steps(n_cameras, n_windows),
+        "joint_steps": config.n_joint_steps(n_pictures, n_windows),
+        "source_steps": config.n_source_steps(n_pictures, n_windows),
     }
-    return derived[name]() if name in derived else getattr(config, name)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from torch import Tensor, nn
@@ -20,11 +20,26 @@ from engine.model.clip_view import View
 from engine.raster.gaussians import Gaussians
 
 
-class PhasePictures(Protocol):
-    """The pictures to draw and compare, by the numbers of items. Arrays stay as they are while a phase runs."""
+class ItemPlace(NamedTuple):
+    """What an item is a picture of.
 
-    def place(self, item: int) -> tuple[int, float]:
-        """Camera row and clip time."""
+    Attributes:
+        camera_row: Of the training cameras.
+        window: Of the camera's picture.
+        clip_time: In [0, 1).
+    """
+
+    camera_row: int
+    window: int
+    clip_time: float
+
+
+class PhasePictures(Protocol):
+    """The pictures to draw and compare, by the numbers of items: windows of captured pictures. Arrays stay as they are
+    while a phase runs."""
+
+    def place(self, item: int) -> ItemPlace:
+        """Camera, window and time."""
         ...
 
     def truth(self, item: int) -> np.ndarray:
@@ -41,9 +56,10 @@ class PhaseCameras(Protocol):
 
     is_learning: bool
     first_views: list[View]
+    """Of whole pictures."""
 
     def view(self, row: int) -> View:
-        """View of one camera, as it is by now."""
+        """View of one camera's whole picture, as it is by now."""
         ...
 
     def watch(self, gaussians: Gaussians) -> None:
@@ -56,6 +72,26 @@ class PhaseCameras(Protocol):
 
     def settle(self) -> None:
         """After a step: back into the gauge."""
+        ...
+
+
+class PhaseWindows(Protocol):
+    """The windows of a camera's picture, as engine.training.windows has them."""
+
+    def row(self, camera_row: int, index: int) -> int:
+        """Number of a camera's window among those of all cameras."""
+        ...
+
+    def view(self, whole: View, index: int) -> View:
+        """The window as a camera sees it."""
+        ...
+
+    def views(self, wholes: Sequence[View]) -> list[View]:
+        """All windows of all cameras."""
+        ...
+
+    def cut_all(self, pictures: np.ndarray | None) -> list[np.ndarray] | None:
+        """All windows of a picture of each camera [C, H, W, ...]; None for None."""
         ...
 
 
@@ -85,6 +121,7 @@ class PhasePlan:
         gains: Colour gains of the cameras. [C, 3]
         cameras: They learn as well where `cameras.is_learning`.
         pictures: The pictures to compare with.
+        windows: The parts of the cameras' pictures that items are.
         is_valid: Pixels that cameras see, in every frame; None where they see all. [C, H, W] bool
         parameters: The tensors that learn, by name.
         schedule: How fast.
@@ -100,6 +137,7 @@ class PhasePlan:
     gains: nn.Parameter
     cameras: PhaseCameras
     pictures: PhasePictures
+    windows: PhaseWindows
     is_valid: np.ndarray | None
     parameters: Mapping[str, nn.Parameter]
     schedule: Schedule

@@ -82,7 +82,9 @@ def faded(
     """
     passes, rate = _LEARNING if is_learning else _FADING
     training = make(clip.clip_index, _slower(_config(state), rate))
-    pictures = FadedPictures(training.capture, clip, training.camera_indices, looks, span, is_learning=is_learning)
+    pictures = FadedPictures(
+        training.capture, clip, training.camera_indices, training.prep_dir, looks, span, is_learning=is_learning
+    )
     inside = [frame - clip.start for frame in clip.frame_indices() if frame in span]
     outside = [frame - clip.start for frame in clip.frame_indices() if frame not in span]
     items = _items(inside, pictures.n_cameras, clip)

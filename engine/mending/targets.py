@@ -9,6 +9,7 @@ so that a jump between two neighbouring frames becomes as many small steps as th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -98,6 +99,7 @@ class FadedPictures(TrainingPictures):
         capture: At working size.
         clip: Whose pictures.
         camera_indices: Training cameras.
+        folder: For pictures that do not fit into memory.
         looks: Clips as they were, this one and its neighbours.
         span: Frames of the capture that may change, in this clip and a neighbour perhaps.
         is_learning: Whether what cannot be taken from the neighbours is learned from the truth; otherwise it keeps the
@@ -109,12 +111,13 @@ class FadedPictures(TrainingPictures):
         capture: Capture,
         clip: Clip,
         camera_indices: Sequence[int],
+        folder: Path,
         looks: Looks,
         span: range,
         *,
         is_learning: bool = False,
     ) -> None:
-        super().__init__(capture, clip, camera_indices)
+        super().__init__(capture, clip, camera_indices, folder)
         self._looks, self._span, self._is_learning = looks, span, is_learning
         self._kept: ByteCache[tuple[int, int], np.ndarray] = ByteCache(MAX_BYTES)
 

@@ -101,6 +101,7 @@ class ClipModel(nn.Module):
         self.reasons: dict[str, np.ndarray] = {}  # the gate's reasons for the anchors of a role, for display
         self.decoder = decoder
         self.clip_length, self.n_frames = clip_length, n_frames
+        self._stores_decoder = False
         self._corners: dict[str, CornerTable] = {}
         self._frozen: dict[str, Gaussians] = {}
         self._lit: dict[float, Gaussians] = {}
@@ -160,6 +161,14 @@ class ClipModel(nn.Module):
             if positions.requires_grad:
                 assert self.field is not None
                 self._corners[role] = self.field.corners(positions.detach())
+
+    def freeze_still_parts(self) -> None:
+        """Static anchors and the heads that this clip has trained stay as they are from here on."""
+        self._stores_decoder |= any(p.requires_grad for p in self.decoder.parameters())
+        self.decoder.requires_grad_(requires_grad=False)
+        for role in self.roles():
+            if not self.anchor_set(role).is_dynamic:
+                self.anchor_set(role).requires_grad_(requires_grad=False)
 
     def is_constant(self, role: str) -> bool:
         """Whether the set's Gaussians never change: static anchors under a frozen decoder."""
@@ -324,7 +333,7 @@ class ClipModel(nn.Module):
                 light=_copy(self.light) if role == STATIC and self.light is not None else None,
             )
             arrays |= record.arrays(role)
-        if any(p.requires_grad for p in self.decoder.parameters()):
+        if self._stores_decoder or any(p.requires_grad for p in self.decoder.parameters()):
             arrays |= {f"{DECODER}{name}": _copy(value) for name, value in self.decoder.state_dict().items()}
         if self.field is not None:
             arrays |= {f"{FIELD}{name}": _copy(value) for name, value in self.field.state_dict().items()}

@@ -6,7 +6,7 @@ test is conservative: an anchor's Gaussians may sit a few spacings away from it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -58,6 +58,13 @@ class View:
             int(height),
             float(near_plane),
         )
+
+    def part(self, x: int, y: int, width: int, height: int) -> View:
+        """The view of a rectangle of the picture, pixels."""
+        K = self.K.clone()
+        K[0, 2] -= x
+        K[1, 2] -= y
+        return replace(self, K=K, width=width, height=height)
 
     def sees(self, positions: Tensor, *, reach: float | Tensor) -> Tensor:
         """Whether something within `reach` scene units, one or [A], of each position may touch a pixel. [A] bool"""

@@ -1,6 +1,7 @@
 """ClipTraining: one clip from pixels to a finished ClipState, step by step.
 
-Reference clip: "static" phase on the backgrounds, then "joint" phase on the pictures with the moving anchors added.
+Reference clip: "static" phase on the backgrounds, then "joint" phase on the pictures with the moving anchors added,
+then "moving" phase, in which these and the field learn on alone, as in a source clip.
 Source clip: one "source" phase; everything inherited is frozen, residual anchors and the clip's own field learn.
 It owns model, optimiser and sampling; it has no loop, no process, and opens no files itself.
 """
@@ -15,7 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.backends.backend import Backend
-from engine.backends.phase import PhasePlan
+from engine.backends.phase import ItemPlace, PhasePlan
 from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -30,7 +31,7 @@ from engine.gate.regions import GateRegion
 from engine.images.psnr import psnr
 from engine.model.camera_colors import CameraColors
 from engine.model.clip_model import ClipModel, decoder_shape
-from engine.model.clip_view import REACH_SPACINGS, render_model
+from engine.model.clip_view import REACH_SPACINGS, reaches_of, render_model
 from engine.model.host_array import host_array
 from engine.model.reading import load_clip_model
 from engine.progress import Progress, ReportProgress, StepStats
@@ -44,11 +45,13 @@ from engine.training.preparation.cloud_preparation import Backgrounds
 from engine.training.preparation.drift import no_drift
 from engine.training.preparation.method import Method
 from engine.training.preparation.training_pictures import TrainingPictures
+from engine.training.preparation.unseen_anchors import continue_unseen
 from engine.training.step.nonfinite import not_finite
 from engine.training.step.order import ShuffledOrder
 from engine.training.step.stepwise_phase import StepwisePhase
 from engine.training.step.training_cameras import TrainingCameras
 from engine.training.step.visible_anchors import camera_views
+from engine.training.windows import Windows
 
 _SEED_STEP = 1_000_003
 """Between clips that are trained independently; far more than the seeds that people try."""
@@ -105,8 +108,14 @@ class ClipTraining:
         self.prep_dir, self.report = Path(prep_dir), report
         self.rig = capture.rig.subset(self.camera_indices)
         self.near_plane = float(near_plane(self.rig)) if self._base is None else self._base.header.near_plane
-        n_cameras = len(self.camera_indices)
-        self.phases = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=self._base is not None)
+        self.windows = Windows(*capture.picture_size)
+        self.phases = phases_of(
+            config,
+            n_cameras=len(self.camera_indices),
+            n_frames=clip.n_frames,
+            n_windows=len(self.windows),
+            is_source=self._base is not None,
+        )
         self.steps_done = 0
         self._generator = torch.Generator().manual_seed(self.seed)
         self._views = camera_views(capture.rig, near_plane=self.near_plane)
@@ -120,7 +129,7 @@ class ClipTraining:
         self._preparation = ClipPreparation(
             capture,
             clip,
-            config,
+            config.of_windows(len(self.windows)),
             method,
             backend=backend,
             camera_indices=self.camera_indices,
@@ -175,6 +184,12 @@ class ClipTraining:
         )
         self._take(self._preparation.with_motion(parts, self.pictures))
 
+    def _settle_still_parts(self) -> None:
+        """Between the phases of a reference clip: still parts have learned, and what no pixel showed follows them."""
+        squares = self._phase.arrays().get("optimizer.sets.static.features.exp_avg_sq")
+        n_changed = 0 if squares is None else continue_unseen(self.model, "static", squares)
+        self._say("Finishing the static scene", f"{n_changed:,} anchors that no camera sees look like their neighbours")
+
     def _take(self, parts: ClipParts) -> None:
         self.model, self.gains, self.drift, self.backgrounds = parts.model, parts.gains, parts.drift, parts.backgrounds
         self.spacing, self.moving_spacing = parts.spacing, parts.moving_spacing
@@ -187,8 +202,10 @@ class ClipTraining:
 
     def _start_phase(self, index: int, steps_in_phase: int, reaches: dict[str, Tensor] | None = None) -> None:
         name, n_steps = self.phases[index]
+        if name == "moving":
+            self.model.freeze_still_parts()
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
-        self.gains.requires_grad_(self.reference is None and has_gains)
+        self.gains.requires_grad_(self.reference is None and has_gains and name != "moving")
         self._learn_positions()
         parameters = named_parameters(self.model, self.gains, self.config, self._cameras.pixels, extent=self.rig.extent)
         ratios = self.method.final_ratios(parameters, self.config)
@@ -197,21 +214,22 @@ class ClipTraining:
             gains=self.gains,
             cameras=self._cameras,
             pictures=self,
+            windows=self.windows,
             is_valid=self.pictures.is_valid,
             parameters={name: parameter for name, (parameter, _) in parameters.items()},
             schedule=schedule_of(parameters, self.config, n_steps=n_steps, final_ratios=ratios),
             reach=REACH_SPACINGS * self.spacing,
             reaches=reaches,
-            has_rest=name == "source" and self.method.has_active_tiles and not self.gains.requires_grad,
+            has_rest=name in ("source", "moving") and self.method.has_active_tiles and not self.gains.requires_grad,
             ssim_weight=self.config.ssim_weight,
             volume_weight=self.config.volume_weight,
             volume_unit=self.spacing if self.config.volume == "mean" else None,
         )
         self._phase = self.backend.phase(plan) or StepwisePhase(plan, self.backend)
         self._phase.restore({}, steps_in_phase)
+        self._phase_index, self._stage = index, name
         self._items = self._items_of(name)
         self._order = ShuffledOrder(len(self._items), seed=self.seed + index)
-        self._phase_index, self._stage = index, name
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: 0 steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
@@ -223,18 +241,44 @@ class ClipTraining:
                 self.model.anchor_set(role).learn_positions()
 
     def _items_of(self, phase: str) -> list[int]:
-        """Numbers of the items a phase draws: cameras, or pictures camera by camera; without wholly excluded ones."""
+        """Numbers of the items a phase draws: windows of cameras, or of pictures camera by camera; without wholly
+        excluded ones."""
         if phase == "static":
             out = self.capture.excluded_cameras
-            return [row for row, camera in enumerate(self.camera_indices) if camera not in out]
+            return self._windows_of([row for row, camera in enumerate(self.camera_indices) if camera not in out])
         n_frames = self.clip.n_frames
-        items = [item for item in range(len(self.pictures)) if self.pictures.is_usable(*divmod(item, n_frames))]
+        usable = [one for one in range(len(self.pictures)) if self.pictures.is_usable(*divmod(one, n_frames))]
+        items = self._windows_of(usable)
+        if len(self.windows) > 1 and phase in ("source", "moving"):
+            items = self._with_motion(items) or items
         if not items:
             raise PreparationError(
                 f"Every picture of clip {self.clip.clip_index} is excluded from training.",
                 hint="Remove some exclusions, or leave the clip untrained.",
             )
         return items
+
+    def _windows_of(self, pictures: Sequence[int]) -> list[int]:
+        """The items that are windows of these pictures."""
+        n = len(self.windows)
+        return [picture * n + window for picture in pictures for window in range(n)]
+
+    def _with_motion(self, items: Sequence[int]) -> list[int]:
+        """Those in which something that learns may be seen: nothing can be learned from the other windows."""
+        dynamic = [role for role in self.model.roles() if self.model.anchor_set(role).is_dynamic]
+        reaches = {role: reaches_of(self.model.anchor_set(role), REACH_SPACINGS * self.spacing) for role in dynamic}
+        views = self.windows.views(self._cameras.first_views)
+        seen = {
+            role: [view.sees(self.model.anchor_set(role).positions.detach(), reach=reaches[role]) for view in views]
+            for role in dynamic
+        }
+        found = []
+        for item in items:
+            camera_row, window, clip_time = self.place(item)
+            view_row = self.windows.row(camera_row, window)
+            if any(seen[role][view_row][self.model.alive(role, clip_time)].any() for role in dynamic):
+                found.append(item)
+        return found
 
     def step(self, n: int = 1) -> StepStats:
         """Steps of one phase, each of which draws a picture, renders it, compares, and updates.
@@ -246,7 +290,10 @@ class ClipTraining:
         """
         index, done = phase_at(self.phases, self.steps_done)
         if index != self._phase_index:
-            self._add_moving()
+            if self.phases[index][0] == "joint":
+                self._add_moving()
+            else:
+                self._settle_still_parts()
             self._start_phase(index, 0)
         order = self._order.state() if n > 1 else {}
         items = [self._items[self._order.draw()] for _ in range(min(n, self.phases[index][1] - done))]
@@ -257,10 +304,10 @@ class ClipTraining:
             if n_done + 1 < len(items):  # the items drawn for the steps behind are drawn again
                 self._order.restore(order)
                 items = [self._items[self._order.draw()] for _ in range(n_done + 1)]
-            where = f"step {self.steps_done + 1}, camera {self.rig.names[self.place(items[n_done])[0]]}"
+            where = f"step {self.steps_done + 1}, camera {self.rig.names[self.place(items[n_done]).camera_row]}"
             raise not_finite(stats.fault, where=where, config=self.config)
-        valid, camera_row = self.pictures.is_valid, self.place(items[-1])[0]
-        share = 1.0 if valid is None else float(valid[camera_row].mean())
+        valid, (camera_row, window, _) = self.pictures.is_valid, self.place(items[-1])
+        share = 1.0 if valid is None else float(self.windows.cut(valid[camera_row], window).mean())
         norms, limit = stats.gradient_norms, self.config.max_gradient_norm
         return StepStats(
             step=self.steps_done,
@@ -275,26 +322,30 @@ class ClipTraining:
 
     # ---------------------------------------------------------------- inputs of a phase
 
-    def place(self, item: int) -> tuple[int, float]:
+    def place(self, item: int) -> ItemPlace:
         """See PhasePictures."""
+        picture, window = divmod(item, len(self.windows))
         if self._stage == "static":
-            return item, 0.0
-        camera_row, frame = divmod(item, self.clip.n_frames)
-        return camera_row, frame / self.clip.clip_length
+            return ItemPlace(picture, window, 0.0)
+        camera_row, frame = divmod(picture, self.clip.n_frames)
+        return ItemPlace(camera_row, window, frame / self.clip.clip_length)
 
     def truth(self, item: int) -> np.ndarray:
         """See PhasePictures."""
+        picture, window = divmod(item, len(self.windows))
         if self._stage == "static":
-            return self.backgrounds.images[item]
-        return self.pictures.picture(*divmod(item, self.clip.n_frames))
+            return self.windows.cut(self.backgrounds.images[picture], window)
+        return self.windows.cut(self.pictures.picture(*divmod(picture, self.clip.n_frames)), window)
 
     def counted(self, item: int) -> np.ndarray | None:
         """See PhasePictures."""
+        picture, window = divmod(item, len(self.windows))
         if self._stage == "static":
-            return self.backgrounds.is_stable[item]  # unstable pixels do not count
+            return self.windows.cut(self.backgrounds.is_stable[picture], window)  # unstable pixels do not count
         if self.capture.exclusions == NOTHING_EXCLUDED:
             return None
-        return self.pictures.valid_in(*divmod(item, self.clip.n_frames))
+        valid = self.pictures.valid_in(*divmod(picture, self.clip.n_frames))
+        return None if valid is None else self.windows.cut(valid, window)
 
     def _tensor(self, array: np.ndarray) -> Tensor:
         return torch.from_numpy(array).to(self.backend.device)
@@ -391,7 +442,7 @@ class ClipTraining:
         self,
         state: ClipState,
         pictures: TrainingPictures,
-        items: Sequence[int],
+        chosen: Sequence[int],
         *,
         n_steps: int,
         learning: tuple[str, ...] = ("",),
@@ -403,7 +454,7 @@ class ClipTraining:
         Args:
             state: The clip, based on the same reference.
             pictures: To compare with, in the exposure of the reference clip; their truth may be any picture.
-            items: The items drawn in a pass: camera row * frames of the clip + frame in the clip.
+            chosen: The pictures drawn in a pass: camera row * frames of the clip + frame in the clip.
             n_steps: How many steps.
             learning: Prefixes of the names of parameters that learn, as the model names them.
         Raises:
@@ -434,7 +485,7 @@ class ClipTraining:
         self.phases, self.steps_done = [("source", n_steps)], 0
         self._start_phase(0, 0)
         usable = set(self._items)
-        self._items = [item for item in items if item in usable] or self._items
+        self._items = [item for item in self._windows_of(chosen) if item in usable] or self._items
         self._order = ShuffledOrder(len(self._items), seed=self.seed)
 
     def write_checkpoint(self, path: Path | str) -> None:

@@ -40,8 +40,15 @@ class StepRule(NamedTuple):
 
 
 STATIC_RULE = StepRule(30, 300, 1000)
-JOINT_RULE = StepRule(20, 1200, 6000)
-SOURCE_RULE = StepRule(24, 1200, 6000)
+JOINT_RULE = StepRule(12, 1200, 3500)
+SOURCE_RULE = StepRule(6, 720, 2000)
+QUALITIES = {"draft": 0.4, "standard": 1.0, "best": 3.0}
+"""Derived steps of each quality, as a share of those of "standard"."""
+MOVING_SHARE = 0.43
+"""Share of the steps after the static phase, the last ones, in which only what moves learns: three for four others."""
+
+
+_MOST_POINTS = 1_000_000
 
 
 def _size(meaning: str, low: float, high: float, unit: str = "", label: str = "") -> msgspec.Meta:
@@ -49,7 +56,7 @@ def _size(meaning: str, low: float, high: float, unit: str = "", label: str = ""
 
 
 def _points(meaning: str, label: str) -> msgspec.Meta:
-    return setting(CLOUDS, meaning, low=1, high=1_000_000, unit="anchors", label=label)
+    return setting(CLOUDS, meaning, low=1, high=_MOST_POINTS, unit="anchors", label=label)
 
 
 def _steps(meaning: str, label: str) -> msgspec.Meta:
@@ -164,13 +171,18 @@ class TrainConfig(msgspec.Struct, frozen=True):
         ),
     ] = "capture"
     max_static_points: Annotated[
-        int, _points("Largest number of static anchors; the voxel grows until they fit.", "Static anchors, at most")
+        int,
+        _points(
+            "Largest number of static anchors for pictures of up to 640 x 480; larger ones get more, in proportion to "
+            "their sides. The voxel grows until they fit.",
+            "Static anchors, at most",
+        ),
     ] = 22_000
     max_moving_points: Annotated[
         int,
         _points(
-            "Largest number of moving anchors over the whole clip. In a reference clip the voxel grows until they "
-            "fit; a source clip keeps that voxel and leaves some points to neighbouring anchors.",
+            "Largest number of moving anchors over the whole clip, likewise. In a reference clip the voxel grows until "
+            "they fit; a source clip keeps that voxel and leaves some points to neighbouring anchors.",
             "Moving anchors, at most",
         ),
     ] = 32_000
@@ -210,6 +222,18 @@ class TrainConfig(msgspec.Struct, frozen=True):
         ),
     ] = "off"
 
+    quality: Annotated[
+        str,
+        _choice(
+            LENGTH,
+            "How long is trained, where the steps below are derived: the learning rates fall towards the last step.",
+            {
+                "draft": f"{QUALITIES['draft']:g} times the steps, to see whether a capture works",
+                "standard": "until most of what is learned at all is learned",
+                "best": f"{QUALITIES['best']:g} times the steps, for the last few tenths of a decibel",
+            },
+        ),
+    ] = "standard"
     static_steps: Annotated[
         int,
         _steps(
@@ -218,7 +242,12 @@ class TrainConfig(msgspec.Struct, frozen=True):
         ),
     ] = 0
     joint_steps: Annotated[
-        int, _steps(f"Steps of the reference clip after that; {JOINT_RULE.text('training picture')}.", "Joint steps")
+        int,
+        _steps(
+            "Steps of the reference clip after that, in the last three of seven of which still parts and decoder no "
+            f"longer learn; {JOINT_RULE.text('training picture')}.",
+            "Joint steps",
+        ),
     ] = 0
     source_steps: Annotated[
         int, _steps(f"Steps of a source clip; {SOURCE_RULE.text('training picture')}.", "Steps of later clips")
@@ -236,8 +265,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
 
     feature_lr: Annotated[float, _rate("the anchors' static features")] = 7.5e-3
     scale_lr: Annotated[float, _rate("the anchors' scales")] = 7e-3
-    table_lr: Annotated[float, _rate("the field's hash tables")] = 0.04
-    field_mlp_lr: Annotated[float, _rate("the field's network")] = 8e-3
+    table_lr: Annotated[float, _rate("the field's hash tables")] = 0.08
+    field_mlp_lr: Annotated[float, _rate("the field's network")] = 0.016
     opacity_head_lr: Annotated[float, _rate("the head of opacities")] = 2e-3
     shape_head_lr: Annotated[float, _rate("the head of scales and rotations")] = 4e-3
     color_head_lr: Annotated[float, _rate("the head of colours")] = 4e-3
@@ -263,7 +292,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
             low=1e-6,
             high=1.0,
         ),
-    ] = 0.02
+    ] = 0.1
     feature_final_ratio: Annotated[float, _final("static features")] = 0.0
     scale_final_ratio: Annotated[float, _final("scales")] = 0.0
     position_final_ratio: Annotated[float, _final("positions")] = 0.0
@@ -367,7 +396,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
                 "off": "none; the clip builds its own and inherits only the decoder",
             },
         ),
-    ] = "frozen"
+    ] = "moving"
     field: Annotated[
         str,
         _choice(
@@ -402,7 +431,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
             raise ProjectError(
                 "independent clips cannot continue each other's field.", hint="Leave out field=continue."
             )
-        shared = [name for name in ("decoder", "residual", "inherit") if name in self.difference()]
+        changed = self.difference()
+        shared = [name for name in ("decoder", "residual", "inherit") if changed.get(name, "frozen") != "frozen"]
         if self.independent and shared:
             listed = ", ".join(f"{name}={getattr(self, name)}" for name in shared)
             raise ProjectError(
@@ -445,20 +475,33 @@ class TrainConfig(msgspec.Struct, frozen=True):
         """Whether backgrounds are estimated: with cloud=frames nothing but exposures is measured against them."""
         return self.cloud != "frames" or self.color != "off"
 
-    def n_static_steps(self, n_cameras: int) -> int:
-        """Steps of the static phase for this many training cameras."""
-        return self.static_steps or STATIC_RULE.steps(n_cameras)
+    def n_static_steps(self, n_cameras: int, n_windows: int = 1) -> int:
+        """Steps of the static phase for this many training cameras, whose pictures have so many windows."""
+        return self.static_steps or self._derived(STATIC_RULE.steps(n_cameras), n_windows)
 
-    def n_joint_steps(self, n_pictures: int) -> int:
-        """Steps of the joint phase of a reference clip with this many training pictures."""
-        return self.joint_steps or self._n_pass_steps(n_pictures) or JOINT_RULE.steps(n_pictures)
+    def n_joint_steps(self, n_pictures: int, n_windows: int = 1) -> int:
+        """Steps of the joint phase of a reference clip with this many training pictures of so many windows."""
+        passes = self._n_pass_steps(n_pictures * n_windows)
+        return self.joint_steps or passes or self._derived(JOINT_RULE.steps(n_pictures), n_windows)
 
-    def n_source_steps(self, n_pictures: int) -> int:
-        """Steps of a source clip with this many training pictures."""
-        return self.source_steps or self._n_pass_steps(n_pictures) or SOURCE_RULE.steps(n_pictures)
+    def n_source_steps(self, n_pictures: int, n_windows: int = 1) -> int:
+        """Steps of a source clip with this many training pictures of so many windows."""
+        passes = self._n_pass_steps(n_pictures * n_windows)
+        return self.source_steps or passes or self._derived(SOURCE_RULE.steps(n_pictures), n_windows)
 
-    def _n_pass_steps(self, n_pictures: int) -> int:
-        return math.ceil(self.passes * n_pictures)
+    def _n_pass_steps(self, n_windows: int) -> int:
+        return math.ceil(self.passes * n_windows)
+
+    def _derived(self, n_steps: int, n_windows: int) -> int:
+        """Steps for pictures of so many windows, where those of one window need `n_steps`: as the square root of the
+        area, since neighbouring pixels teach the same anchors."""
+        return max(round(n_steps * QUALITIES[self.quality] * n_windows**0.5), 1)
+
+    def of_windows(self, n_windows: int) -> TrainConfig:
+        """The settings with the limits of anchors that pictures of so many windows have."""
+        names, grown = ("max_static_points", "max_moving_points"), n_windows**0.5
+        limits = {name: min(round(getattr(self, name) * grown), _MOST_POINTS) for name in names}
+        return msgspec.structs.replace(self, **limits)
 
 
 SETTINGS = settings_of(TrainConfig)

@@ -4,23 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from engine.training.config import TrainConfig
+from engine.training.config import MOVING_SHARE, TrainConfig
 
 
-def phases_of(config: TrainConfig, *, n_cameras: int, n_frames: int, is_source: bool) -> list[tuple[str, int]]:
+def phases_of(
+    config: TrainConfig, *, n_cameras: int, n_frames: int, n_windows: int, is_source: bool
+) -> list[tuple[str, int]]:
     """Name and number of steps of every phase, in order.
 
     Args:
         config: Gives the steps.
         n_cameras, n_frames: Training cameras, and frames of the clip.
+        n_windows: Windows of a picture, one of which a step draws.
         is_source: Whether the clip inherits from another one.
     """
     n_pictures = n_cameras * n_frames
     if config.cloud == "frames" and not is_source:  # one cloud, so there is nothing to begin with
-        return [("joint", config.n_joint_steps(n_pictures))]
+        return [("joint", config.n_joint_steps(n_pictures, n_windows))]
     if is_source:
-        return [("source", config.n_source_steps(n_pictures))]
-    return [("static", config.n_static_steps(n_cameras)), ("joint", config.n_joint_steps(n_pictures))]
+        return [("source", config.n_source_steps(n_pictures, n_windows))]
+    n_joint_steps, static = config.n_joint_steps(n_pictures, n_windows), config.n_static_steps(n_cameras, n_windows)
+    if config.gate == "off":  # every anchor moves
+        return [("static", static), ("joint", n_joint_steps)]
+    n_alone = round(MOVING_SHARE * n_joint_steps)
+    return [("static", static), ("joint", n_joint_steps - n_alone), ("moving", n_alone)]
 
 
 def phase_at(phases: Sequence[tuple[str, int]], step: int) -> tuple[int, int]:

@@ -71,6 +71,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "volume": "sum",
         "volume_weight": 0.01,
         "max_gradient_norm": 0.0,
+        "inherit": "frozen",
         "gate": "off",
         "tiles": "all",
         "storage": "exact",

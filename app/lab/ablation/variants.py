@@ -65,7 +65,7 @@ VARIANTS = (
         "without residual anchor compensation (RAC): all points of a clip next to the inherited anchors, however many",
         {"residual": "full"},
     ),
-    Variant("inherit-moving", "inherited moving anchors keep learning, static ones stay", {"inherit": "moving"}),
+    Variant("inherit-frozen", "all inherited anchors stay as they are, as published", {"inherit": "frozen"}),
     Variant(
         "inherit-trainable",
         "without anchor inheritance (AI): inherited anchors keep learning in every source clip",

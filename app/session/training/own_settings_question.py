@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
 from app.session.questions import OwnSetting, SettingsQuestion, retrain_question
-from app.training.own_settings import derived_value, offered
+from app.training.own_settings import derived_steps, offered
 from engine.errors import ProjectError
 from engine.training.config import SETTINGS
 
@@ -27,10 +27,11 @@ def settings_question(opened: OpenedProject, catalog: ClipCatalog, clip_index: i
     config = project.settings.config()
     capture = opened.capture.without(project.document.exclusions)
     n_cameras = len(capture.training_cameras(opened.holdout))
+    derived = derived_steps(config, n_cameras, opened.clips[clip_index].n_frames, capture.picture_size)
     settings = []
     for name in offered(project, clip_index):
         declared = SETTINGS[name]
-        value = derived_value(config, name, n_cameras=n_cameras, n_frames=opened.clips[clip_index].n_frames)
+        value = derived[name] if name in derived else getattr(config, name)
         help_text = f"{declared.meaning}\n{declared.span}"
         if declared.choices:
             help_text = "\n".join([declared.meaning, *(f"{word}: {said}" for word, said in declared.choices.items())])

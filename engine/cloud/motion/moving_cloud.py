@@ -16,6 +16,7 @@ import numpy as np
 from engine.camera.depth_range import near_plane
 from engine.camera.projection import project, projection_matrices
 from engine.camera.rig import CameraRig
+from engine.cloud.background.motion_masks import MotionMasks
 from engine.cloud.fusion import keep_inliers
 from engine.cloud.kept_results import Arrays, Keep, do_now
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility, surface_rows
@@ -62,7 +63,7 @@ class MovingCloud:
 
 def build_moving_cloud(
     frames: Callable[[int, int], np.ndarray],
-    masks: np.ndarray,
+    masks: MotionMasks,
     rig: CameraRig,
     gains: np.ndarray,
     *,
@@ -78,7 +79,7 @@ def build_moving_cloud(
 
     Args:
         frames: (row of the rig, frame_in_clip) -> picture [H, W, 3] uint8. Called in order from this thread.
-        masks: Motion masks. [M, C, H, W] bool
+        masks: Pixels that move.
         rig: Training cameras only, at mask size.
         gains: camera_colour = gain * scene_colour. [C, 3]
         bounds_min, bounds_max: Box to search, scene units. [3]
@@ -91,7 +92,7 @@ def build_moving_cloud(
         MovingCloud; empty where nothing moves.
     """
     started = time.perf_counter()
-    n_frames, n_cameras = masks.shape[:2]
+    n_frames, n_cameras, _, _ = masks.shape
     projections, near = projection_matrices(rig), 0.5 * near_plane(rig)
     min_hits, n_misses = hull_votes(n_cameras)
     n_hidden = 0
@@ -103,7 +104,7 @@ def build_moving_cloud(
         return found["voxels"]
 
     def carve_frame(frame_in_clip: int, grid: Grid) -> Arrays:
-        frame_masks = masks[frame_in_clip]
+        frame_masks = masks.of_frame(frame_in_clip)
         is_valid = valid_in(frame_in_clip)
         voxels = carve(
             frame_masks, projections, grid, near=near, n_misses=n_misses, min_hits=min_hits, is_valid=is_valid
@@ -207,7 +208,7 @@ def _colors(
     points: np.ndarray,
     presence: np.ndarray,
     frames: Callable[[int, int], np.ndarray],
-    masks: np.ndarray,
+    masks: MotionMasks,
     projections: np.ndarray,
     gains: np.ndarray,
     *,
@@ -216,11 +217,12 @@ def _colors(
 ) -> np.ndarray:
     """Mean over the frames of each point's median colour, 0..1. [P, 3] float32"""
     sums, counts = np.zeros((len(points), 3)), np.zeros(len(points))
-    n_frames, n_cameras = masks.shape[:2]
+    n_frames, n_cameras, _, _ = masks.shape
     for frame_in_clip in range(n_frames):
         rows = np.flatnonzero(presence[:, frame_in_clip])
         pictures = np.stack([frames(row, frame_in_clip) for row in range(n_cameras)])
-        pixel, is_visible = hull_visibility(points[rows], size, masks[frame_in_clip], projections, near=near)
+        frame_masks = masks.of_frame(frame_in_clip)
+        pixel, is_visible = hull_visibility(points[rows], size, frame_masks, projections, near=near)
         colors = hull_colors(pictures, pixel, is_visible, gains)
         is_known = np.isfinite(colors[:, 0])
         sums[rows[is_known]] += colors[is_known]

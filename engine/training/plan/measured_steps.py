@@ -29,7 +29,7 @@ def measured_step_s(sizes: StepSizes, phase: str, backend: Backend) -> float:
 
     Args:
         sizes: Of the clip.
-        phase: "static", "joint" or "source".
+        phase: As engine.training.phases calls it.
         backend: The backend they are computed with.
     """
     run = _Steps(sizes, phase, backend)
@@ -45,22 +45,22 @@ class _Steps:
     """Steps as engine.training.clip_training does them, without a capture, checks and statistics."""
 
     def __init__(self, sizes: StepSizes, phase: str, backend: Backend) -> None:
-        config = sizes.config
+        config, is_source = sizes.config, phase in ("source", "moving")  # still parts are frozen in both
         recipe = ClipRecipe(
             n_anchors=sizes.n_static + (0 if phase == "static" else sizes.n_moving),
             gaussians_per_anchor=config.gaussians_per_anchor,
             width=sizes.width,
             height=sizes.height,
-            is_source=phase == "source",
+            is_source=is_source,
             n_static=sizes.n_static,
             motion_share=MOTION_SHARE,
         )
         self._backend = backend
         self._config, self._model = config, make_clip(recipe, config=config, backend=self._backend)
         self._view, self._truth = make_view(recipe), torch.from_numpy(make_truth(recipe))
-        self._gain = nn.Parameter(torch.ones(3, dtype=self._backend.dtype), requires_grad=phase != "source")
+        self._gain = nn.Parameter(torch.ones(3, dtype=self._backend.dtype), requires_grad=not is_source)
         self._rows = {role: torch.arange(len(self._model.anchor_set(role))) for role in self._model.roles()}
-        has_tiles = phase == "source" and ActiveTiles.applies(self._model)
+        has_tiles = is_source and ActiveTiles.applies(self._model)
         self._tiles = ActiveTiles(self._model, backend=self._backend) if has_tiles else None
         parameters = named_parameters(self._model, self._gain, config)
         schedule, learning = schedule_of(parameters, config, n_steps=10_000), {n: p for n, (p, _) in parameters.items()}

@@ -11,13 +11,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from msgspec.structs import replace as replace_settings
+
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
-from engine.training.config import TrainConfig
+from engine.training.config import QUALITIES, TrainConfig
 from engine.training.phases import phases_of
 from engine.training.plan.forecast import MeasuredClip, median_of, rough_memory_mb, rough_preparation_s
+from engine.training.windows import Windows
 
 Value = int | float | str | None
 
@@ -29,13 +32,17 @@ SEEN_SHARE = 0.6
 """Share of the static anchors that one camera sees."""
 
 
+WINDOW_OVERLAP = 1.4
+"""Anchors that the windows of a picture see together, against those that the picture sees."""
+
+
 @dataclass(frozen=True, slots=True)
 class StepSizes:
     """The quantities that the time of a training step follows from.
 
     Attributes:
-        width, height: Of a picture, pixels.
-        n_static, n_moving: Anchors that a camera sees at one time.
+        width, height: Of what a step draws, pixels.
+        n_static, n_moving: Anchors that are seen there at one time.
         config: Widths, Gaussians per anchor, loss.
     """
 
@@ -216,7 +223,15 @@ def make_plan(
         for known in history
         if known.clip_index != clip.clip_index and known.is_source == is_source and not known.is_still
     ]
-    phases = phases_of(config, n_cameras=footage.n_cameras, n_frames=clip.n_frames, is_source=is_source)
+    windows = Windows(footage.width, footage.height)
+    counts = {"n_cameras": footage.n_cameras, "n_frames": clip.n_frames, "n_windows": len(windows)}
+    others = {
+        quality: sum(n for _, n in phases_of(replace_settings(config, quality=quality), **counts, is_source=is_source))
+        for quality in QUALITIES
+        if quality != config.quality
+    }
+    config = config.of_windows(len(windows))
+    phases = phases_of(config, **counts, is_source=is_source)
     stays_still = is_still and is_source
     if stays_still:
         phases = [(name, 0) for name, _ in phases]
@@ -226,7 +241,9 @@ def make_plan(
     if not is_source and config.needs_backgrounds and config.backgrounds == "capture":
         n_read = footage.n_cameras * min(footage.n_frames, config.background_frames)
     n_static, n_moving = expected_anchors(footage, config, reference)
-    sizes = StepSizes(footage.width, footage.height, round(SEEN_SHARE * n_static), n_moving, config)
+    share = 1.0 if len(windows) == 1 else min(1.0, WINDOW_OVERLAP / len(windows))
+    window, n_seen, n_alive = windows[0], round(share * SEEN_SHARE * n_static), round(share * n_moving)
+    sizes = StepSizes(window.width, window.height, n_seen, n_alive, config)
     step_s = median_of([known.step_s for known in same])
     timed_s = _timed_s(phases, lambda phase: step_time(sizes, phase)) if step_s is None else step_s * n_steps
     preparation_s = median_of([known.preparation_s for known in same]) or rough_preparation_s(
@@ -251,6 +268,11 @@ def make_plan(
             *_anchor_lines(config, reference, is_source=is_source),
             *_distance_lines(clip, reference, exposure),
             PlanLine("Gaussians per anchor", config.gaussians_per_anchor),
+            *(
+                PlanLine(f"training at quality={quality}", None if timed_s is None else timed_s * n / n_steps, "s")
+                for quality, n in others.items()
+                if n_steps and n != n_steps  # lengths that are set follow no quality
+            ),
         ),
         preparation_s=round(preparation_s, 3),
         training_s=None if timed_s is None else round(timed_s, 3),

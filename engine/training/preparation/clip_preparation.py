@@ -23,6 +23,7 @@ from engine.capture.exclusions import exclusion_key
 from engine.clip_files.clip_header import ClipHeader, Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.cloud.background.exposure import Exposure
+from engine.cloud.background.motion_masks import MotionMasks
 from engine.cloud.kept_results import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.frames_cloud import FramesCloud
@@ -160,7 +161,7 @@ class ClipPreparation:
             CaptureError: They cannot be read.
         """
         self._report(Progress("Reading pictures", 0.0))
-        pictures = TrainingPictures(self._capture, self._clip, self._camera_indices)
+        pictures = TrainingPictures(self._capture, self._clip, self._camera_indices, self._prep_dir)
         view = self._cameras.first_views[0]
         size_mb = len(pictures) * view.width * view.height * 3 / 1e6
         self._say("Reading pictures", f"{len(pictures)} pictures, {size_mb:.0f} MB")
@@ -382,7 +383,7 @@ class ClipPreparation:
     def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:
         """The files the reference clip left behind, made anew from its pictures where gone."""
         clip = _clip_of(reference.header)
-        pictures = TrainingPictures(self._capture, clip, self._camera_indices)
+        pictures = TrainingPictures(self._capture, clip, self._camera_indices, self._prep_dir)
         _, exposures = self._without_drift(pictures)
         estimated = self._estimated(clip, exposures)
         if reference.vignetting is not None:
@@ -426,14 +427,14 @@ class ClipPreparation:
 
     # ---------------------------------------------------------------- moving parts
 
-    def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
-        """The moving pixels of each picture. [M, C, H, W] bool"""
+    def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> MotionMasks:
+        """The moving pixels of each picture."""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         brightness = brightness_in(parts.model, self._cameras.views) if parts.model.has_light else None
         return motion_masks(pictures, parts.backgrounds, brightness, self._report, keep)
 
     def _moving_cloud(
-        self, parts: ClipParts, pictures: TrainingPictures, masks: np.ndarray
+        self, parts: ClipParts, pictures: TrainingPictures, masks: MotionMasks
     ) -> tuple[MovingCloud, float | None]:
         """The moving points, and the spacing of moving anchors."""
         static_points = host_array(parts.model.anchor_set("static").positions)

@@ -26,6 +26,7 @@ from engine.capture.points import points_of
 from engine.cloud.background.background import estimate_background
 from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
+from engine.cloud.background.motion_masks import MotionMasks
 from engine.cloud.background.recheck import recheck_background
 from engine.cloud.kept_results import Arrays, Keep, do_now
 from engine.cloud.motion.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
@@ -260,15 +261,15 @@ def motion_masks(
     brightness: Callable[[int, int], np.ndarray] | None,
     report: ReportProgress,
     keep: Keep = do_now,
-) -> np.ndarray:
-    """The pixels that differ from the background, per frame and camera. [M, C, H, W] bool
+) -> MotionMasks:
+    """The pixels that differ from the background, per frame and camera.
 
     Args:
         brightness: (camera row, frame in clip) -> factor by which light changes the background [H, W, 1]; None where it
             does not.
     """
     n_frames, n_cameras = pictures.clip.n_frames, len(pictures.camera_indices)
-    masks = np.empty((n_frames, *backgrounds.is_stable.shape), bool)
+    masks = MotionMasks(n_frames, *backgrounds.is_stable.shape)
 
     def find(row: int) -> Arrays:
         background = backgrounds.images[row]
@@ -285,10 +286,9 @@ def motion_masks(
         return {"masks": np.packbits(np.stack(found), axis=-1)}
 
     for row in range(n_cameras):
-        packed = keep(f"motion masks {row}", partial(find, row))["masks"]
-        masks[:, row] = np.unpackbits(packed, axis=-1, count=masks.shape[-1])
+        masks.put_camera(row, keep(f"motion masks {row}", partial(find, row))["masks"])
         report(Progress("Finding what moves", (row + 1) / n_cameras))
-    report(Progress("Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"))
+    report(Progress("Finding what moves", 1.0, f"{100 * masks.share:.1f} % of pixels move"))
     return masks
 
 
@@ -312,18 +312,18 @@ def moving_pixels(
     return found | (masked if valid is None else masked & valid)
 
 
-def stable_in_clip(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.ndarray) -> Backgrounds:
+def stable_in_clip(backgrounds: Backgrounds, pictures: TrainingPictures, masks: MotionMasks) -> Backgrounds:
     """Backgrounds in the light of a clip: where a camera sees something stand still in most frames, their mean.
 
     Args:
-        masks: The moving pixels of the same pictures. [M, C, H, W] bool
+        masks: The moving pixels of the same pictures.
     Returns:
         Trusted are the pixels that were seen so; the others are as they were.
     """
-    n_frames = len(masks)
+    n_frames, n_cameras, _, _ = masks.shape
 
     def seen(row: int) -> tuple[np.ndarray, np.ndarray]:
-        is_still = ~masks[:, row]
+        is_still = ~masks.of_camera(row)
         for frame in range(n_frames):
             valid = pictures.valid_in(row, frame)
             if valid is not None:
@@ -339,7 +339,7 @@ def stable_in_clip(backgrounds: Backgrounds, pictures: TrainingPictures, masks: 
             is_seen &= valid[..., None]
         return np.where(is_seen, means, backgrounds.images[row]), is_seen[..., 0]
 
-    images, is_seen = zip(*map_ordered(seen, range(masks.shape[1])), strict=True)
+    images, is_seen = zip(*map_ordered(seen, range(n_cameras)), strict=True)
     return Backgrounds(np.stack(images), np.stack(is_seen))
 
 
@@ -408,7 +408,7 @@ def frames_cloud(
 
 def moving_cloud(
     pictures: TrainingPictures,
-    masks: np.ndarray,
+    masks: MotionMasks,
     rig: CameraRig,
     gains: np.ndarray,
     static_points: np.ndarray,

@@ -1,12 +1,13 @@
 """Training pictures: the pixels of one clip's training cameras, all in the exposure of the reference clip, and without
 vignetting.
 
-Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them like that.
+Pictures stay uint8 (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them like that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.images.rendition import Rendition
 from engine.parallel import map_ordered
+from engine.training.preparation.picture_store import PictureStore
 
 
 class TrainingPictures:
@@ -23,18 +25,25 @@ class TrainingPictures:
         capture: Source of pixels.
         clip: Frames to load.
         camera_indices: Training cameras, in capture numbering; a row here is a position in this list.
+        folder: For pictures that do not fit into memory.
 
     Attributes:
         is_valid: Pixels that these cameras see, in every frame; None where they see all. [C, H, W] bool
     """
 
-    def __init__(self, capture: Capture, clip: Clip, camera_indices: Sequence[int]) -> None:
+    def __init__(self, capture: Capture, clip: Clip, camera_indices: Sequence[int], folder: Path) -> None:
         self.camera_indices = list(camera_indices)
         self.capture, self.clip = capture, clip
         self.is_valid = capture.valid_of(self.camera_indices)
         frames = list(clip.frame_indices())
+        width, height = capture.picture_size
+        self._pixels = PictureStore((len(self.camera_indices), clip.n_frames, height, width), folder)
+
+        def read(row: int) -> None:
+            self._pixels.put(row, capture.frames_of(self.camera_indices[row], frames))
+
         # side by side: decoders and lenses work without the interpreter
-        self._pixels = map_ordered(lambda camera: capture.frames_of(camera, frames), self.camera_indices)
+        map_ordered(read, range(len(self.camera_indices)))
 
     def __len__(self) -> int:
         return len(self.camera_indices) * self.clip.n_frames
@@ -66,11 +75,11 @@ class TrainingPictures:
 
     def picture(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
         """One picture. [H, W, 3] uint8"""
-        return self._pixels[camera_row][frame_in_clip]
+        return self._pixels.picture(camera_row, frame_in_clip)
 
     def of_camera(self, camera_row: int) -> np.ndarray:
         """All pictures of one camera. [M, H, W, 3] uint8"""
-        return self._pixels[camera_row]
+        return self._pixels.of_camera(camera_row)
 
     def remove(self, drift: np.ndarray | None, vignetting: np.ndarray | None) -> None:
         """Take out of the pictures how the cameras' exposure changes, what their lenses lose towards the rim, or both.
@@ -81,13 +90,14 @@ class TrainingPictures:
         """
         rig = self.capture.rig
 
-        def correct(row: int) -> np.ndarray:
-            camera, pictures = self.camera_indices[row], self._pixels[row]
-            gains = np.ones((len(pictures), 3)) if drift is None else drift[row]
+        def correct(row: int) -> None:
+            camera = self.camera_indices[row]
+            gains = np.ones((self.clip.n_frames, 3)) if drift is None else drift[row]
             lens = None if vignetting is None else vignetting[row]
             seen = [Rendition.of(gain, lens, rig.Ks[camera], rig.image_sizes[camera]) for gain in gains]
-            if all(rendition.is_plain for rendition in seen):
-                return pictures
-            return np.stack([one.to_scene(picture) for one, picture in zip(seen, pictures, strict=True)])
+            if any(not rendition.is_plain for rendition in seen):
+                pictures = self._pixels.of_camera(row)
+                corrected = [one.to_scene(picture) for one, picture in zip(seen, pictures, strict=True)]
+                self._pixels.put(row, np.stack(corrected))
 
-        self._pixels = map_ordered(correct, range(len(self._pixels)))
+        map_ordered(correct, range(self._pixels.n_cameras))

@@ -95,22 +95,22 @@ class ActiveTiles:
         """Whether the first set of a clip, and no other one, is constant, so that tiles can differ."""
         return [model.is_constant(role) for role in model.roles()] == [True] + [False] * (len(model.roles()) - 1)
 
-    def split(self, camera_row: int, view: View, clip_time: float, rows: dict[str, Tensor]) -> ActivePicture:
+    def split(self, view_row: int, view: View, clip_time: float, rows: dict[str, Tensor]) -> ActivePicture:
         """The active part of one picture.
 
         Args:
             rows: Rows that the camera may see, per role; those of the constant set must be the same at every call.
         """
-        frozen_view = self._frozen_view(camera_row, view, rows)
+        frozen_view = self._frozen_view(view_row, view, rows)
         (role,) = self._constant
         if frozen_view is None:
             gaussians = self._model.decode(clip_time, rows)
             is_learning = slice(len(rows[role]) * self._model.decoder.gaussians_per_anchor, None)
-            return ActivePicture(gaussians, gaussians[is_learning], len(gaussians), self._valid.tiles_of(camera_row))
+            return ActivePicture(gaussians, gaussians[is_learning], len(gaussians), self._valid.tiles_of(view_row))
         nothing = rows[role][:0]
         learning = self._model.decode(clip_time, rows | {role: nothing})
         mask = self._boxes(learning, view).mask()
-        seen_tiles = self._valid.tiles_of(camera_row)
+        seen_tiles = self._valid.tiles_of(view_row)
         if seen_tiles is not None:
             mask = mask & seen_tiles
         chosen = frozen_view.boxes.meeting(mask, frozen_view.rows)
@@ -137,8 +137,8 @@ class ActiveTiles:
             self._squares[item] = self._backend.tile_squares(picture.rest, truth, gain.detach())
         return torch.where(picture.tile_mask, 0.0, self._squares[item]).sum() / truth.numel()
 
-    def _frozen_view(self, camera_row: int, view: View, rows: dict[str, Tensor]) -> _FrozenView | None:
-        known = self._views.get(camera_row)
+    def _frozen_view(self, view_row: int, view: View, rows: dict[str, Tensor]) -> _FrozenView | None:
+        known = self._views.get(view_row)
         if known is None and not self._is_full:
             (role,) = self._constant
             k = self._model.decoder.gaussians_per_anchor
@@ -147,7 +147,7 @@ class ActiveTiles:
             with torch.no_grad():
                 lit = [self._model.lit_gaussians(role, clip_time)[seen] for clip_time in ends]
                 pictures = tuple(
-                    self._valid.shown(camera_row, render_gaussians(part, view, backend=self._backend).image[0])
+                    self._valid.shown(view_row, render_gaussians(part, view, backend=self._backend).image[0])
                     for part in lit
                 )
             gaussians = lit[0]
@@ -158,7 +158,7 @@ class ActiveTiles:
             if self._is_full:
                 return None
             self.n_bytes += known.n_bytes
-            self._views[camera_row] = known
+            self._views[view_row] = known
         return known
 
     def _boxes(self, gaussians: Gaussians, view: View) -> TileBoxes:

@@ -49,8 +49,9 @@ class StepwisePhase:
 
     def __init__(self, plan: PhasePlan, backend: Backend) -> None:
         self._plan, self._backend = plan, backend
-        self.sight = Sight(plan.model, plan.cameras.first_views, reach=plan.reach, reaches=plan.reaches)
-        self.valid = ValidPixels(plan.is_valid, backend.device)
+        views = plan.windows.views(plan.cameras.first_views)
+        self.sight = Sight(plan.model, views, reach=plan.reach, reaches=plan.reaches)
+        self.valid = ValidPixels(plan.windows.cut_all(plan.is_valid), backend.device)
         has_rest = plan.has_rest and ActiveTiles.applies(plan.model)
         self.tiles = ActiveTiles(plan.model, backend=backend, valid=self.valid) if has_rest else None
         self._pictures: dict[int, tuple[Tensor, Tensor | None]] = {}
@@ -99,7 +100,7 @@ class StepwisePhase:
     def _step(self, item: int, is_sound: Tensor) -> tuple[_Terms, Tensor, Tensor]:
         """One step, which changes nothing unless all was sound so far. Returns terms, norm and whether it still is."""
         cameras, gains = self._plan.cameras, self._plan.gains
-        camera_row, _ = self._plan.pictures.place(item)
+        camera_row = self._plan.pictures.place(item).camera_row
         terms = self._compare(item)
         if terms.loss.requires_grad:
             terms.loss.backward()
@@ -117,13 +118,13 @@ class StepwisePhase:
     def _compare(self, item: int) -> _Terms:
         """Draw the picture of an item and compare it."""
         plan, backend = self._plan, self._backend
-        camera_row, clip_time = plan.pictures.place(item)
-        view = plan.cameras.view(camera_row)
+        camera_row, window, clip_time = plan.pictures.place(item)
+        view, view_row = plan.windows.view(plan.cameras.view(camera_row), window), plan.windows.row(camera_row, window)
         plan.model.follow_positions()
-        active = self.active_picture(camera_row, view, clip_time)
+        active = self.active_picture(view_row, view, clip_time)
         plan.cameras.watch(active.gaussians)
         image = render_gaussians(active.gaussians, view, backend=backend, tile_mask=active.tile_mask).image[0]
-        (pixels, is_counted), gain = self._picture(item, camera_row), plan.gains[camera_row]
+        (pixels, is_counted), gain = self._picture(item, view_row), plan.gains[camera_row]
         compared = photometric_loss(
             image,
             pixels,
@@ -156,20 +157,20 @@ class StepwisePhase:
         values = float(terms.photometric.detach()), float(terms.volume.detach())
         return Fault(*values, n_bad, terms.image.numel(), is_of_gradient, names)
 
-    def active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
-        """The parts of a picture to draw and compare."""
-        rows = self.sight.rows(camera_row, clip_time)
+    def active_picture(self, view_row: int, view: View, clip_time: float) -> ActivePicture:
+        """The parts of a window to draw and compare."""
+        rows = self.sight.rows(view_row, clip_time)
         if self.tiles is not None:
-            return self.tiles.split(camera_row, view, clip_time, rows)
+            return self.tiles.split(view_row, view, clip_time, rows)
         gaussians = self._plan.model.decode(clip_time, rows)
-        return ActivePicture(gaussians, gaussians, len(gaussians), self.valid.tiles_of(camera_row))
+        return ActivePicture(gaussians, gaussians, len(gaussians), self.valid.tiles_of(view_row))
 
-    def _picture(self, item: int, camera_row: int) -> tuple[Tensor, Tensor | None]:
+    def _picture(self, item: int, view_row: int) -> tuple[Tensor, Tensor | None]:
         """Truth and pixels that count, where it is computed."""
         known = self._pictures.get(item)
         if known is None:
             truth, counted = self._plan.pictures.truth(item), self._plan.pictures.counted(item)
-            is_counted = self.valid.of(camera_row) if counted is None else self._tensor(counted)
+            is_counted = self.valid.of(view_row) if counted is None else self._tensor(counted)
             known = self._tensor(truth), is_counted
             if self._backend.device.type != "cpu" and self._n_bytes < MAX_BYTES:
                 self._n_bytes += truth.nbytes + (0 if counted is None else counted.nbytes)

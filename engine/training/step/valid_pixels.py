@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -11,16 +13,16 @@ from engine.raster.pinhole_view import TILE_PX
 
 
 class ValidPixels:
-    """The valid pixels of each training camera, as a step needs them. Owns one flag a pixel.
+    """The valid pixels of each window of each training camera, as a step needs them. Owns one flag a pixel.
 
-    Cameras that see all of their pictures have None everywhere, and their steps are as without this class.
+    Windows that are seen as a whole have None everywhere, and their steps are as without this class.
 
     Args:
-        is_valid: [C, H, W] bool, or None where all cameras see all.
+        is_valid: [H, W] bool each, or None where all cameras see all.
         device: Where steps are computed.
     """
 
-    def __init__(self, is_valid: np.ndarray | None, device: torch.device | str) -> None:
+    def __init__(self, is_valid: Sequence[np.ndarray] | None, device: torch.device | str) -> None:
         self._is_valid: list[Tensor | None] = []
         self._tiles: list[Tensor | None] = []
         self._shares: list[float] = []
@@ -34,21 +36,21 @@ class ValidPixels:
             self._is_valid.append(valid)
             self._tiles.append(tiles_with_any(valid))
 
-    def of(self, camera_row: int) -> Tensor | None:
+    def of(self, view_row: int) -> Tensor | None:
         """Pixels that count; None for all. [H, W] bool"""
-        return self._is_valid[camera_row] if self._is_valid else None
+        return self._is_valid[view_row] if self._is_valid else None
 
-    def tiles_of(self, camera_row: int) -> Tensor | None:
+    def tiles_of(self, view_row: int) -> Tensor | None:
         """Tiles in which any pixel counts; None for all. [rows, columns] bool"""
-        return self._tiles[camera_row] if self._tiles else None
+        return self._tiles[view_row] if self._tiles else None
 
-    def share_of(self, camera_row: int) -> float:
-        """Share of the pixels that count."""
-        return self._shares[camera_row] if self._shares else 1.0
+    def share_of(self, view_row: int) -> float:
+        """Share of the pixels that count. view_row: of the window, engine.training.windows.Windows.row"""
+        return self._shares[view_row] if self._shares else 1.0
 
-    def shown(self, camera_row: int, picture: Tensor) -> Tensor:
+    def shown(self, view_row: int, picture: Tensor) -> Tensor:
         """A picture [H, W, 3] as a captured one is: black where nothing counts."""
-        valid = self.of(camera_row)
+        valid = self.of(view_row)
         return picture if valid is None else picture * valid[..., None]
 
 

@@ -26,11 +26,11 @@ MAX_BYTES = 256 << 20
 
 
 class Sight:
-    """Rows to decode, camera by camera. Visible anchors that stay in place are found once.
+    """Rows to decode, view by view. Visible anchors that stay in place are found once.
 
     Args:
         model: Its sets must stay as they are; another one is needed where anchors come, go or become dynamic.
-        views: Of the training cameras.
+        views: Of the training cameras, or of windows of their pictures.
         reach: How far beyond its anchor a Gaussian may lie, scene units; farther where anchors are larger.
         reaches: The same anchor by anchor, where that was decided before: sizes are learned, and the visible anchors
             stay those at the beginning of a phase. By role, [A] each; those that do not fit the model are decided anew.
@@ -56,24 +56,22 @@ class Sight:
         self._rows: dict[tuple[str, int, float], Tensor] = {}  # of dynamic sets
         self._n_bytes = 0
 
-    def rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
+    def rows(self, view_row: int, clip_time: float) -> dict[str, Tensor]:
         """Rows of every set that a camera can see and that exist at this time. [n] int64 each"""
         rows = {}
         for role in self._model.roles():
-            key, anchors = (role, camera_row), self._model.anchor_set(role)
+            key, anchors = (role, view_row), self._model.anchor_set(role)
             if key not in self._seen or anchors.positions.requires_grad:
-                is_seen = self._views[camera_row].sees(anchors.positions, reach=self.reaches[role])
+                is_seen = self._views[view_row].sees(anchors.positions, reach=self.reaches[role])
                 self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
             rows[role] = self._seen[key]
             if anchors.presence is not None:
-                rows[role] = self._present_rows(
-                    role, camera_row, clip_time, is_kept=not anchors.positions.requires_grad
-                )
+                rows[role] = self._present_rows(role, view_row, clip_time, is_kept=not anchors.positions.requires_grad)
         return rows
 
-    def _present_rows(self, role: str, camera_row: int, clip_time: float, *, is_kept: bool) -> Tensor:
+    def _present_rows(self, role: str, view_row: int, clip_time: float, *, is_kept: bool) -> Tensor:
         """Rows of a dynamic set that the camera can see and that exist at this time, found once where they are kept."""
-        known = self._rows.get((role, camera_row, clip_time))
+        known = self._rows.get((role, view_row, clip_time))
         if known is not None:
             return known
         presence = self._model.anchor_set(role).presence
@@ -82,8 +80,8 @@ class Sight:
             self._present[role] = presence.T.contiguous()
         frames = [self._present[role][knot] for knot, _ in self._model.knots(clip_time)]
         is_present = frames[0] if len(frames) == 1 else torch.logical_or(*frames)
-        rows = (is_present & self._seen[role, camera_row]).nonzero()[:, 0]
+        rows = (is_present & self._seen[role, view_row]).nonzero()[:, 0]
         if is_kept and self._n_bytes < MAX_BYTES:
             self._n_bytes += rows.nbytes
-            self._rows[role, camera_row, clip_time] = rows
+            self._rows[role, view_row, clip_time] = rows
         return rows

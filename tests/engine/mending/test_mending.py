@@ -7,6 +7,7 @@ moved by two pixels while a clip is trained in which furniture may move.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -107,7 +108,7 @@ def test_wrong_exposure_of_some_cameras_is_measured_again(tiny: Tiny, trained: C
 def test_a_shifted_camera_is_outweighed_by_the_clip_beside(tiny: Tiny) -> None:
     training = tiny.prepared(1, regions=FURNITURE, source_steps=60)
     pixels = training.pictures._pixels
-    pixels[2] = np.roll(pixels[2], 2, axis=2)
+    pixels.put(2, np.roll(pixels.of_camera(2), 2, axis=2))
     finish(training)
     case = Case(tiny, {0: tiny.reference, 1: training.finish().state})
     mended = case.mending().run()
@@ -140,13 +141,13 @@ def test_the_reference_clip_and_clips_that_are_not_there_are_refused(tiny: Tiny,
         Case(tiny, {0: tiny.reference}).mending()
 
 
-def test_a_fade_goes_evenly_from_one_look_to_the_other(tiny: Tiny, trained: ClipState) -> None:
+def test_a_fade_goes_evenly_from_one_look_to_the_other(tiny: Tiny, trained: ClipState, tmp_path: Path) -> None:
     case = Case(tiny, {0: tiny.reference, 1: brightened(tiny, trained)})
     cameras = tiny.capture.training_cameras(tiny.holdout)
     looks = Looks(tiny.capture, case.shown(), cameras)
     clip = tiny.clips[1]
     span = range(clip.start, clip.start + 2)
-    pictures = FadedPictures(tiny.capture, clip, cameras, looks, span)
+    pictures = FadedPictures(tiny.capture, clip, cameras, tmp_path, looks, span)
     is_still = looks.still_between(0, span.start - 1, span.stop)
     assert 0.3 < is_still.mean() < 1.0
     start, end = looks.look(0, span.start - 1), looks.look(0, span.stop)
@@ -166,7 +167,9 @@ def test_taking_up_a_clip_changes_nothing_before_the_first_step(
     case = Case(tiny, {0: tiny.reference, 1: trained})
     looks = Looks(tiny.capture, case.shown(), training.camera_indices)
     clip = tiny.clips[1]
-    pictures = FadedPictures(tiny.capture, clip, training.camera_indices, looks, range(clip.start, clip.start + 1))
+    pictures = FadedPictures(
+        tiny.capture, clip, training.camera_indices, training.prep_dir, looks, range(clip.start, clip.start + 1)
+    )
     training.take_up(trained, pictures, [0, 1], n_steps=3, learning=("field.",))
     assert same_arrays(training.state().arrays, trained.arrays)
     first = {name: array.copy() for name, array in training.state().arrays.items()}

@@ -7,13 +7,27 @@ import pytest
 from engine.training.config import TrainConfig
 from engine.training.phases import phase_at, phases_of
 
-SIZES = {"n_cameras": 3, "n_frames": 2}
+SIZES = {"n_cameras": 3, "n_frames": 2, "n_windows": 1}
 
 
-def test_a_reference_clip_has_two_phases_and_a_source_clip_one():
+def test_a_reference_clip_has_three_phases_and_a_source_clip_one():
     config = TrainConfig(static_steps=5, joint_steps=7, source_steps=4)
-    assert phases_of(config, **SIZES, is_source=False) == [("static", 5), ("joint", 7)]
+    assert phases_of(config, **SIZES, is_source=False) == [("static", 5), ("joint", 4), ("moving", 3)]
     assert phases_of(config, **SIZES, is_source=True) == [("source", 4)]
+
+
+def test_where_every_anchor_moves_no_phase_is_of_moving_ones_alone():
+    config = TrainConfig(static_steps=5, joint_steps=8, gate="off")
+    assert phases_of(config, **SIZES, is_source=False) == [("static", 5), ("joint", 8)]
+
+
+def test_derived_steps_grow_with_the_side_of_pictures_and_given_ones_do_not():
+    small, large = (
+        sum(n for _, n in phases_of(TrainConfig(), **(SIZES | {"n_windows": n}), is_source=False)) for n in (1, 9)
+    )
+    assert large == 3 * small
+    given = phases_of(TrainConfig(static_steps=5, joint_steps=7), **(SIZES | {"n_windows": 9}), is_source=False)
+    assert given == [("static", 5), ("joint", 4), ("moving", 3)]
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ PINNED: dict[str, tuple[dict[str, Any], dict[str, Any], list[str]]] = {
     "decoder-finetune": ({"decoder": "finetune"}, {}, ["inherited heads keep learning"]),
     "residual-none": ({"residual": "none"}, {}, ["inherited anchors only"]),
     "residual-full": ({"residual": "full"}, {}, ["all points of a clip", "however many"]),
-    "inherit-moving": ({"inherit": "moving"}, {}, ["moving anchors keep learning, static ones stay"]),
+    "inherit-frozen": ({"inherit": "frozen"}, {}, ["all inherited anchors stay as they are"]),
     "inherit-trainable": ({"inherit": "trainable"}, {}, ["inherited anchors keep learning"]),
     "inherit-off": (
         {"inherit": "off"},
@@ -126,8 +126,9 @@ def test_independent_clips_are_trained_as_long_as_those_of_full(base):
     settings, *_ = settings_of(BY_NAME["independent"], base, clips=clips, n_cameras=n_cameras, n_capture_frames=30)
     config = TrainConfig(**settings)
     for clip in clips[1:]:
-        in_full = phases_of(TrainConfig(**base), n_cameras=n_cameras, n_frames=clip.n_frames, is_source=True)
-        alone = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=False)
+        sizes = {"n_cameras": n_cameras, "n_frames": clip.n_frames, "n_windows": 1}
+        in_full = phases_of(TrainConfig(**base), **sizes, is_source=True)
+        alone = phases_of(config, **sizes, is_source=False)
         assert sum(n for _, n in alone) == sum(n for _, n in in_full)
         assert all(n > 0 for _, n in alone)
     seeds = [seed_of(config, clip, seed) for seed in range(3) for clip in clips]

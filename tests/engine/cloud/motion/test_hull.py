@@ -9,6 +9,7 @@ import pytest
 
 from engine.camera.projection import pixel_rays, project, projection_matrices
 from engine.camera.rig import CameraRig
+from engine.cloud.background.motion_masks import MotionMasks
 from engine.cloud.motion.hull import BLOCK, Grid, carve, hull_colors, hull_visibility, surface_rows
 from engine.cloud.motion.moving_cloud import build_moving_cloud
 
@@ -147,7 +148,7 @@ def test_colors_are_balanced_and_taken_from_visible_cameras() -> None:
 def test_moving_cloud_follows_the_sphere_through_the_clip() -> None:
     rig = dome_rig()
     positions = [CENTER + np.array([0.3 * m, 0.0, 0.0]) for m in range(3)]
-    masks = np.stack([sphere_masks(rig, position, RADIUS) for position in positions])
+    masks = MotionMasks.of(np.stack([sphere_masks(rig, position, RADIUS) for position in positions]))
     gains = np.ones((len(rig), 3))
     lines: list[str] = []
 
@@ -176,7 +177,7 @@ def test_nothing_moving_gives_an_empty_cloud(n_frames: int) -> None:
     lines: list[str] = []
     cloud = build_moving_cloud(
         lambda row, frame_in_clip: np.zeros((HEIGHT, WIDTH, 3), np.uint8),
-        np.zeros((n_frames, 4, HEIGHT, WIDTH), bool),
+        MotionMasks(n_frames, 4, HEIGHT, WIDTH),
         rig,
         np.ones((4, 3)),
         bounds_min=-np.ones(3),

@@ -24,7 +24,7 @@ SAMPLE = Footage(width=320, height=240, n_cameras=18, n_held_out=2, n_frames=30)
 BASKETBALL = Footage(width=640, height=360, n_cameras=27, n_held_out=4, n_frames=40)
 CLIP = Clip(clip_index=0, start=0, n_frames=10, clip_length=10)
 NEXT = Clip(clip_index=1, start=10, n_frames=10, clip_length=10)
-STEP_S = {"static": 0.01, "joint": 0.02, "source": 0.03}
+STEP_S = {"static": 0.01, "joint": 0.02, "moving": 0.02, "source": 0.03}
 
 
 FIELD = {
@@ -44,7 +44,7 @@ def header(**changes) -> ClipHeader:
     """Of a trained reference clip of the basketball."""
     found = {
         "n_frames": 10,
-        "step": 6210,
+        "step": 4050,
         "n_anchors": {"static": 20621, "moving": 26923},
         "n_alive": 7235,
         "reference_fingerprint": "clip",
@@ -74,12 +74,13 @@ def values(found) -> dict[str, object]:
 
 def test_a_reference_clip():
     found = plan()
-    assert (found.role, found.n_steps) == ("reference", 6210)
+    assert (found.role, found.n_steps) == ("reference", 4050)
     assert values(found) == {
         "pictures": 270,
         "background frames": 40,
         "static steps": 810,
-        "joint steps": 5400,
+        "joint steps": 1847,
+        "moving steps": 1393,
         "static anchors": "<= 22,000",
         "moving anchors": "<= 32,000",
         "Gaussians per anchor": 5,
@@ -89,7 +90,7 @@ def test_a_reference_clip():
 def test_a_source_clip_counts_what_the_reference_has():
     found = plan(clip=NEXT, is_source=True, reference=header())
     lines = values(found)
-    assert found.n_steps == lines["source steps"] == 6000
+    assert found.n_steps == lines["source steps"] == 1620
     assert lines["static anchors"] == 20621
     assert "background frames" not in lines
     assert values(plan(clip=NEXT, is_source=True))["static anchors"] == "<= 22,000"
@@ -131,9 +132,9 @@ def test_a_plan_is_json():
 
 def test_a_resumed_training_takes_what_is_left():
     whole = plan()
-    rest = resumed_plan(whole, 3105, 6210)
+    rest = resumed_plan(whole, 2025, 4050)
     assert (rest.training_s, rest.preparation_s) == (pytest.approx((whole.training_s or 0) / 2), 0)
-    unknown = resumed_plan(plan(step_time=lambda sizes, phase: None), 3105, 6210)
+    unknown = resumed_plan(plan(step_time=lambda sizes, phase: None), 2025, 4050)
     assert (unknown.training_s, unknown.seconds) == (None, None)
 
 
@@ -142,7 +143,7 @@ def test_a_resumed_training_takes_what_is_left():
 
 def test_without_any_clip_the_timed_steps_are_multiplied():
     found = plan()
-    assert found.training_s == pytest.approx((810 * 0.01 + 5400 * 0.02) * 1.03, abs=0.001)
+    assert found.training_s == pytest.approx((810 * 0.01 + 3240 * 0.02) * 1.03, abs=0.001)
     assert found.seconds == found.preparation_s + (found.training_s or 0)
     assert (found.disk_mb, found.forecast[3].text) == (None, "unknown")
 
@@ -156,8 +157,8 @@ def test_steps_are_timed_at_the_sizes_of_the_reference_clip_or_expected_ones():
     asked = []
     plan(SAMPLE, step_time=lambda sizes, phase: asked.append((phase, sizes)) or 0.01)
     plan(clip=NEXT, is_source=True, reference=header(), step_time=lambda s, phase: asked.append((phase, s)) or 0.01)
-    assert [phase for phase, _ in asked] == ["static", "joint", "source"]
-    first, last = asked[0][1], asked[2][1]
+    assert [phase for phase, _ in asked] == ["static", "joint", "moving", "source"]
+    first, last = asked[0][1], asked[3][1]
     assert (first.width, first.height) == (320, 240)
     assert first.n_static == pytest.approx(0.6 * 14747, rel=0.1)  # as trained
     assert first.n_moving == pytest.approx(2416, rel=0.2)
@@ -205,7 +206,7 @@ def test_the_clip_itself_the_other_kind_and_still_clips_do_not_count():
     assert measured(previous_fingerprint="0").is_source
 
 
-@pytest.mark.parametrize("phase", ["static", "joint", "source"])
+@pytest.mark.parametrize("phase", ["static", "joint", "moving", "source"])
 def test_steps_of_every_phase_can_be_timed(phase):
     sizes = StepSizes(32, 24, n_static=40, n_moving=20, config=TrainConfig(gaussians_per_anchor=2))
     assert 0 < measured_step_s(sizes, phase, backend_called("cpu")) < 60

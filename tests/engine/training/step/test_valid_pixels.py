@@ -10,7 +10,7 @@ from engine.training.step.valid_pixels import ValidPixels, tiles_with_any
 
 def test_cameras_that_see_all_have_no_masks() -> None:
     picture = torch.rand(40, 70, 3)
-    for valid in (ValidPixels(None, "cpu"), ValidPixels(np.ones((2, 40, 70), bool), "cpu")):
+    for valid in (ValidPixels(None, "cpu"), ValidPixels(list(np.ones((2, 40, 70), bool)), "cpu")):
         assert valid.of(1) is None
         assert valid.tiles_of(1) is None
         assert valid.share_of(1) == 1.0
@@ -21,7 +21,7 @@ def test_a_tile_is_drawn_where_one_of_its_pixels_counts() -> None:
     is_valid = np.ones((2, 40, 70), bool)
     is_valid[1] = False
     is_valid[1, 39, 69] = is_valid[1, 0, 32] = True
-    valid = ValidPixels(is_valid, "cpu")
+    valid = ValidPixels(list(is_valid), "cpu")
     assert valid.of(0) is None
     tiles = valid.tiles_of(1)
     assert tiles is not None
