@@ -40,8 +40,8 @@ class StepRule(NamedTuple):
 
 
 STATIC_RULE = StepRule(30, 300, 1000)
-JOINT_RULE = StepRule(12, 1200, 3500)
-SOURCE_RULE = StepRule(6, 720, 2000)
+JOINT_RULE = StepRule(12, 3000, 3500)
+SOURCE_RULE = StepRule(6, 1500, 2000)
 QUALITIES = {"draft": 0.4, "standard": 1.0, "best": 3.0}
 """Derived steps of each quality, as a share of those of "standard"."""
 MOVING_SHARE = 0.43
@@ -263,8 +263,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
         ),
     ] = 0.0
 
-    feature_lr: Annotated[float, _rate("the anchors' static features")] = 7.5e-3
-    scale_lr: Annotated[float, _rate("the anchors' scales")] = 7e-3
+    feature_lr: Annotated[float, _rate("the anchors' static features")] = 0.015
+    scale_lr: Annotated[float, _rate("the anchors' scales")] = 0.014
     table_lr: Annotated[float, _rate("the field's hash tables")] = 0.08
     field_mlp_lr: Annotated[float, _rate("the field's network")] = 0.016
     opacity_head_lr: Annotated[float, _rate("the head of opacities")] = 2e-3

@@ -54,7 +54,9 @@ PRESETS: dict[str, dict[str, Any]] = {
         "field_form": "published",
         "color": "off",
         "passes": 34,
-        # features, scales, opacity and shape heads start as in every preset
+        # opacity and shape heads start as in every preset
+        "feature_lr": 7.5e-3,
+        "scale_lr": 7e-3,
         "position_lr": 1.6e-4,
         "position_final_ratio": 0.01,
         "table_lr": 2e-4,

@@ -75,7 +75,10 @@ def values(found) -> dict[str, object]:
 def test_a_reference_clip():
     found = plan()
     assert (found.role, found.n_steps) == ("reference", 4050)
-    assert values(found) == {
+    shown = values(found)
+    prices = [shown.pop(f"training at quality={quality}") for quality in ("draft", "best")]
+    assert prices == pytest.approx([0.4 * found.training_s, 3 * found.training_s], rel=1e-3)
+    assert shown == {
         "pictures": 270,
         "background frames": 40,
         "static steps": 810,
