@@ -40,8 +40,8 @@ class StepRule(NamedTuple):
 
 
 STATIC_RULE = StepRule(30, 300, 1000)
-JOINT_RULE = StepRule(12, 3000, 3500)
-SOURCE_RULE = StepRule(6, 1500, 2000)
+JOINT_RULE = StepRule(17, 1200, 3240)
+SOURCE_RULE = StepRule(8, 1200, 1620)
 QUALITIES = {"draft": 0.4, "standard": 1.0, "best": 3.0}
 """Derived steps of each quality, as a share of those of "standard"."""
 MOVING_SHARE = 0.43
