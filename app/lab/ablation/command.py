@@ -29,6 +29,18 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("capture", type=path_argument, nargs="?", help="capture folder")
     command.add_argument("--project", type=path_argument, help="folder for one project per variant and the table")
     command.add_argument("--variants", metavar="NAMES", help="separated by commas (default: all; --list names them)")
+    command.add_argument(
+        "--row",
+        action="append",
+        default=[],
+        metavar="'NAME: KEY=VALUE ...'",
+        help="also train with these settings; may be repeated",
+    )
+    command.add_argument(
+        "--validate",
+        metavar="CAMERAS",
+        help="train without these cameras, too, and measure on them instead of the held-out ones, to choose settings",
+    )
     command.add_argument("--list", action="store_true", help="list the variants and exit")
     command.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
     command.add_argument(
@@ -59,7 +71,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     from app.lab.ablation.report import REPORT, write_ablation_report
     from app.lab.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, run_ablation
     from app.lab.ablation.table import as_text
-    from app.lab.ablation.variants import VARIANTS, chosen_variants, with_source_steps
+    from app.lab.ablation.variants import VARIANTS, chosen_variants, own_row, with_source_steps
     from app.lab.report.write import PAGE_FILE
 
     if options.list:
@@ -78,7 +90,9 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         raise ProjectError(
             f"--variants is '{options.variants}', which names none.", hint="Leave it out for all of them."
         )
-    variants = chosen_variants(names)
+    variants = chosen_variants(names) + [own_row(text) for text in options.row]
+    if len({variant.name for variant in variants}) < len(variants):
+        raise ProjectError("Two rows have the same name.", hint="Give every --row a name of its own.")
     seeds = _whole_numbers("--seeds", options.seeds)
     if options.source_steps is not None:
         lengths = sorted(_whole_numbers("--source-steps", options.source_steps))
@@ -95,6 +109,11 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         overrides=overrides_of(options),
         reference_clip=options.reference_clip,
     )
+    validation = None
+    if options.validate is not None:
+        validation = parse_cameras(options.validate, capture)
+        settings = replace(settings, holdout=tuple(dict.fromkeys((*settings.holdout, *validation))))
+        check_settings(settings, capture)
     for seed in seeds[1:]:
         check_settings(replace(settings, seed=seed), capture)
     most = len(settings.clips(capture.n_frames))
@@ -130,6 +149,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             variants=variants,
             n_clips=n_clips,
             seeds=seeds,
+            validation=validation,
             metrics=options.metrics,
             precision=options.precision,
             launch=launch,

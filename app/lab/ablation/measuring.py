@@ -53,12 +53,14 @@ class VariantScope:
         clips: Indices of its clips.
         borders: Frames at which a clip of "full" starts.
         metrics, precision: See app.evaluation.evaluation.evaluate_project.
+        cameras: Names of those to measure; None for all that are held out.
     """
 
     clips: Sequence[int]
     borders: Sequence[int]
     metrics: Choice
     precision: Precision
+    cameras: tuple[str, ...] | None = None
 
 
 def measure(
@@ -79,7 +81,7 @@ def measure(
     opened = open_trained(project)
     if kept is not None:
         return kept.with_rates(rates_of(opened))
-    holdout = opened.capture.camera_indices(project.settings.holdout)
+    holdout = opened.capture.camera_indices(project.settings.holdout if scope.cameras is None else scope.cameras)
     document = evaluate_project(
         opened,
         clip_indices=scope.clips,
@@ -133,6 +135,7 @@ def _key(project: Project, scope: VariantScope) -> dict[str, Any]:
         "borders": list(scope.borders),
         "metrics": scope.metrics,
         "precision": scope.precision,
+        **({} if scope.cameras is None else {"cameras": list(scope.cameras)}),
         "schema": MEASURED_SCHEMA,
         **({} if "lpips" in lacking else {"lpips": True}),
         **({"tof": False} if "tof" in lacking else {}),

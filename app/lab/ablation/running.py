@@ -68,6 +68,7 @@ def run_ablation(
     variants: Sequence[Variant],
     n_clips: int,
     seeds: Sequence[int],
+    validation: Sequence[str] | None = None,
     metrics: Choice,
     precision: Precision = "float",
     launch: Launch,
@@ -83,6 +84,7 @@ def run_ablation(
         folder: Gets one project per variant and seed, ablation.json and ablation.csv.
         settings: Of "full"; its seed is replaced.
         n_clips: From the first.
+        validation: Names of the cameras to measure, which are among those held out; None for all of these.
         metrics, precision: See engine.metrics.pictures.picture.measure_picture.
         rates_of: Measures how fast a variant is rendered; nothing does by default.
     Returns:
@@ -101,7 +103,9 @@ def run_ablation(
     clips = settings.clips(capture.n_frames)[:n_clips]
     todo = [_Task(capture, settings, variant, seed, clips) for seed in seeds for variant in variants]
     borders = [clip.start for clip in clips[1:]]
-    all_clips = VariantScope(range(n_clips), borders, metrics, precision)
+    all_clips = VariantScope(
+        range(n_clips), borders, metrics, precision, None if validation is None else tuple(validation)
+    )
     found = _finished(folder, capture, settings, clips, all_clips)
     first_of: dict[tuple[str, int], Path] = {}  # project that trains the reference clip of a family
     for task in todo:
@@ -120,6 +124,7 @@ def run_ablation(
             "schema": ABLATION_SCHEMA,
             "capture": str(capture.path),
             "holdout": list(settings.holdout),
+            "measured_on": list(settings.holdout if validation is None else validation),
             "clip_length": settings.clip_length,
             "n_clips": n_clips,
             "metrics": metrics,

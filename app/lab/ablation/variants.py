@@ -13,6 +13,7 @@ from typing import Any
 
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
+from engine.training.config import parse_overrides
 from engine.training.presets import PUBLISHED_SIZES
 
 
@@ -195,11 +196,31 @@ def variant_called(name: str) -> Variant | None:
         return None
 
 
+def own_row(text: str) -> Variant:
+    """A row of settings that are tried, as `NAME: KEY=VALUE KEY=VALUE`.
+
+    Raises:
+        ProjectError: It has no name or no settings, takes the name of another variant, or a setting does not exist.
+    """
+    name, colon, settings = (part.strip() for part in text.partition(":"))
+    if not colon or not re.fullmatch(r"[A-Za-z0-9._]+(-[A-Za-z0-9._]+)*", name) or not settings:
+        raise ProjectError(f"--row is '{text}'.", hint="Write it as NAME: KEY=VALUE KEY=VALUE.")
+    if variant_called(name) is not None:
+        raise ProjectError(f"A variant is called '{name}' already.", hint="Choose another name for the row.")
+    overrides = parse_overrides(settings.split())
+    is_of_source = overrides.keys() <= _OF_SOURCE_CLIPS
+    return Variant(name, settings, overrides, shares_reference=is_of_source, is_on_request=True)
+
+
+_OF_SOURCE_CLIPS = {"decoder", "residual", "inherit", "field", "source_steps"}
+"""Settings that leave the reference clip as it is."""
+
+
 def rank(name: str) -> tuple[int, int]:
-    """Place of a variant in the table."""
-    steps = _STEPS_NAME.fullmatch(name)
-    base = name if steps is None else steps[1]
-    return [variant.name for variant in VARIANTS].index(base), 0 if steps is None else int(steps[2])
+    """Place of a variant in the table; rows of own settings come last."""
+    steps, names = _STEPS_NAME.fullmatch(name), [variant.name for variant in VARIANTS]
+    base = name if steps is None or name in names else steps[1]
+    return names.index(base) if base in names else len(names), 0 if steps is None else int(steps[2])
 
 
 def chosen_variants(names: Sequence[str] | None) -> list[Variant]:

@@ -1,4 +1,4 @@
-"""Trainings of cameras whose lenses darken the rim: it is found, taken out, stored, inherited, and shown in pictures."""
+"""Trainings of cameras whose lenses darken the rim: found, taken out, stored, inherited, and shown in pictures."""
 
 from __future__ import annotations
 

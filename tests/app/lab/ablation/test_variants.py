@@ -7,7 +7,16 @@ from typing import Any
 
 import pytest
 
-from app.lab.ablation.variants import FULL, MIN_STEPS_PER_FRAME, VARIANTS, Variant, chosen_variants, settings_of
+from app.lab.ablation.variants import (
+    FULL,
+    MIN_STEPS_PER_FRAME,
+    VARIANTS,
+    Variant,
+    chosen_variants,
+    own_row,
+    rank,
+    settings_of,
+)
 from engine.capture.clip import split_clips
 from engine.errors import ProjectError
 from engine.training.clip_training import seed_of
@@ -208,3 +217,31 @@ def test_other_clip_lengths_cover_the_same_frames(n_frames, length, n_capture_fr
 def test_the_reference_in_the_middle_is_trained_first(runner):
     runner.run(["reference-middle"])
     assert [clip for name, clip in runner.launched if name == "reference-middle-seed0"] == [1, 0]
+
+
+def test_a_row_of_own_settings_is_a_variant():
+    row = own_row("fast-field: table_lr=0.1 source_steps=700")
+    assert (row.name, row.words) == ("fast-field", "table_lr=0.1 source_steps=700")
+    assert row.overrides == {"table_lr": 0.1, "source_steps": 700}
+    assert not row.shares_reference, "the reference clip learns at that rate, too"
+    assert own_row("short: source_steps=700").shares_reference
+    assert rank("fast-field") > max(rank(variant.name) for variant in VARIANTS)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("no colon", "--row is"),
+        ("name:", "--row is"),
+        (": passes=1", "--row is"),
+        ("a/b: passes=1", "--row is"),
+        ("full: passes=1", "called 'full' already"),
+        ("full-steps7: passes=1", "already"),
+        ("x: passes", "has no '='"),
+        ("x: nonsense=1", "does not exist"),
+        ("x: passes=-1", "passes"),
+    ],
+)
+def test_bad_rows_are_refused(text: str, said: str):
+    with pytest.raises(ProjectError, match=said):
+        own_row(text)
