@@ -13,7 +13,7 @@ from typing import Any
 
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.training.config import parse_overrides
+from engine.training.config import config_of, parse_overrides
 from engine.training.presets import PUBLISHED_SIZES
 
 
@@ -208,6 +208,7 @@ def own_row(text: str) -> Variant:
     if variant_called(name) is not None:
         raise ProjectError(f"A variant is called '{name}' already.", hint="Choose another name for the row.")
     overrides = parse_overrides(settings.split())
+    config_of(overrides)  # raises where one may not have its value
     is_of_source = overrides.keys() <= _OF_SOURCE_CLIPS
     return Variant(name, settings, overrides, shares_reference=is_of_source, is_on_request=True)
 
