@@ -187,7 +187,7 @@ class ClipTraining:
     def _settle_still_parts(self) -> None:
         """Between the phases of a reference clip: still parts have learned, and what no pixel showed follows them."""
         squares = self._phase.arrays().get("optimizer.sets.static.features.exp_avg_sq")
-        n_changed = 0 if squares is None else continue_unseen(self.model, "static", squares)
+        n_changed = 0 if squares is None else continue_unseen(self.model, "static", squares, self._cameras.views)
         self._say("Finishing the static scene", f"{n_changed:,} anchors that no camera sees look like their neighbours")
 
     def _take(self, parts: ClipParts) -> None:
@@ -204,6 +204,7 @@ class ClipTraining:
         name, n_steps = self.phases[index]
         if name == "moving":
             self.model.freeze_still_parts()
+            self._cameras.freeze()
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains and name != "moving")
         self._learn_positions()
@@ -259,9 +260,13 @@ class ClipTraining:
         return items
 
     def _windows_of(self, pictures: Sequence[int]) -> list[int]:
-        """The items that are windows of these pictures."""
-        n = len(self.windows)
-        return [picture * n + window for picture in pictures for window in range(n)]
+        """The items that are windows of these pictures, but for those of which the camera sees nothing."""
+        n, valid = len(self.windows), self.pictures.is_valid
+        items = [picture * n + window for picture in pictures for window in range(n)]
+        if valid is None or n == 1:
+            return items
+        is_seen = [[bool(self.windows.cut(flags, window).any()) for window in range(n)] for flags in valid]
+        return [item for item in items if is_seen[self.place(item).camera_row][self.place(item).window]]
 
     def _with_motion(self, items: Sequence[int]) -> list[int]:
         """Those in which something that learns may be seen: nothing can be learned from the other windows."""

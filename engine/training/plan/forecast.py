@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from engine.clip_files.clip_header import ClipHeader
+from engine.training.preparation.picture_store import MAX_BYTES
 
 _START_S, _CAMERA_S, _PICTURE_S = {True: 2.5, False: 3.5}, 0.45, 5e-3
 """Rough preparation: of a source clip or not; of a camera whose depths are found; of a picture."""
@@ -96,4 +97,5 @@ def rough_memory_mb(*, n_pixels: int, n_pictures: int, n_read: int) -> float:
         n_pictures: To train on.
         n_read: Pictures read at one time, backgrounds included.
     """
-    return _PROGRAM_MB + 3e-6 * n_pixels * n_pictures + min(3e-6 * n_pixels * n_read, _CACHE_MB)
+    pictures_mb = min(3e-6 * n_pixels * n_pictures, MAX_BYTES / 1e6)
+    return _PROGRAM_MB + pictures_mb + min(3e-6 * n_pixels * n_read, _CACHE_MB)

@@ -47,7 +47,8 @@ class TrainingCameras:
     def __init__(
         self, rig: CameraRig, *, near_plane: float, start: np.ndarray | None, is_learning: bool, like: Tensor
     ) -> None:
-        self._original, self._near_plane, self.is_learning = rig, near_plane, is_learning
+        self._original, self._near_plane = rig, near_plane
+        self.is_learning = self._is_refined = is_learning
         self._units = _units(rig)
         values = np.zeros((len(rig), N_VALUES)) if start is None else start / self._units
         self.pixels = nn.Parameter(torch.from_numpy(values).to(like), requires_grad=is_learning)
@@ -62,18 +63,23 @@ class TrainingCameras:
     @property
     def corrections(self) -> np.ndarray | None:
         """As engine.camera.corrections has them; None where there are none. [C, 7] float32"""
-        if not self.is_learning:
+        if not self._is_refined:
             return self._start
         return (host_array(self.pixels) * self._units).astype(np.float32)
 
     @property
     def kept(self) -> np.ndarray | None:
-        """The corrections for a checkpoint, to the last bit; None where nothing learns. [C, 7]"""
-        return host_array(self.pixels).copy() if self.is_learning else None
+        """The corrections for a checkpoint, to the last bit; None where nothing was learned. [C, 7]"""
+        return host_array(self.pixels).copy() if self._is_refined else None
+
+    def freeze(self) -> None:
+        """The corrections stay as they are from here on."""
+        self.is_learning = False
+        self.pixels.requires_grad = False
 
     def restore(self, kept: np.ndarray | None) -> None:
         """Inverse of `kept`. Raises ValueError where it does not fit."""
-        if (kept is not None) != self.is_learning or (kept is not None and kept.shape != self.pixels.shape):
+        if (kept is not None) != self._is_refined or (kept is not None and kept.shape != self.pixels.shape):
             raise ValueError("corrections of cameras do not fit the setting or the cameras")
         if kept is not None:
             with torch.no_grad():

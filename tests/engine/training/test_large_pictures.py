@@ -81,3 +81,17 @@ def test_limits_of_anchors_grow_with_the_side_of_a_picture(tiny: Tiny, tmp_path:
     grown = training._preparation._config.max_static_points
     assert grown == round(500 * np.sqrt(2))
     assert training.config.max_static_points == 500, "what is stored is what was set"
+
+
+@pytest.mark.usefixtures("small_windows")
+def test_windows_that_a_lens_does_not_reach_are_not_drawn(tiny: Tiny):
+    training = tiny.prepared(1)
+    height, width = training.pictures.picture(0, 0).shape[:2]
+    is_valid = np.ones((training.pictures.n_cameras, height, width), bool)
+    window = training.windows[1]
+    is_valid[2, :, window.x :] = False
+    training.pictures.is_valid = is_valid
+    left_out = {training.place(item)[:2] for item in range(2 * len(training.pictures))} - {
+        training.place(item)[:2] for item in training._windows_of(range(len(training.pictures)))
+    }
+    assert left_out == {(2, 1)}

@@ -72,6 +72,19 @@ def test_a_checkpoint_without_corrections_is_refused_where_cameras_learn(tiny: T
         tiny.training(0, is_source=False, refine_cameras="on").restore_checkpoint(tmp_path / "kept.safetensors")
 
 
+def test_cameras_stay_while_only_moving_parts_learn(own_tiny: Tiny) -> None:
+    training = refining(own_tiny)
+    while training._stage != "moving":
+        training.step()
+    before = training._cameras.corrections
+    assert before is not None
+    finish(training)
+    assert training.steps_done > training.phases[0][1] + training.phases[1][1] + 1
+    after = training._cameras.corrections
+    assert after is not None
+    assert np.array_equal(after, before)
+
+
 def test_later_clips_are_trained_with_the_corrected_cameras_and_leave_them(own_tiny: Tiny) -> None:
     source = own_tiny.prepared(1, refine_cameras="on", camera_lr=0.05)
     rig, names = own_tiny.capture.rig, own_tiny.reference.header.camera_names

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from engine.images.rendition import Rendition, log_rims
 from tests.engine.training.tiny_training import Tiny, finish, picture, same_arrays, take_steps
 
 LENS = np.array([-0.5, 0.05], np.float32)
-STEPS = {"static_steps": 6, "joint_steps": 7, "is_source": False}
+STEPS: dict[str, Any] = {"static_steps": 6, "joint_steps": 7, "is_source": False}
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +82,8 @@ def test_pictures_are_trained_without_and_shown_with_it(reference: tuple[ClipSta
 
 def test_stopped_trainings_go_on_to_the_bit(reference: tuple[ClipState, Path], tiny: Tiny, tmp_path: Path):
     state, folder = reference
-    for clip_index, settings in ((0, STEPS), (1, {"reference": state})):
+    sources: dict[str, Any] = {"reference": state}
+    for clip_index, settings in ((0, STEPS), (1, sources)):
         whole = finish(tiny.prepared(clip_index, prep_dir=folder, **settings))
         stopped = take_steps(tiny.prepared(clip_index, prep_dir=folder, **settings), 4)
         stopped.write_checkpoint(tmp_path / "checkpoint")

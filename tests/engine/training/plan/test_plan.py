@@ -76,6 +76,7 @@ def test_a_reference_clip():
     found = plan()
     assert (found.role, found.n_steps) == ("reference", 4050)
     shown = values(found)
+    assert found.training_s is not None
     prices = [shown.pop(f"training at quality={quality}") for quality in ("draft", "best")]
     assert prices == pytest.approx([0.4 * found.training_s, 3 * found.training_s], rel=1e-3)
     assert shown == {
