@@ -187,7 +187,7 @@ class ClipTraining:
     def _settle_still_parts(self) -> None:
         """Between the phases of a reference clip: still parts have learned, and what no pixel showed follows them."""
         squares = self._phase.arrays().get("optimizer.sets.static.features.exp_avg_sq")
-        n_changed = 0 if squares is None else continue_unseen(self.model, "static", squares, self._cameras.views)
+        n_changed = 0 if squares is None else continue_unseen(self.model, "static", squares)
         self._say("Finishing the static scene", f"{n_changed:,} anchors that no camera sees look like their neighbours")
 
     def _take(self, parts: ClipParts) -> None:

@@ -477,12 +477,12 @@ class TrainConfig(msgspec.Struct, frozen=True):
 
     def n_static_steps(self, n_cameras: int, n_windows: int = 1) -> int:
         """Steps of the static phase for this many training cameras, whose pictures have so many windows."""
-        return self.static_steps or self._derived(STATIC_RULE.steps(n_cameras), n_windows)
+        return self.static_steps or self._derived(STATIC_RULE.steps(n_cameras), n_windows**0.5)
 
     def n_joint_steps(self, n_pictures: int, n_windows: int = 1) -> int:
         """Steps of the joint phase of a reference clip with this many training pictures of so many windows."""
         passes = self._n_pass_steps(n_pictures * n_windows)
-        return self.joint_steps or passes or self._derived(JOINT_RULE.steps(n_pictures), n_windows)
+        return self.joint_steps or passes or self._derived(JOINT_RULE.steps(n_pictures), n_windows**0.5)
 
     def n_source_steps(self, n_pictures: int, n_windows: int = 1) -> int:
         """Steps of a source clip with this many training pictures of so many windows."""
@@ -492,10 +492,14 @@ class TrainConfig(msgspec.Struct, frozen=True):
     def _n_pass_steps(self, n_windows: int) -> int:
         return math.ceil(self.passes * n_windows)
 
-    def _derived(self, n_steps: int, n_windows: int) -> int:
-        """Steps for pictures of so many windows, where those of one window need `n_steps`: as the square root of the
-        area, since neighbouring pixels teach the same anchors."""
-        return max(round(n_steps * QUALITIES[self.quality] * n_windows**0.5), 1)
+    def _derived(self, n_steps: int, growth: float) -> int:
+        """Steps of the chosen quality, where pictures of one window need `n_steps` for the standard one.
+
+        Args:
+            growth: How many times as many larger pictures need: a reference clip as the root of their windows, since
+                neighbouring pixels teach the same anchors; a source clip, whose windows are mostly still, as these.
+        """
+        return max(round(n_steps * QUALITIES[self.quality] * growth), 1)
 
     def of_windows(self, n_windows: int) -> TrainConfig:
         """The settings with the limits of anchors that pictures of so many windows have."""

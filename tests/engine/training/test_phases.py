@@ -21,11 +21,12 @@ def test_where_every_anchor_moves_no_phase_is_of_moving_ones_alone():
     assert phases_of(config, **SIZES, is_source=False) == [("static", 5), ("joint", 8)]
 
 
-def test_derived_steps_grow_with_the_side_of_pictures_and_given_ones_do_not():
+@pytest.mark.parametrize(("is_source", "growth"), [(False, 3), (True, 9)])
+def test_derived_steps_grow_with_pictures_and_given_ones_do_not(is_source: bool, growth: int):
     small, large = (
-        sum(n for _, n in phases_of(TrainConfig(), **(SIZES | {"n_windows": n}), is_source=False)) for n in (1, 9)
+        sum(n for _, n in phases_of(TrainConfig(), **(SIZES | {"n_windows": n}), is_source=is_source)) for n in (1, 9)
     )
-    assert large == 3 * small
+    assert large == growth * small
     given = phases_of(TrainConfig(static_steps=5, joint_steps=7), **(SIZES | {"n_windows": 9}), is_source=False)
     assert given == [("static", 5), ("joint", 4), ("moving", 3)]
 
@@ -40,3 +41,13 @@ def test_a_step_lies_in_one_phase_and_the_last_has_no_end(step, expected):
 def test_a_phase_without_steps_is_passed_over_unless_it_is_the_last():
     assert phase_at([("static", 0), ("joint", 7)], 0) == (1, 0)
     assert phase_at([("source", 0)], 0) == (0, 0)
+
+
+def test_qualities_differ_in_derived_steps_alone():
+    n_steps = {
+        quality: sum(n for _, n in phases_of(TrainConfig(quality=quality), **SIZES, is_source=False))
+        for quality in ("draft", "standard", "best")
+    }
+    assert n_steps == {"draft": 600, "standard": 1500, "best": 4500}
+    given = TrainConfig(quality="best", static_steps=5, joint_steps=7)
+    assert phases_of(given, **SIZES, is_source=False) == [("static", 5), ("joint", 4), ("moving", 3)]

@@ -9,7 +9,6 @@ import torch
 from engine.backends.table import backend_called
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
-from engine.model.clip_view import View
 from engine.model.decoder import Decoder
 from engine.training.preparation.unseen_anchors import FAINT, continue_unseen
 
@@ -40,7 +39,7 @@ def squares(n_unseen: int) -> np.ndarray:
 
 def test_unseen_anchors_look_like_a_neighbour(model: ClipModel):
     before = {name: value.clone() for name, value in model.anchor_set("static").state_dict().items()}
-    assert continue_unseen(model, "static", squares(N_UNSEEN), []) == N_UNSEEN
+    assert continue_unseen(model, "static", squares(N_UNSEEN)) == N_UNSEEN
     anchors = model.anchor_set("static")
     for name, value in anchors.state_dict().items():
         assert torch.equal(value[N_UNSEEN:], before[name][N_UNSEEN:]), name
@@ -56,32 +55,21 @@ def test_unseen_anchors_look_like_a_neighbour(model: ClipModel):
 
 def test_where_all_are_seen_nothing_changes(model: ClipModel):
     before = model.anchor_set("static").features.clone()
-    assert continue_unseen(model, "static", squares(0), []) == 0
+    assert continue_unseen(model, "static", squares(0)) == 0
     assert torch.equal(model.anchor_set("static").features, before)
 
 
 def test_with_hardly_anything_seen_nothing_is_continued(model: ClipModel):
     found = np.zeros((N, 8), np.float32)
     found[:5] = 1.0
-    assert continue_unseen(model, "static", found, []) == 0
-    assert continue_unseen(model, "static", np.zeros((N, 8), np.float32), []) == 0
+    assert continue_unseen(model, "static", found) == 0
+    assert continue_unseen(model, "static", np.zeros((N, 8), np.float32)) == 0
 
 
-def test_what_a_camera_looks_through_stays_clear(model: ClipModel):
+def test_anchors_in_one_place_stay_finite(model: ClipModel):
     anchors = model.anchor_set("static")
-    with torch.no_grad():
-        anchors.positions[0] = torch.tensor([2.0, 1.5, -1.0])  # between the camera and the wall
-        anchors.positions[1] = torch.tensor([2.0, 1.5, 1.0])  # behind the wall
-        anchors.features[:N_UNSEEN] = 0.1
-        anchors.features[:2] = 0.2
-        model.decoder.second_bias["opacity"].fill_(6.0)
-        anchors.log_base_scales[0] = -12.0  # it has learned to be as good as nothing
-        anchors.log_offset_scales[0] = -12.0
-    pose = np.eye(4)
-    pose[:3, 3] = [-2.0, -1.5, 3.0]
-    K = np.array([[60.0, 0, 48], [0, 60, 36], [0, 0, 1]])
-    view = View.from_arrays(pose, K, width=96, height=72, near_plane=0.1)
-    before = anchors.features.clone()
-    continue_unseen(model, "static", squares(2), [view])
-    assert torch.equal(anchors.features[0], before[0])
-    assert not torch.equal(anchors.features[1], before[1])
+    anchors.positions[:8] = anchors.positions[0]
+    anchors.positions[100:108] = anchors.positions[100]
+    continue_unseen(model, "static", squares(N_UNSEEN))
+    for value in anchors.state_dict().values():
+        assert torch.isfinite(value).all()
