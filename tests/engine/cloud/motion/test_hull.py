@@ -148,12 +148,13 @@ def test_colors_are_balanced_and_taken_from_visible_cameras() -> None:
 def test_moving_cloud_follows_the_sphere_through_the_clip() -> None:
     rig = dome_rig()
     positions = [CENTER + np.array([0.3 * m, 0.0, 0.0]) for m in range(3)]
-    masks = MotionMasks.of(np.stack([sphere_masks(rig, position, RADIUS) for position in positions]))
+    flags = np.stack([sphere_masks(rig, position, RADIUS) for position in positions])
+    masks = MotionMasks.of(flags)
     gains = np.ones((len(rig), 3))
     lines: list[str] = []
 
     def picture(row: int, frame_in_clip: int) -> np.ndarray:
-        return np.where(masks[frame_in_clip, row][..., None], [200, 100, 50], [0, 255, 0]).astype(np.uint8)
+        return np.where(flags[frame_in_clip, row][..., None], [200, 100, 50], [0, 255, 0]).astype(np.uint8)
 
     bounds: dict[str, Any] = {"bounds_min": np.full(3, -1.5), "bounds_max": np.full(3, 1.8)}
     cloud = build_moving_cloud(picture, masks, rig, gains, **bounds, max_points=3000, report=lines.append)
