@@ -106,10 +106,8 @@ class VariantMethod(Method):
         return super().choose_residual(cloud, is_new, n_used, config)
 
     def adapt(self, model: ClipModel, config: TrainConfig) -> None:
-        if config.inherit == "moving" and self._gate in ("off", "static"):
-            adapt_moving(model, all_of_them=True)
-        else:
-            super().adapt(model, config)
+        if self._inherit == "moving":  # which a clip that continues from the one before does not do, whatever is set
+            adapt_moving(model, all_of_them=self._gate in ("off", "static"))
 
     def gate(
         self, model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool

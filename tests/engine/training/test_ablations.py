@@ -1,4 +1,4 @@
-"""Every ablation switch changes only what it names: what learns, what stays as it is, what the clip stores."""
+"""With inherit=frozen every ablation switch changes only what it names: what learns, what stays, what is stored."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ LEARNS: dict[str, set[str]] = {
 
 
 def arguments_of(tiny: Tiny, name: str) -> dict:
-    return SWITCHES[name] | ({"previous": tiny.reference} if name == "continue" else {})
+    return {"inherit": "frozen"} | SWITCHES[name] | ({"previous": tiny.reference} if name == "continue" else {})
 
 
 @pytest.fixture(scope="module")
