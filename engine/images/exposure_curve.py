@@ -9,7 +9,6 @@ The two directions undo each other.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 KNEE = 0.9
 """Share of white up to which a gain is a plain factor, in the darker of the two pictures' scales."""
@@ -29,13 +28,14 @@ def to_reference(pixels: np.ndarray, gain: np.ndarray, falloff: np.ndarray | Non
     """
     if falloff is None and (gain == 1.0).all():
         return pixels
-    levels = np.zeros(pixels.shape[:-1], np.int64) if falloff is None else np.rint(_STEPS * np.log(falloff)).astype(int)
+    levels = np.zeros((), np.int32) if falloff is None else np.rint(_STEPS * np.log(falloff)).astype(np.int32)
     lowest, highest = (int(levels.min()), int(levels.max())) if levels.size else (0, 0)
     shares = np.exp(np.arange(lowest, highest + 1) / _STEPS)
-    gains = shares[:, None, None] * np.asarray(gain, np.float64)[:, None]  # [L, 3, 1]
-    tables = np.floor(_reference_values(np.arange(256) / 255.0, gains) * 255.0 + 0.5).astype(np.uint8)  # [L, 3, 256]
-    result = np.empty(pixels.shape, np.uint8)
-    _look_up(np.ascontiguousarray(pixels).reshape(-1, 3), (levels - lowest).reshape(-1), tables, result.reshape(-1, 3))
+    gains = shares * np.asarray(gain, np.float64)[:, None]  # [3, L]
+    tables = np.floor(_reference_values(np.arange(256) / 255.0, gains[..., None]) * 255.0 + 0.5).astype(np.uint8)
+    rows, result = 256 * (levels - lowest), np.empty(pixels.shape, np.uint8)
+    for channel, table in enumerate(tables):  # [L, 256] each
+        result[..., channel] = np.take(table, rows + pixels[..., channel])
     return result
 
 
@@ -67,10 +67,3 @@ def _reference_values(values: np.ndarray, gains: np.ndarray) -> np.ndarray:
     reference_knee = camera_knee / gains
     above = reference_knee + (values - camera_knee) * ((1.0 - reference_knee) / (1.0 - camera_knee))
     return np.minimum(np.where(values <= camera_knee, values / gains, above), 1.0)
-
-
-@njit(cache=True, nogil=True)
-def _look_up(pixels, levels, tables, result):
-    for i in range(len(pixels)):
-        for channel in range(3):
-            result[i, channel] = tables[levels[i], channel, pixels[i, channel]]

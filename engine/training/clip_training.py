@@ -183,6 +183,8 @@ class ClipTraining:
             self.model, self.gains, self.drift, self.backgrounds, self.spacing, vignetting=self.vignetting
         )
         self._take(self._preparation.with_motion(parts, self.pictures))
+        if not any(self.model.anchor_set(role).is_dynamic for role in self.model.roles()):
+            self.phases = [phase for phase in self.phases if phase[0] != "moving"]
 
     def _settle_still_parts(self) -> None:
         """Between the phases of a reference clip: still parts have learned, and what no pixel showed follows them."""
@@ -424,7 +426,10 @@ class ClipTraining:
             NonFiniteLoss: An array holds numbers that are not finite.
             DiskError: The backgrounds that source clips share could not be kept; nothing has changed.
         """
-        if self._base is None and self.phases[self._phase_index][0] != "static":
+        last = self.phases[self._phase_index][0]
+        if last == "joint" and not self.model.anchor_set("static").is_dynamic:  # nothing moves
+            self._settle_still_parts()
+        if self._base is None and last != "static":
             self._preparation.keep_backgrounds(self.model, self.gains, self.backgrounds)
         state = self.state()
         self._trained = self.model

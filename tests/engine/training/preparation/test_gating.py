@@ -73,7 +73,7 @@ def test_promoted_anchors_go_on_from_what_they_learned_and_every_clip_inherits_t
     assert (state.arrays["gate.static"] == STILL).all()
     assert len(state.arrays["gate.static"]) == n_static - len(rows)
 
-    source = tiny.trained(1, reference=state, prep_dir=tmp_path)
+    source = tiny.trained(1, reference=state, prep_dir=tmp_path, inherit="frozen")
     assert source.arrays["inherited.promoted.presence"].all()  # part of the still scene: there at all times
     model = load_clip_model(source, state, backend=backend_called("cpu"))
     assert model.roles()[:3] == ["static", "moving", "promoted"]
@@ -158,7 +158,7 @@ def test_what_the_user_marks_as_static_is(tiny: Tiny, tmp_path):
     assert not training.model.hidden
     assert (training.state().arrays["gate.static"][inside] == USER_STATIC).all()
     everywhere = GateRegion("static", (-1e6, -1e6, -1e6), (1e6, 1e6, 1e6))
-    still = tiny.prepared(1, prep_dir=tmp_path, regions=[everywhere])
+    still = tiny.prepared(1, prep_dir=tmp_path, regions=[everywhere], inherit="frozen")
     assert still.is_finished  # nothing moves where nothing may: there is nothing to learn
     assert still.model.roles() == ["static", "moving"]
 
