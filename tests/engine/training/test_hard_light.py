@@ -94,12 +94,12 @@ def test_a_slow_shadow_is_followed(folder):
 
 @pytest.fixture(scope="module")
 def steady(folder) -> Trained:
-    return train_scene(plain(), folder / "plain")
+    return train_scene(plain(), folder / "plain", joint_steps=400)
 
 
 @pytest.fixture(scope="module")
 def drifted(folder) -> Trained:
-    return train_scene(drifting_exposure(), folder / "drift")
+    return train_scene(drifting_exposure(), folder / "drift", joint_steps=400)
 
 
 def everywhere(_camera: int, _frame: int) -> np.ndarray:
