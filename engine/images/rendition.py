@@ -78,12 +78,18 @@ def squared_radii(x: np.ndarray, y: np.ndarray, image_size: tuple[int, int] | np
 
 def falloff_at(squared: np.ndarray, vignetting: np.ndarray) -> np.ndarray:
     """Share of the light at squared radii. vignetting: a and b, [2]"""
-    return np.exp(squared * (vignetting[0] + vignetting[1] * squared))
+    return np.exp(log_falloff(squared, vignetting))
+
+
+def log_falloff(squared: np.ndarray, vignetting: np.ndarray) -> np.ndarray:
+    """Log of the share of light at squared radii. [...], or [C, ...] with a and b of each camera [C, 2]"""
+    a, b = (vignetting[..., i : i + 1] if vignetting.ndim > 1 else vignetting[i] for i in (0, 1))
+    return squared * (a + b * squared)
 
 
 def log_rims(vignetting: np.ndarray) -> np.ndarray:
     """Log of the share of light at the rim. [C, 2] to [C]"""
-    return RIM * vignetting[:, 0] + RIM**2 * vignetting[:, 1]
+    return log_falloff(np.full((1, 1), RIM), vignetting)[:, 0]
 
 
 def typical_vignetting(vignetting: np.ndarray) -> np.ndarray:

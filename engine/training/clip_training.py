@@ -268,7 +268,8 @@ class ClipTraining:
         if valid is None or n == 1:
             return items
         is_seen = [[bool(self.windows.cut(flags, window).any()) for window in range(n)] for flags in valid]
-        return [item for item in items if is_seen[self.place(item).camera_row][self.place(item).window]]
+        places = [self.place(item) for item in items]
+        return [item for item, at in zip(items, places, strict=True) if is_seen[at.camera_row][at.window]]
 
     def _with_motion(self, items: Sequence[int]) -> list[int]:
         """Those in which something that learns may be seen: nothing can be learned from the other windows."""

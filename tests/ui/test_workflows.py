@@ -136,4 +136,4 @@ def test_from_a_folder_to_the_cause_of_flicker(
     for row in document["rows"]:
         at = row["frame_index"], names.index(row["camera"])
         assert session.residual_status.cells["psnr"][at] == pytest.approx(row["psnr"], abs=1e-4)
-    assert not [notice for notice in session.notices if notice.kind != "info"], "that a clip is trained fades away"
+    draw_until(pilot, lambda: len(session.notices) == 0, "that notices fade, and none is a warning that stays")

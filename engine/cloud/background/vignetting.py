@@ -14,7 +14,7 @@ import numpy as np
 from engine.camera.projection import project, projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import MAX_SPLIT_POINTS, MIN_SPREAD, MIN_SPREAD_RATIO, gains_from_observations
-from engine.images.rendition import log_rims, squared_radii
+from engine.images.rendition import log_falloff, log_rims, squared_radii
 
 MIN_OBSERVATIONS = 200
 """Of a camera; one with fewer is taken to be like the median of the others."""
@@ -76,7 +76,7 @@ def measure_vignetting(points: np.ndarray, log_colors: np.ndarray, rig: CameraRi
     coefficients, gains = nothing.astype(np.float64), np.ones((len(rig), 3))
     errors = np.zeros_like(squared)
     for _ in range(_N_ROUNDS):
-        falloff = squared * coefficients[:, :1] + squared**2 * coefficients[:, 1:]
+        falloff = log_falloff(squared, coefficients)
         gains, colors = gains_from_observations(log_colors - falloff[..., None].astype(np.float32), gains)
         residuals = log_colors - np.log(gains)[:, None] - np.log(colors + 1.0)
         errors = np.median(residuals, axis=-1)  # NaN where not seen

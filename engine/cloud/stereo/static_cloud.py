@@ -23,6 +23,7 @@ from engine.cloud.stereo.depth.depth_maps import estimate_depth_maps
 from engine.cloud.stereo.sampling import median_footprint, sample_tiers, seen_pixels, working_pictures
 from engine.cloud.stereo.unseen import backdrop, unseen_points
 from engine.errors import PreparationError
+from engine.images.rendition import log_falloff
 
 logger = logging.getLogger(__name__)
 
@@ -125,8 +126,7 @@ def build_static_cloud(
     if color != "off":
         lenses = measure_vignetting(points, log_colors, rig)
         vignetting = lenses.coefficients
-        squared = point_radii(points, rig)
-        log_colors -= (squared * vignetting[:, :1] + squared**2 * vignetting[:, 1:])[..., None]
+        log_colors -= log_falloff(point_radii(points, rig), vignetting)[..., None]
         report(f"Vignetting: {lenses.text}")
     gains, seen_colors, decision = balance(points, log_colors, first_gains, color)
     n_colored = int(np.isfinite(seen_colors).all(axis=1).sum())
