@@ -97,14 +97,16 @@ def dynamic_features(positions, field, arrays, knot):
     unit = (positions.astype(np.float64) - field["bounds_min"]) / sides
     table = arrays["field.tables.0" if field.get("is_shared") else f"field.tables.{knot}"]  # [levels, entries, values]
     levels, mask = [], field["n_entries"] - 1
-    for level, n_cells in enumerate(field["cells"]):
+    strides = field.get("strides") or [1] * len(field["cells"])
+    for level, (n_cells, stride) in enumerate(zip(field["cells"], strides, strict=True)):
         scaled = np.clip(unit, 0, 1) * n_cells
         corner = np.minimum(scaled.astype(np.int64), n_cells - 1)
         fraction, side = scaled - corner, n_cells + 1
         key = 0
         if field.get("is_shared"):  # all frames share a table: the frame's entries lie beside others', or are hashed
             block = 1 << (side**3 - 1).bit_length()
-            key = knot * (block if block * field["n_knots"] <= field["n_entries"] else PRIMES[3]) & mask
+            n_different = (field["n_knots"] - 1) // stride + 1
+            key = knot // stride * (block if block * n_different <= field["n_entries"] else PRIMES[3]) & mask
         total = 0
         for bits in range(8):
             offset = np.array([bits & 1, bits >> 1 & 1, bits >> 2 & 1])
@@ -125,6 +127,7 @@ def decode(header, arrays, reference, frame_in_clip):
     """Gaussians of a frame: means, quats (wxyz), scales, opacities, colors."""
     sets, light = anchor_sets(header, arrays, reference)
     heads = arrays if any(name.startswith("decoder.") for name in arrays) else reference
+    apart = [at for at in (arrays, heads) if any(name.startswith("moving_decoder.") for name in at)]
     k, parts = header["decoder"]["gaussians_per_anchor"], []
     for role, anchors in sets.items():
         rows = np.arange(len(anchors["positions"]))
@@ -134,9 +137,10 @@ def decode(header, arrays, reference, frame_in_clip):
             f_d = dynamic_features(anchors["positions"][rows], header["field"], arrays, frame_in_clip)
         features = np.concatenate([anchors["features"][rows], f_d], 1)
         raw = {}
+        at, name = (apart[0], "moving_decoder") if apart and "presence" in anchors else (heads, "decoder")
         for head in ("opacity", "color", "shape", "offset"):
-            hidden = np.maximum(features @ heads[f"decoder.first.{head}"] + heads[f"decoder.first_bias.{head}"], 0)
-            raw[head] = hidden @ heads[f"decoder.second.{head}"] + heads[f"decoder.second_bias.{head}"]
+            hidden = np.maximum(features @ at[f"{name}.first.{head}"] + at[f"{name}.first_bias.{head}"], 0)
+            raw[head] = hidden @ at[f"{name}.second.{head}"] + at[f"{name}.second_bias.{head}"]
         n, shape = len(rows), raw["shape"].reshape(len(rows), k, 7)
         offsets = raw["offset"].reshape(n, k, 3) * np.exp(anchors["log_offset_scales"][rows])[:, None]
         colors = sigmoid(raw["color"].reshape(n, k, 3) + anchors["color_logits"][rows][:, None])

@@ -5,8 +5,9 @@ from __future__ import annotations
 OWN, INHERITED, REASONS = "sets", "inherited", "gate"
 """How names of arrays of anchors begin, before a dot and a role: those that the clip itself stores; what it says of
 those it inherits; why the gate decided about each."""
-DECODER, FIELD, TABLES = "decoder.", "field.", "field.tables."
-"""How the names of the decoder's arrays begin, of the field's, and of the field's tables."""
+DECODER, MOVING_DECODER, FIELD, TABLES = "decoder.", "moving_decoder.", "field.", "field.tables."
+"""How the names of the decoder's arrays begin, of those of the heads for moving parts where they are others, of the
+field's, and of the field's tables."""
 GAINS = "gains"
 """Of the training cameras, in a clip that inherits nothing."""
 CORRECTIONS = "camera_corrections"

@@ -62,6 +62,7 @@ class FieldShape(Struct, frozen=True):
         is_shared: Whether all knots share one table, as in the published 4D hash, instead of one each.
         aspect: Sides of the box as shares of the longest; every axis has the same number of cells. A cube unless said.
         is_rectified: Whether the network ends in a ReLU, so that no dynamic feature is negative.
+        strides: Knots in a row that read the same entries, per level; one unless said.
     """
 
     n_knots: Size
@@ -75,12 +76,15 @@ class FieldShape(Struct, frozen=True):
     is_shared: bool = False
     aspect: tuple[Length, Length, Length] = (1.0, 1.0, 1.0)
     is_rectified: bool = False
+    strides: tuple[Size, ...] = ()
 
     def __post_init__(self) -> None:
         if max(self.n_tables * self.n_entries * self.channels, self.n_knots) * len(self.cells) > _MAX_TABLE_VALUES:
             raise ValueError(f"more than {_MAX_TABLE_VALUES} values in its tables")
         if not all(map(math.isfinite, self.bounds_min)):
             raise ValueError(f"bounds_min {shown(self.bounds_min)}")
+        if self.strides and (len(self.strides) != len(self.cells) or not self.is_shared):
+            raise ValueError(f"strides {shown(self.strides)}")
 
     @property
     def n_tables(self) -> int:

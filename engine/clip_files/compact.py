@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace as with_entries
 
-from engine.clip_files.array_names import DECODER, FIELD, LOG_DRIFT, own_kind, table_index
+from engine.clip_files.array_names import DECODER, FIELD, LOG_DRIFT, MOVING_DECODER, own_kind, table_index
 from engine.clip_files.clip_header import SCHEMA, ClipFigures
 from engine.clip_files.clip_state import ClipState, write_coded_arrays
 from engine.clip_files.coding import CodedArray, CodingError, decode_array, encode_array
@@ -109,7 +109,7 @@ def _codecs(name: str, array: np.ndarray, state: ClipState) -> list[Codec]:
         return [("steps", {"bits": _LIGHT_BITS}), exact]
     if name == LOG_DRIFT:
         return [("half", {}), exact]
-    if kind is not None or name.startswith((DECODER, FIELD)):
+    if kind is not None or name.startswith((DECODER, MOVING_DECODER, FIELD)):
         return [("half", {}), exact]
     return [exact]
 

@@ -9,6 +9,8 @@ all clips. "replacing" ones are the same for one source clip: they take the plac
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from copy import deepcopy
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -16,7 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.clip_files.anchor_record import AnchorRecord, StoredAnchors
-from engine.clip_files.array_names import DECODER, FIELD
+from engine.clip_files.array_names import DECODER, FIELD, MOVING_DECODER
 from engine.clip_files.clip_header import DecoderShape
 from engine.clip_files.roles import ROLES, STATIC
 from engine.gate.reasons import NO_REASON
@@ -70,7 +72,7 @@ class ClipModel(nn.Module):
 
     Args:
         sets: Anchor sets by role.
-        decoder: Shared heads.
+        decoder: Heads of everything that learns.
         field: Field of this clip; None while only static anchors exist.
         clip_length: M, the divisor of clip_time.
         n_frames: Frames of this clip.
@@ -79,6 +81,8 @@ class ClipModel(nn.Module):
             too; None where it is as in the reference clip. [A of the reference, 2]
         hidden: Rows of the reference clip's sets that this clip leaves out; the sets given are without them already.
             By role, [A of the reference] bool
+        still_decoder: Heads of still parts where they are others: those they learned with, frozen like them.
+        own_heads: Heads that are the clip's own, and not a reference clip's: DECODER, MOVING_DECODER.
     """
 
     def __init__(
@@ -92,6 +96,8 @@ class ClipModel(nn.Module):
         backend: ModelBackend,
         light: Tensor | None = None,
         hidden: dict[str, Tensor] | None = None,
+        still_decoder: Decoder | None = None,
+        own_heads: Iterable[str] = (),
     ) -> None:
         super().__init__()
         self.backend = backend
@@ -99,9 +105,9 @@ class ClipModel(nn.Module):
         self.hidden = dict(hidden or {})
         self.light = light
         self.reasons: dict[str, np.ndarray] = {}  # the gate's reasons for the anchors of a role, for display
-        self.decoder = decoder
+        self.decoder, self.still_decoder = decoder, still_decoder
         self.clip_length, self.n_frames = clip_length, n_frames
-        self._stores_decoder = False
+        self._own_heads = set(own_heads)
         self._corners: dict[str, CornerTable] = {}
         self._frozen: dict[str, Gaussians] = {}
         self._lit: dict[float, Gaussians] = {}
@@ -162,18 +168,34 @@ class ClipModel(nn.Module):
                 assert self.field is not None
                 self._corners[role] = self.field.corners(positions.detach())
 
-    def freeze_still_parts(self) -> None:
-        """Static anchors and the heads that this clip has trained stay as they are from here on."""
-        self._stores_decoder |= any(p.requires_grad for p in self.decoder.parameters())
+    def freeze_still_parts(self, *, learns_heads: bool) -> None:
+        """Static anchors stay as they are from here on.
+
+        Args:
+            learns_heads: Whether the heads of moving parts keep learning, apart from those of still parts; else all
+                heads stay as they are, too.
+        """
+        if self.still_decoder is None and _learns(self.decoder):
+            self._own_heads.add(DECODER)
         self.decoder.requires_grad_(requires_grad=False)
+        if learns_heads:
+            self.still_decoder = self.still_decoder or deepcopy(self.decoder)
+            self.decoder.requires_grad_(requires_grad=True)
+            self._own_heads.add(MOVING_DECODER)
         for role in self.roles():
             if not self.anchor_set(role).is_dynamic:
                 self.anchor_set(role).requires_grad_(requires_grad=False)
 
+    def unite_heads(self) -> None:
+        """Heads of still parts draw all parts from here on, and are the clip's own where others drew moving ones."""
+        if self.still_decoder is not None:
+            self.decoder, self.still_decoder = self.still_decoder, None
+            self._own_heads = {DECODER}
+
     def is_constant(self, role: str) -> bool:
-        """Whether the set's Gaussians never change: static anchors under a frozen decoder."""
+        """Whether the set's Gaussians never change: static anchors under frozen heads."""
         anchors = self.anchor_set(role)
-        is_learning = anchors.features.requires_grad or any(p.requires_grad for p in self.decoder.parameters())
+        is_learning = anchors.features.requires_grad or _learns(self.still_decoder or self.decoder)
         return not anchors.is_dynamic and not is_learning
 
     def n_constant_rows(self) -> int:
@@ -239,7 +261,8 @@ class ClipModel(nn.Module):
     def static_gaussians(self, role: str) -> Gaussians:
         """Gaussians of a whole static set as it is now, in the light of the reference clip. K per anchor"""
         everything = ChosenAnchors(anchors=self.anchor_set(role), rows=self._all_rows(role))
-        return decode_anchors([everything], self.decoder, None, [(0, 1.0)], backend=self.backend)
+        heads = self.still_decoder or self.decoder
+        return decode_anchors([everything], heads, None, [(0, 1.0)], backend=self.backend)
 
     @property
     def has_light(self) -> bool:
@@ -333,11 +356,18 @@ class ClipModel(nn.Module):
                 light=_copy(self.light) if role == STATIC and self.light is not None else None,
             )
             arrays |= record.arrays(role)
-        if self._stores_decoder or any(p.requires_grad for p in self.decoder.parameters()):
-            arrays |= {f"{DECODER}{name}": _copy(value) for name, value in self.decoder.state_dict().items()}
+        still_heads = self.still_decoder or self.decoder
+        if DECODER in self._own_heads or _learns(still_heads):
+            arrays |= {f"{DECODER}{name}": _copy(value) for name, value in still_heads.state_dict().items()}
+        if MOVING_DECODER in self._own_heads:
+            arrays |= {f"{MOVING_DECODER}{name}": _copy(value) for name, value in self.decoder.state_dict().items()}
         if self.field is not None:
             arrays |= {f"{FIELD}{name}": _copy(value) for name, value in self.field.state_dict().items()}
         return arrays
+
+
+def _learns(module: nn.Module) -> bool:
+    return any(parameter.requires_grad for parameter in module.parameters())
 
 
 def _copy(tensor: Tensor) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 Knots lie exactly on the frames of the clip, so the temporal resolution is that of the capture and no frame falls
 between two knots; times between frames interpolate the two neighbouring knots linearly. The field starts at (nearly)
-zero, so an untrained field leaves the static look of the anchors unchanged.
+zero, so an untrained field leaves the static look of the anchors unchanged. Fine levels may keep their entries for
+several frames: what is small in space rarely changes from one frame to the next, and is then learned from all of them.
 Source: ClipGStream, spatio-temporal field; sizes follow the number of anchors instead of fixed 16 levels.
 """
 
@@ -51,7 +52,7 @@ class SpatioTemporalField(nn.Module):
         )
         keys = torch.zeros(shape.n_knots, len(shape.cells), dtype=torch.int32)
         if shape.is_shared:
-            keys = time_keys(shape.cells, shape.n_entries, shape.n_knots)
+            keys = time_keys(shape.cells, shape.n_entries, shape.n_knots, shape.strides)
         self.register_buffer("keys", keys, persistent=False)
         n_in = len(shape.cells) * shape.channels
         self.hidden = nn.Linear(n_in, shape.hidden, bias=False)

@@ -13,6 +13,17 @@ def derive_cells(*, side: float, spacing: float, base: int, growth: float, max_l
     return tuple(cells)
 
 
+_STRIDES = (10, 5)
+"""Frames for which the finest level keeps its entries, and the next one; others of the finer half keep them for 2."""
+
+
+def derive_strides(n_levels: int, n_knots: int) -> tuple[int, ...]:
+    """Frames for which each level keeps its entries, coarse levels first: those change with every frame."""
+    n_own = max(n_levels // 2, min(2, n_levels))
+    kept = [*_STRIDES, *(2 for _ in range(n_levels))][: n_levels - n_own]
+    return (1,) * n_own + tuple(min(frames, n_knots) for frames in reversed(kept))
+
+
 def derive_log2_entries(n_alive: int, *, n_shared_knots: int = 1, at_most: int = 17) -> int:
     """log2 of the table entries per level for this many anchors alive in one frame, in a table of so many knots.
 

@@ -86,7 +86,7 @@ def corner_table_reference(unit_positions: np.ndarray, cells: tuple[int, ...], n
     return CornerTable(torch.from_numpy(indices), torch.from_numpy(weights), n_entries)
 
 
-def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int) -> Tensor:
+def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int, strides: tuple[int, ...] = ()) -> Tensor:
     """The keys combined with the entries of each knot and level by XOR, where all knots share a table.
 
     Knots of a level that fits the table n_knots times lie side by side; otherwise they are spread by the hash.
@@ -94,14 +94,15 @@ def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int) -> Tensor:
     Args:
         cells: Cells per axis of each level. L entries
         n_entries: Table entries per level, a power of two.
+        strides: Knots in a row that read the same entries, per level; one unless said.
     Returns:
         Keys below n_entries. [n_knots, L] int32
     """
     keys = np.empty((n_knots, len(cells)), np.int32)
-    knots = np.arange(n_knots, dtype=np.uint64)
-    for level, n_cells in enumerate(cells):
+    for level, (n_cells, stride) in enumerate(zip(cells, strides or (1,) * len(cells), strict=True)):
+        knots = np.arange(n_knots, dtype=np.uint64) // np.uint64(stride)
         block = 1 << ((n_cells + 1) ** 3 - 1).bit_length()  # entries of one knot, rounded up to a power of two
-        step = block if block * n_knots <= n_entries else _PRIMES[3]
+        step = block if block * (int(knots[-1]) + 1) <= n_entries else _PRIMES[3]
         keys[:, level] = (knots * np.uint64(step) & np.uint64(n_entries - 1)).astype(np.int32)
     return torch.from_numpy(keys)
 

@@ -8,7 +8,7 @@ from msgspec.structs import asdict
 from torch import Tensor
 
 from engine.clip_files.anchor_record import AnchorRecord, StoredAnchors
-from engine.clip_files.array_names import DECODER, FIELD
+from engine.clip_files.array_names import DECODER, FIELD, MOVING_DECODER
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.roles import ROLES, STATIC
 from engine.errors import ProjectError
@@ -26,17 +26,18 @@ def inherit(
     *,
     is_trainable: bool = False,
     hidden: dict[str, Tensor] | None = None,
-) -> tuple[dict[str, AnchorSet], Decoder]:
-    """Anchor sets and frozen decoder of a reference clip. Copies, so that nothing learned reaches the reference.
+) -> tuple[dict[str, AnchorSet], Decoder, Decoder | None]:
+    """What a clip takes over from a reference clip. Copies, so that nothing learned reaches the reference.
 
     Args:
         reference: A finished reference clip.
         presence: Gate in time of dynamic sets in the clip that inherits; sets without one are left out. [A, M] bool
         is_trainable: Whether the anchors keep learning (an ablation; they are stored with the clip then).
         hidden: Rows that are left out, by role. [A] bool
+    Returns:
+        Anchor sets, heads, and those of still parts where they are others; heads are frozen.
     """
-    decoder = _read_decoder(reference)
-    decoder.requires_grad_(requires_grad=False)
+    decoder, still_decoder = _read_decoders(reference)
     sets = {}
     for role, anchors in _read_sets(reference, is_trainable=is_trainable).items():
         if anchors.presence is not None:
@@ -46,7 +47,7 @@ def inherit(
         if hidden and role in hidden:
             anchors = anchors.subset(~hidden[role])
         sets[role] = anchors
-    return sets, decoder
+    return sets, decoder.requires_grad_(requires_grad=False), still_decoder
 
 
 def load_clip_model(
@@ -88,7 +89,7 @@ def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBacken
     light: Tensor | None = None
     if state.is_reference:
         sets = _read_sets(state, is_trainable=True)
-        decoder = _read_decoder(state)
+        decoder, still_decoder = _read_decoders(state)
     else:
         if reference is None:
             raise ProjectError(f"Clip {header.clip_index} inherits from a missing reference clip.")
@@ -101,12 +102,15 @@ def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBacken
         records = state.anchors.items()
         hidden = {role: _tensor(record.is_hidden) for role, record in records if record.is_hidden is not None}
         presence = {role: _tensor(record.presence) for role, record in records if record.presence is not None}
-        inherited, decoder = inherit(reference, presence, hidden=hidden)
+        inherited, decoder, still_decoder = inherit(reference, presence, hidden=hidden)
         light = _read_light(state, reference)
         sets = inherited | _read_sets(state, is_trainable=True)
         sets = {role: sets[role] for role in ROLES if role in sets}
-        if any(name.startswith(DECODER) for name in state.arrays):  # it continued learning in this clip
-            decoder = _read_decoder(state)
+        if _has(state, DECODER):  # all heads continued learning in this clip
+            decoder, still_decoder = _read_decoders(state)
+        elif _has(state, MOVING_DECODER):
+            still_decoder = still_decoder or decoder
+            decoder = _read_decoder(state, MOVING_DECODER)
     model = ClipModel(
         sets=sets,
         decoder=decoder,
@@ -116,7 +120,12 @@ def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBacken
         backend=backend,
         light=light,
         hidden=hidden,
+        still_decoder=still_decoder,
+        own_heads=[prefix for prefix in (DECODER, MOVING_DECODER) if _has(state, prefix)],
     )
+    if still_decoder is not None:  # they learned to the end, and are drawn by heads that no longer learn
+        for anchors in sets.values():
+            anchors.requires_grad_(requires_grad=anchors.is_dynamic and anchors.is_trainable)
     model.reasons = _reasons(state, reference, model)
     return model
 
@@ -163,9 +172,21 @@ def _read_set(stored: StoredAnchors, *, is_trainable: bool) -> AnchorSet:
     )
 
 
-def _read_decoder(state: ClipState) -> Decoder:
+def _read_decoders(state: ClipState) -> tuple[Decoder, Decoder | None]:
+    """The heads of a clip that stores some, and the frozen ones of its still parts where they are others."""
+    decoder = _read_decoder(state, DECODER)
+    if not _has(state, MOVING_DECODER):
+        return decoder, None
+    return _read_decoder(state, MOVING_DECODER), decoder.requires_grad_(requires_grad=False)
+
+
+def _has(state: ClipState, prefix: str) -> bool:
+    return any(name.startswith(prefix) for name in state.arrays)
+
+
+def _read_decoder(state: ClipState, prefix: str) -> Decoder:
     decoder = Decoder(**asdict(state.header.decoder))
-    decoder.load_state_dict(_strip(state.arrays, DECODER))
+    decoder.load_state_dict(_strip(state.arrays, prefix))
     return decoder
 
 

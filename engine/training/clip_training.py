@@ -205,7 +205,7 @@ class ClipTraining:
     def _start_phase(self, index: int, steps_in_phase: int, reaches: dict[str, Tensor] | None = None) -> None:
         name, n_steps = self.phases[index]
         if name == "moving":
-            self.model.freeze_still_parts()
+            self.model.freeze_still_parts(learns_heads=self.config.learns_moving_heads)
             self._cameras.freeze()
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains and name != "moving")
@@ -490,8 +490,11 @@ class ClipTraining:
             )
         )
         self._learn_positions()
+        heads = (
+            DECODER if self.model.still_decoder is None else learning[0]
+        )  # those of all parts are stored from now on
         for name, parameter in self.model.named_parameters():
-            if not name.startswith((DECODER, *learning)):  # heads that learn are stored from now on
+            if not name.startswith((heads, *learning)):
                 parameter.requires_grad = False
         self.phases, self.steps_done = [("source", n_steps)], 0
         self._start_phase(0, 0)

@@ -117,11 +117,12 @@ class TrainConfig(msgspec.Struct, frozen=True):
             MODEL,
             "Hash tables of the field.",
             {
+                "graded": "one for all frames, in which the finer a level is, the more frames share its entries",
                 "shared": "one for all frames, with time as fourth coordinate, as published",
                 "per_frame": "one for every frame, of which a step touches one",
             },
         ),
-    ] = "shared"
+    ] = "graded"
 
     field_form: Annotated[
         str,
@@ -244,8 +245,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
     joint_steps: Annotated[
         int,
         _steps(
-            "Steps of the reference clip after that, in the last three of seven of which still parts and decoder no "
-            f"longer learn; {JOINT_RULE.text('training picture')}.",
+            "Steps of the reference clip after that, in the last three of seven of which still parts no longer learn; "
+            f"{JOINT_RULE.text('training picture')}.",
             "Joint steps",
         ),
     ] = 0
@@ -364,14 +365,15 @@ class TrainConfig(msgspec.Struct, frozen=True):
         str,
         _choice(
             SHARING,
-            "Heads of the reference clip in a source clip.",
+            "Heads of the decoder once still parts have learned: at the end of a reference clip, and in source clips.",
             {
-                "frozen": "as they are",
+                "moving": "those of moving parts keep learning, unless still parts do or clips continue each other",
+                "frozen": "all are kept",
                 "finetune": "they keep learning in every source clip",
                 "new": "they start afresh in every source clip",
             },
         ),
-    ] = "frozen"
+    ] = "moving"
     residual: Annotated[
         str,
         _choice(
@@ -432,7 +434,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
                 "independent clips cannot continue each other's field.", hint="Leave out field=continue."
             )
         changed = self.difference()
-        shared = [name for name in ("decoder", "residual", "inherit") if changed.get(name, "frozen") != "frozen"]
+        kept = ("frozen", "moving")
+        shared = [name for name in ("decoder", "residual", "inherit") if changed.get(name, "frozen") not in kept]
         if self.independent and shared:
             listed = ", ".join(f"{name}={getattr(self, name)}" for name in shared)
             raise ProjectError(
@@ -463,7 +466,12 @@ class TrainConfig(msgspec.Struct, frozen=True):
     @property
     def keeps_static(self) -> bool:
         """Whether a source clip shows the reference clip's static anchors exactly as they are there."""
-        return self.inherit in ("frozen", "moving") and self.decoder == "frozen"
+        return self.inherit in ("frozen", "moving") and self.decoder in ("frozen", "moving")
+
+    @property
+    def learns_moving_heads(self) -> bool:
+        """Whether the heads of moving parts keep learning where still parts no longer do."""
+        return self.decoder == "moving" and self.keeps_static and not self.follows_previous
 
     @property
     def follows_previous(self) -> bool:

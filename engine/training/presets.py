@@ -74,6 +74,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "volume_weight": 0.01,
         "max_gradient_norm": 0.0,
         "inherit": "frozen",
+        "decoder": "frozen",
+        "field_tables": "shared",
         "gate": "off",
         "tiles": "all",
         "storage": "exact",

@@ -50,6 +50,7 @@ def part_of(model: ClipModel, content: str) -> ClipModel:
                 backend=model.backend,
                 light=None if wants_dynamic else model.light,
                 hidden=model.hidden,
+                still_decoder=model.still_decoder,
             )
         case _:
             return model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from engine.clip_files.array_names import DECODER, FIELD, GAINS, TABLES, is_said_of_anchors, own_kind
+from engine.clip_files.array_names import DECODER, FIELD, GAINS, MOVING_DECODER, TABLES, is_said_of_anchors, own_kind
 from engine.clip_files.clip_state import read_clip_metadata, reason_of
 from engine.errors import ProjectError
 from engine.storage.array_files import ArraysError
@@ -18,7 +18,13 @@ _OWN_COMPONENTS = {
     "presence": "presence",
 }
 """Arrays of anchors to the name of the component."""
-_PREFIXES = {TABLES: "field tables", FIELD: "field network", DECODER: "decoder", GAINS: "gains"}
+_PREFIXES = {
+    TABLES: "field tables",
+    FIELD: "field network",
+    DECODER: "decoder",
+    MOVING_DECODER: "decoder",
+    GAINS: "gains",
+}
 """How the names of other arrays begin; the first that fits counts."""
 OTHER = "other arrays"
 HEADER = "header"

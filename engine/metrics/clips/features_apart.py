@@ -43,4 +43,5 @@ def with_features(model: ClipModel, features: Features) -> ClipModel:
         backend=model.backend,
         light=model.light,
         hidden=model.hidden,
+        still_decoder=model.still_decoder,
     )

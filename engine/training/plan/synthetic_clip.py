@@ -35,7 +35,7 @@ class ClipRecipe:
         motion_share: Share of the picture's width and height, around its middle, in which the moving ones are.
         gaussians_per_anchor: K.
         width, height: Picture, pixels.
-        is_source: Heads and static anchors frozen, as in a source clip; else everything learns.
+        is_source: Static anchors frozen, and heads as in a source clip; else everything learns.
     """
 
     n_anchors: int
@@ -76,10 +76,12 @@ def make_clip(
     if recipe.n_anchors > n_static:
         sets[role] = _anchors(recipe, recipe.n_anchors - n_static, config, generator, is_moving=True)
     if recipe.is_source:
-        decoder.requires_grad_(requires_grad=False)
         for anchors in sets.values():
             anchors.requires_grad_(requires_grad=anchors.is_dynamic)
     model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=N_FRAMES, n_frames=N_FRAMES, backend=backend)
+    if recipe.is_source:
+        learns_heads = config.learns_moving_heads and recipe.n_anchors > n_static
+        model.freeze_still_parts(learns_heads=learns_heads)
     fit_field(model, spacing=8.0 * _LEVELS_SPACING, config=config, generator=generator)
     with torch.no_grad():
         for table in [] if model.field is None else model.field.tables:  # away from its start of nearly zero

@@ -50,7 +50,13 @@ def static_model(
     return _without_field(sets, decoder, clip, backend)
 
 
-def _without_field(sets: dict[str, AnchorSet], decoder: Decoder, clip: Clip, backend: ModelBackend) -> ClipModel:
+def _without_field(
+    sets: dict[str, AnchorSet],
+    decoder: Decoder,
+    clip: Clip,
+    backend: ModelBackend,
+    still_decoder: Decoder | None = None,
+) -> ClipModel:
     return ClipModel(
         sets=sets,
         decoder=decoder,
@@ -58,6 +64,7 @@ def _without_field(sets: dict[str, AnchorSet], decoder: Decoder, clip: Clip, bac
         clip_length=clip.clip_length,
         n_frames=clip.n_frames,
         backend=backend,
+        still_decoder=still_decoder,
     )
 
 
@@ -108,8 +115,8 @@ def inheriting_model(reference: ClipState, clip: Clip, backend: ModelBackend, *,
         for role, record in reference.anchors.items()
         if record.own is not None and record.own.presence is not None
     }
-    sets, decoder = inherit(reference, presence, is_trainable=learns)
-    return _without_field(sets, decoder, clip, backend)
+    sets, decoder, still_decoder = inherit(reference, presence, is_trainable=learns)
+    return _without_field(sets, decoder, clip, backend, still_decoder)
 
 
 def moving_anchors(
@@ -226,6 +233,13 @@ def adapt_moving(model: ClipModel, *, all_of_them: bool = False) -> None:
     model.replace_sets({role: model.anchor_set(role) for role in model.roles() if role != "moving"})
     if is_used.any():
         model.add_set("adapted", moving.subset(is_used, is_trainable=True))
+
+
+def adapt_heads(model: ClipModel) -> None:
+    """Heads of what moves keep learning in a source clip in which something moves."""
+    presences = [model.anchor_set(role).presence for role in model.roles()]
+    if any(presence is not None and bool(presence.any()) for presence in presences):
+        model.freeze_still_parts(learns_heads=True)
 
 
 def _residual_budget(presence: np.ndarray, n_used: int, config: TrainConfig) -> tuple[int, str]:

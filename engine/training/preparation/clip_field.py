@@ -11,28 +11,25 @@ from engine.clip_files.clip_header import FieldShape
 from engine.errors import PreparationError
 from engine.model.clip_model import ClipModel
 from engine.model.field import SpatioTemporalField
-from engine.model.field_sizes import derive_cells, derive_log2_entries
+from engine.model.field_sizes import derive_cells, derive_log2_entries, derive_strides
 from engine.training.config import TrainConfig
 
 _MOST_LOG2 = 20
 """log2 of the most table entries where every anchor is in the field, so that each has as many as with the gate."""
 
 
-def fit_field(
-    model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator, is_shared: bool = True
-) -> str:
+def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator) -> str:
     """Attach a fresh field over the dynamic anchors alive in this clip; none when nothing moves. Says its size.
 
     Args:
         spacing: Distance between moving anchors, scene units.
-        is_shared: Whether all frames share one table; else every frame has its own.
     Raises:
         PreparationError: Its tables would be too large.
     """
     positions, most_alive = _alive_positions(model), n_alive(model)
     if len(positions) == 0:
         return "no field: nothing moves in this clip"
-    is_published = config.field_form == "published"
+    is_published, is_shared = config.field_form == "published", config.field_tables != "per_frame"
     # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
     ends = (0.0, 1.0) if is_published else (0.005, 0.995)
     lower, upper = (positions.quantile(end, dim=0) for end in ends)
@@ -61,6 +58,7 @@ def fit_field(
         bounds_min=(x, y, z),
         side=side,
         is_shared=is_shared,
+        strides=derive_strides(len(cells), model.n_frames) if config.field_tables == "graded" else (),
         aspect=tuple(sides.tolist()) if is_published else (1.0, 1.0, 1.0),
         is_rectified=is_published,
     )

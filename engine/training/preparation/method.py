@@ -18,7 +18,7 @@ from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.training.config import TrainConfig
-from engine.training.preparation.building import ResidualAnchors, adapt_moving, uncovered_points
+from engine.training.preparation.building import ResidualAnchors, adapt_heads, adapt_moving, uncovered_points
 from engine.training.preparation.clip_field import fit_field
 from engine.training.preparation.gating import decide
 
@@ -47,10 +47,10 @@ class Method:
     def words(self, config: TrainConfig) -> str:
         """How a source clip treats the parts that it takes over, in one line."""
         moving = ", moving ones keep learning" if config.inherit == "moving" else ""
-        return f"inherited anchors kept{moving}, decoder kept"
+        return f"inherited anchors kept{moving}, decoder kept for still parts"
 
     def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
-        """The heads of a source clip: those of the reference clip, as they are.
+        """The heads that a source clip starts with: those of the reference clip, as they are.
 
         Args:
             model: With the heads of the reference clip.
@@ -76,9 +76,10 @@ class Method:
         return uncovered_points(cloud, is_new, n_used, config)
 
     def adapt(self, model: ClipModel, config: TrainConfig) -> None:
-        """The inherited moving anchors that become the clip's own: with inherit=moving those that exist in it."""
+        """What becomes the clip's own: the moving anchors that exist in it, with inherit=moving, and heads for them."""
         if config.inherit == "moving":
             adapt_moving(model)
+        adapt_heads(model)
 
     def gate(
         self, model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool

@@ -19,8 +19,7 @@ from engine.model.clip_model import ClipModel, decoder_shape
 from engine.model.decoder import Decoder
 from engine.model.reading import read_field
 from engine.training.config import TrainConfig
-from engine.training.preparation.building import ResidualAnchors, adapt_moving
-from engine.training.preparation.clip_field import fit_field
+from engine.training.preparation.building import ResidualAnchors, adapt_heads, adapt_moving
 from engine.training.preparation.method import Method
 
 _FINAL_RATIOS = {
@@ -47,7 +46,7 @@ def method_of(config: TrainConfig, *, previous: ClipState | None) -> Method:
 
 def _is_product(config: TrainConfig) -> bool:
     default = TrainConfig()
-    names = ["gate", "tiles", "decoder", "residual", "field_tables", "field_form", "initial", *_FINAL_RATIOS.values()]
+    names = ["gate", "tiles", "decoder", "residual", "field_form", "initial", *_FINAL_RATIOS.values()]
     is_default = all(getattr(config, name) == getattr(default, name) for name in names)
     return is_default and config.inherit in ("frozen", "moving") and config.field != "continue"
 
@@ -60,7 +59,7 @@ class VariantMethod(Method):
     """
 
     def __init__(self, config: TrainConfig) -> None:
-        self._gate, self._tables = config.gate, config.field_tables
+        self._gate, self._learns_moving_heads = config.gate, config.learns_moving_heads
         self._inherit, self._decoder, self._residual = config.inherit, config.decoder, config.residual
         self._is_plain = config.initial == "published"
         self._field_goes_on = config.field == "continue"
@@ -78,18 +77,22 @@ class VariantMethod(Method):
             "trainable": "learning",
             "off": "left out",
         }
-        heads = {"frozen": "kept", "finetune": "learning", "new": "new"}
-        return f"inherited anchors {anchors[self._inherit]}, decoder {heads[self._decoder]}"
+        heads = {"frozen": "kept", "moving": "kept", "finetune": "learning", "new": "new"}[self._decoder]
+        heads = "learning for what moves" if self._learns_moving_heads else heads
+        return f"inherited anchors {anchors[self._inherit]}, decoder {heads}"
 
     def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
-        """New heads have their own generator: other random starts are the same for any choice."""
+        """New heads have their own generator: other random starts are the same for any choice. Where still parts learn
+        or have other heads than before, all parts have one set of heads."""
+        if self._decoder in ("finetune", "new") or self.learns_inherited or self.builds_static:
+            model.unite_heads()
         if self._decoder == "new":
             model.decoder = Decoder(
                 **asdict(decoder_shape(model.decoder)),
                 generator=torch.Generator().manual_seed(seed),
                 is_plain=self._is_plain,
             ).to(model.backend.device, model.backend.dtype)
-        model.decoder.requires_grad_(self._decoder != "frozen")
+        model.decoder.requires_grad_(self._decoder in ("finetune", "new"))
 
     def covering(self, model: ClipModel) -> list[str]:
         """gate=off: every inherited anchor has a dynamic feature."""
@@ -108,6 +111,8 @@ class VariantMethod(Method):
     def adapt(self, model: ClipModel, config: TrainConfig) -> None:
         if self._inherit == "moving":  # which a clip that continues from the one before does not do, whatever is set
             adapt_moving(model, all_of_them=self._gate in ("off", "static"))
+        if self._learns_moving_heads:
+            adapt_heads(model)
 
     def gate(
         self, model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool
@@ -136,8 +141,7 @@ class VariantMethod(Method):
     ) -> str:
         if self._field_goes_on and previous is not None and previous.header.field:
             return _continue_field(model, previous, clip)
-        is_shared = self._tables == "shared"
-        return fit_field(model, spacing=spacing, config=config, generator=generator, is_shared=is_shared)
+        return super().attach_field(model, clip, config, spacing=spacing, previous=previous, generator=generator)
 
     def final_ratios(self, names: Iterable[str], config: TrainConfig) -> dict[str, float]:
         own = {

@@ -38,7 +38,7 @@ def reference() -> tuple[ClipModel, ClipState]:
 def source(state: ClipState, *, adapted: bool = False) -> tuple[ClipModel, ClipState]:
     """A clip that inherits all of it, with one residual anchor; its moving anchors learn on if wanted."""
     presence = torch.ones(3, CLIP_LENGTH, dtype=torch.bool)
-    sets, decoder = inherit(state, {"moving": presence})
+    sets, decoder, _ = inherit(state, {"moving": presence})
     if adapted:
         sets["adapted"] = sets.pop("moving").subset(torch.ones(3, dtype=torch.bool), is_trainable=True)
     sets["residual"] = AnchorSet.from_cloud(

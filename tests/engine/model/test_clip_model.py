@@ -86,7 +86,7 @@ def state_of(model: ClipModel, *, role: str, clip_index: int = 0, reference: Cli
 
 def make_source(reference: ClipState) -> ClipModel:
     inherited = torch.ones(10, N_FRAMES, dtype=torch.bool)
-    sets, decoder = inherit(reference, {"moving": inherited})
+    sets, decoder, still_decoder = inherit(reference, {"moving": inherited})
     sets["residual"] = make_anchors(5, seed=7, presence=torch.ones(5, N_FRAMES, dtype=torch.bool))
     return ClipModel(
         sets=sets,
@@ -95,6 +95,7 @@ def make_source(reference: ClipState) -> ClipModel:
         clip_length=N_FRAMES,
         n_frames=N_FRAMES,
         backend=backend_called("cpu"),
+        still_decoder=still_decoder,
     )
 
 
@@ -168,6 +169,61 @@ def test_constant_sets_are_decoded_once_and_equal_the_plain_decode():
     assert not learning.is_constant("static")
     plain = learning.decode(0.0, {"static": rows["static"], "moving": rows["moving"]})
     assert torch.allclose(cached.means, plain.means, atol=1e-6)  # the same sums in another order
+
+
+def with_own_heads(model: ClipModel, change: float) -> ClipModel:
+    """The same, after the heads of what moves have learned something."""
+    model.freeze_still_parts(learns_heads=True)
+    with torch.no_grad():
+        for parameter in model.decoder.parameters():
+            parameter.add_(change)
+    return model
+
+
+def test_heads_of_what_moves_learn_apart_and_leave_still_parts_to_the_bit():
+    model = make_reference()
+    before = model.static_gaussians("static")
+    moving = model.decode(0.0)[20 * K :]
+    with_own_heads(model, 0.1)
+    after = model.decode(0.0)
+    assert model.is_constant("static")
+    for ours, theirs in zip(before.tensors(), after[: 20 * K].tensors(), strict=True):
+        assert torch.equal(ours, theirs)
+    assert (moving.colors - after[20 * K :].colors).abs().max() > 0.01
+    learning = {name.split(".")[0] for name, parameter in model.named_parameters() if parameter.requires_grad}
+    assert learning == {"sets", "decoder", "field"}
+    assert not any(parameter.requires_grad for parameter in model.anchor_set("static").parameters())
+
+
+@pytest.mark.parametrize("is_learning", [False, True])
+def test_both_sets_of_heads_come_back_from_a_file_and_reach_later_clips(is_learning):
+    model = with_own_heads(make_reference(), 0.1)
+    state = state_of(model, role="reference")
+    again = load_clip_model(state, None, backend=backend_called("cpu"), is_learning=is_learning)
+    assert again.own_arrays().keys() == model.own_arrays().keys()
+    source = with_own_heads(make_source(state), -0.2)
+    assert not any(name.startswith("decoder.") for name in source.own_arrays())
+    stored = state_of(source, role="source", clip_index=1, reference=state)
+    read = load_clip_model(stored, state, backend=backend_called("cpu"), is_learning=is_learning)
+    assert read.own_arrays().keys() == source.own_arrays().keys()
+    for ours, theirs in ((model, again), (source, read)):
+        for mine, other in zip(ours.decode(0.25).tensors(), theirs.decode(0.25).tensors(), strict=True):
+            assert torch.equal(mine, other)
+    for mine, other in zip(model.decode(0.25)[: 20 * K].tensors(), read.decode(0.25)[: 20 * K].tensors(), strict=True):
+        assert torch.equal(mine, other)  # still parts are those of the reference clip
+
+
+def test_united_heads_are_those_of_still_parts_and_stored_with_the_clip():
+    state = state_of(with_own_heads(make_reference(), 0.1), role="reference")
+    source = make_source(state)
+    assert not any("decoder." in name for name in source.own_arrays())  # both are inherited
+    source.unite_heads()
+    stored = state_of(source, role="source", clip_index=1, reference=state)
+    assert any(name.startswith("decoder.") for name in stored.arrays)
+    assert not any(name.startswith("moving_decoder.") for name in stored.arrays)
+    read = load_clip_model(stored, state, backend=backend_called("cpu"))
+    for mine, other in zip(source.decode(0.25).tensors(), read.decode(0.25).tensors(), strict=True):
+        assert torch.equal(mine, other)
 
 
 def test_a_source_clip_refuses_a_missing_or_another_reference():

@@ -60,3 +60,12 @@ def test_a_shared_table_at_knot_zero_is_that_of_space():
     at_zero, later = (encode(table, torch.arange(20), corners, keys[knot]) for knot in (0, 3))
     assert torch.equal(at_zero, encode(table, torch.arange(20), corners))
     assert not torch.equal(later, at_zero)
+
+
+def test_frames_that_a_level_does_not_tell_apart_have_one_key_and_others_different_ones():
+    keys = time_keys((2, 3, 30), 256, 10, (1, 2, 5)).numpy()
+    assert len(set(keys[:, 0].tolist())) == 10
+    assert [len(set(keys[frame : frame + 2, 1].tolist())) for frame in range(0, 10, 2)] == [1] * 5
+    assert [len(set(keys[frame : frame + 5, 2].tolist())) for frame in (0, 5)] == [1, 1]
+    assert keys[0, 2] != keys[5, 2]
+    assert np.array_equal(time_keys((2, 3, 30), 256, 10, (1, 1, 1)).numpy(), time_keys((2, 3, 30), 256, 10).numpy())

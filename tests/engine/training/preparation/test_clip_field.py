@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 import torch
+from msgspec.structs import replace
 
 from engine.backends.table import backend_called
 from engine.errors import PreparationError
@@ -41,5 +42,6 @@ def test_a_long_clip_has_a_field_of_the_published_size():
 
 
 def test_tables_of_every_frame_that_are_too_large_are_refused():
+    config = replace(PUBLISHED, field_tables="per_frame")
     with pytest.raises(PreparationError, match="field of 300 frames would have more than"):
-        fit_field(long_clip(), spacing=0.1, config=PUBLISHED, generator=torch.Generator(), is_shared=False)
+        fit_field(long_clip(), spacing=0.1, config=config, generator=torch.Generator())

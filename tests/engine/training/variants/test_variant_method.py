@@ -36,7 +36,6 @@ def test_numbers_and_which_clips_there_are_leave_the_method_as_it_is(settings):
         {"decoder": "new"},
         {"decoder": "finetune"},
         {"field": "continue"},
-        {"field_tables": "per_frame"},
         {"field_form": "published"},
         {"initial": "published"},
     ],
