@@ -568,6 +568,8 @@ class ClipTraining:
             vignetting=vignetting,
         )
         self._take(parts)
+        if self._base is not None and not self.method.learns_heads:  # stored, since they are not the reference clip's
+            self.model.decoder.requires_grad_(requires_grad=False)
         self.phases = list(place.phases)
         self.steps_done = header.step
         reaches = {role: self._tensor(reach) for role, reach in kept.reaches.items()}

@@ -1,9 +1,9 @@
 """Pictures and truth of the sample scene by ray casting triangles with Open3D. No Gaussian is involved.
 
-A picture takes supersampling^2 rays per pixel, shades each hit (Lambert with an area lamp, ambient light) in linear
-light, averages and encodes. Still parts are cast once per camera and set of present parts; moving parts are cast
-per frame inside the rectangle they can cover, and win where they are nearer. Still parts cast shadows; moving ones
-receive them but cast none, which keeps static pixels truly static.
+A picture takes supersampling^2 rays per pixel, shades each hit (Lambert with an area lamp, ambient light, highlights
+of glossy parts) in linear light, averages and encodes. Still parts are cast once per camera and set of present parts;
+moving parts are cast per frame inside the rectangle they can cover, and win where they are nearer. Still parts cast
+shadows; moving ones receive them but cast none, which keeps static pixels truly static.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ LAMP = 0.85
 """Light of the lamp on a surface that faces it at LAMP_DISTANCE."""
 LAMP_DISTANCE = 2.2
 """Scene units at which the lamp gives LAMP. It falls off gently, as in a room with bright walls."""
+HIGHLIGHT_POWER = 60
+"""Of the cosine between normal and half-way vector: normals within 9 degrees of it get half of the light or more."""
 GAMMA = 2.2
 """Display encoding: encoded = linear ** (1 / GAMMA)."""
 
@@ -244,6 +246,9 @@ class _MeshCaster:
             albedo = part.texture((points - pose[:3, 3]) @ pose[:3, :3], normals @ pose[:3, :3])
             shade = _shade(points, normals, lamp[is_here], shadow)
             light[is_here] = np.clip(albedo, 0, 1) ** GAMMA * shade[:, None]
+            if part.gloss > 0:
+                highlight = _highlight(points, normals, lamp[is_here], rays[is_here, :3], shadow)
+                light[is_here] += part.gloss * highlight[:, None]
         return _Samples(found.depths, found.part_indices, light)
 
     def is_blocked(self, points: np.ndarray, towards: np.ndarray) -> np.ndarray:
@@ -260,6 +265,17 @@ def _shade(points: np.ndarray, normals: np.ndarray, lamp: np.ndarray, shadow: _M
     is_blocked = shadow.is_blocked(points + 2e-3 * normals, lamp)
     ambient = AMBIENT * (0.9 + 0.1 * normals[:, 2])
     return ambient + LAMP * np.where(is_blocked, 0.0, facing) * (LAMP_DISTANCE / (LAMP_DISTANCE * 0.4 + 0.6 * distance))
+
+
+def _highlight(
+    points: np.ndarray, normals: np.ndarray, lamp: np.ndarray, eyes: np.ndarray, shadow: _MeshCaster
+) -> np.ndarray:
+    """Share of the lamp that a glossy surface reflects towards each eye, after Blinn and Phong. [P] in 0..1"""
+    to_lamp, to_eye = (away / np.linalg.norm(away, axis=-1, keepdims=True) for away in (lamp - points, eyes - points))
+    halfway = to_lamp + to_eye
+    cosine = (normals * halfway).sum(-1) / np.maximum(np.linalg.norm(halfway, axis=-1), 1e-9)
+    is_lit = ((normals * to_lamp).sum(-1) > 0) & ~shadow.is_blocked(points + 2e-3 * normals, lamp)
+    return np.where(is_lit, np.maximum(cosine, 0.0) ** HIGHLIGHT_POWER, 0.0)
 
 
 def _lamp_points(rows: np.ndarray, supersampling: int, rays_per_row: int) -> np.ndarray:

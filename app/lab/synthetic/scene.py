@@ -42,6 +42,7 @@ class Part:
         texture: Albedo over object space.
         pose: frame_index -> object-to-world map [4, 4], or None while the part is not in the scene.
         is_moving: Whether its pose changes while it is there.
+        gloss: Light in the middle of the lamp's highlight, which moves with the viewer; 0 is matt.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Part:
     texture: Texture
     pose: Callable[[int], np.ndarray | None]
     is_moving: bool = False
+    gloss: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

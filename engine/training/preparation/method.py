@@ -28,6 +28,7 @@ class Method:
 
     Attributes:
         learns_inherited: Whether all inherited anchors keep learning; they are stored with the clip then.
+        learns_heads: Whether heads learn in a source clip, all or those of what moves.
         builds_static: Whether a source clip has its own static anchors in place of all inherited ones.
         obeys_regions: Whether regions that the user marks count.
         has_active_tiles: Whether a step of a source clip may leave out tiles that nothing learning touches.
@@ -35,6 +36,7 @@ class Method:
     """
 
     learns_inherited = False
+    learns_heads = True
     builds_static = False
     obeys_regions = True
     has_active_tiles = True

@@ -60,6 +60,7 @@ class VariantMethod(Method):
 
     def __init__(self, config: TrainConfig) -> None:
         self._gate, self._learns_moving_heads = config.gate, config.learns_moving_heads
+        self.learns_heads = config.decoder in ("finetune", "new") or config.learns_moving_heads
         self._inherit, self._decoder, self._residual = config.inherit, config.decoder, config.residual
         self._is_plain = config.initial == "published"
         self._field_goes_on = config.field == "continue"

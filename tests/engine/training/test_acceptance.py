@@ -189,7 +189,8 @@ def test_6_a_still_scene_changes_at_the_border_about_as_much_as_inside_without_t
     """
     slow = {"table_lr": 0.04, "field_mlp_lr": 8e-3, "feature_lr": 7.5e-3, "scale_lr": 7e-3, "final_lr_ratio": 0.02}
     steps = {"joint_steps": 40, "source_steps": 60}  # too few for the rates of the defaults
-    pairs = flicker_of_still_clips(tiny, tmp_path, gate="off", inherit="frozen", **steps, **slow)
+    shared = {"inherit": "frozen", "decoder": "frozen", "field_tables": "shared"}
+    pairs = flicker_of_still_clips(tiny, tmp_path, gate="off", **shared, **steps, **slow)
     ratios = []
     for camera in {pair.camera for pair in pairs}:
         changes = [(pair.is_boundary, pair.change_static or 0.0) for pair in pairs if pair.camera == camera]

@@ -24,6 +24,7 @@ from engine.model.reading import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.phases import phase_at
 from engine.training.preparation.method import Method
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
@@ -124,6 +125,11 @@ def test_gains_learn_in_the_reference_clip_and_are_kept_in_the_next(tiny, tmp_pa
     assert np.array_equal(source.gains.detach().numpy(), learned)
 
 
+def of_reference(setting):
+    """The reference clip as it is shown."""
+    return load_clip_model(setting.reference, None, backend=backend_called("cpu"))
+
+
 def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_untouched(setting, source):
     before = {name: array.copy() for name, array in setting.reference.arrays.items()}
     training = source()
@@ -132,10 +138,13 @@ def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_unt
     state = finish(training)
     assert "sets.residual.positions" in state.arrays  # an object appears in clip 1
     assert not any(name.startswith(("decoder.", "sets.static")) for name in state.arrays)
+    assert any(name.startswith("moving_decoder.") for name in state.arrays)  # those of still parts are inherited
     model = training.model
     for name in ("positions", "features", "log_base_scales", "log_offset_scales"):
         kept = getattr(model.anchor_set("static"), name).detach().numpy()
         assert np.array_equal(kept, before[f"sets.static.{name}"]), name
+    shown, as_before = model.constant_gaussians("static"), of_reference(setting).constant_gaussians("static")
+    assert all(torch.equal(*pair) for pair in zip(shown.tensors(), as_before.tensors(), strict=True))
     # moving anchors that the clip uses go on in a set of its own
     places = {tuple(place) for place in before["sets.moving.positions"]}
     assert {tuple(place) for place in model.anchor_set("adapted").positions.numpy()} < places
@@ -221,14 +230,17 @@ def test_a_fault_among_many_steps_leaves_what_was_before_it(source, tmp_path):
     assert kept[0] == kept[1]
 
 
-def test_resuming_in_the_static_phase_goes_through_the_change_of_phase(tiny, tmp_path):
-    settings = {"is_source": False, "static_steps": 4, "joint_steps": 4, "prep_dir": tmp_path}
-    stopped = take_steps(tiny.prepared(0, **settings), 2)
+@pytest.mark.parametrize(("n_steps", "phase"), [(2, "static"), (6, "joint"), (10, "moving")])
+def test_resuming_in_any_phase_goes_through_the_changes_of_phase(tiny, tmp_path, n_steps, phase):
+    settings = {"is_source": False, "static_steps": 4, "joint_steps": 7, "prep_dir": tmp_path}
+    stopped = take_steps(tiny.prepared(0, **settings), n_steps)
+    assert phase_at(stopped.phases, n_steps - 1)[0] == ["static", "joint", "moving"].index(phase)
     stopped.write_checkpoint(tmp_path / "kept.safetensors")
     resumed = tiny.training(0, **settings)
     resumed.restore_checkpoint(tmp_path / "kept.safetensors")
     assert finish(stopped).fingerprint == finish(resumed).fingerprint
     assert "moving" in resumed.model.roles()
+    assert any(name.startswith("moving_decoder.") for name in resumed.state().arrays)
 
 
 def test_a_checkpoint_of_another_clip_is_refused(setting, source, tmp_path):
