@@ -55,7 +55,7 @@ STORES = LEARNS | {
     "heads": {"residual", "field", "moving_decoder"},
     **{name: LEARNS[name] | {"decoder"} for name in ("trainable", "off", "both")},
 }
-"""Where what moves in the reference clip has heads of its own, clips that learn still parts store the heads of these."""
+"""Where what moves in the reference clip has heads of its own, clips that learn still parts store those of these."""
 
 
 def arguments_of(tiny: Tiny, name: str) -> dict:
