@@ -490,11 +490,10 @@ class ClipTraining:
             )
         )
         self._learn_positions()
-        heads = (
-            DECODER if self.model.still_decoder is None else learning[0]
-        )  # those of all parts are stored from now on
+        # heads of all parts learn with whatever does and are stored from now on; those of what moves learn if named
+        prefixes = learning if self.model.still_decoder is not None else (DECODER, *learning)
         for name, parameter in self.model.named_parameters():
-            if not name.startswith((heads, *learning)):
+            if not name.startswith(prefixes):
                 parameter.requires_grad = False
         self.phases, self.steps_done = [("source", n_steps)], 0
         self._start_phase(0, 0)
