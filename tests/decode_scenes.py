@@ -13,6 +13,7 @@ from engine.model.anchors import AnchorSet
 from engine.model.decoder import Decoder
 from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import SpatioTemporalField
+from engine.model.motion import AnchorMotion
 from engine.raster.gaussians import Gaussians
 
 PAPER: dict[str, Any] = {"features": 64, "hidden": 64, "k": 10}
@@ -52,15 +53,22 @@ class Scene:
         self.sets = {
             "static": self._anchors(n, features, spread, is_dynamic=False),
             "moving": self._anchors(n + 1, features, spread, is_dynamic=True),
-            "residual": self._anchors(n // 2, features, spread, is_dynamic=True),
+            "residual": self._anchors(n // 2, features, spread, is_dynamic=True, travels=True),
         }
 
-    def _anchors(self, n: int, features: int, spread: float, *, is_dynamic: bool) -> AnchorSet:
+    def _anchors(self, n: int, features: int, spread: float, *, is_dynamic: bool, travels: bool = False) -> AnchorSet:
         def random(*size: int) -> torch.Tensor:
             return torch.rand(*size, generator=self.generator)
 
         presence = torch.ones(n, 3, dtype=torch.bool) if is_dynamic else None
-        anchors = AnchorSet.from_cloud(random(n, 3), random(n, 3), spacing=0.1, feature_dim=features, presence=presence)
+        anchors = AnchorSet.from_cloud(
+            random(n, 3),
+            random(n, 3),
+            spacing=0.1,
+            feature_dim=features,
+            presence=presence,
+            motion=AnchorMotion(3 * random(n).round(), random(n, 3) - 0.5, 0.1 * random(n, 3)) if travels else None,
+        )
         with torch.no_grad():
             anchors.features.normal_(generator=self.generator).mul_(spread)
             anchors.log_offset_scales.add_(random(n, 3))
@@ -98,10 +106,16 @@ class Scene:
                 rows=rows[role],
                 corners=self.field.corners(anchors.positions.float()) if anchors.is_dynamic else None,
                 decoded=decoded if role == "static" else None,
+                moved=anchors.positions_at(moment(knots)) if anchors.travels else None,
             )
             for role, anchors in self.sets.items()
         ]
         return decode_anchors(chosen, self.decoder, self.field, knots, backend=backend_called(backend))
+
+
+def moment(knots: list) -> float:
+    """The frame, or the time between two, that knots stand for."""
+    return sum(knot * weight for knot, weight in knots)
 
 
 def backward(gaussians: Gaussians) -> None:

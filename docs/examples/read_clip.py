@@ -13,7 +13,8 @@ import numpy as np
 
 ROLES = ("static", "moving", "promoted", "residual", "adapted", "replacing")  # in the order in which they are decoded
 PRIMES = (1, 2654435761, 805459861, 3674653429)  # of x, y, z and time
-KINDS = ("positions", "color_logits", "features", "log_offset_scales", "log_base_scales", "presence")
+MOTION = ("birth_frames", "velocities", "accelerations")
+KINDS = ("positions", "color_logits", "features", "log_offset_scales", "log_base_scales", "presence", *MOTION)
 FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 6, "dict_size": 1 << 20, "lc": 0, "lp": 0, "pb": 0}]
 
 
@@ -81,6 +82,7 @@ def anchor_sets(header, arrays, reference):
         if header["role"] == "source" and not own:
             own = {kind: reference[f"sets.{role}.{kind}"] for kind in KINDS if f"sets.{role}.{kind}" in reference}
             if "presence" in own:  # frames of this clip in which each exists; a role that is not named is left out
+                own = {kind: array for kind, array in own.items() if kind not in MOTION}
                 own = own | {"presence": arrays[p]} if (p := f"inherited.{role}.presence") in arrays else {}
             hidden = arrays.get(f"inherited.{role}.is_hidden")
             if hidden is not None:
@@ -147,8 +149,12 @@ def decode(header, arrays, reference, frame_in_clip):
         if role == "static" and light is not None:
             weight = frame_in_clip / header["n_frames"]
             colors = colors * (np.exp(light) @ [1 - weight, weight])[:, None, None]
+        positions = anchors["positions"][rows]
+        if "velocities" in anchors:
+            since = frame_in_clip - anchors["birth_frames"][rows][:, None]
+            positions = positions + since * (anchors["velocities"][rows] + since * anchors["accelerations"][rows])
         part = (
-            anchors["positions"][rows][:, None] + offsets,
+            positions[:, None] + offsets,
             shape[..., 3:] / np.linalg.norm(shape[..., 3:], axis=-1, keepdims=True),
             np.exp(anchors["log_base_scales"][rows])[:, None] * sigmoid(shape[..., :3]),
             sigmoid(raw["opacity"].reshape(n, k, 1)),

@@ -76,6 +76,12 @@ def project(points: np.ndarray, projection: np.ndarray) -> tuple[np.ndarray, np.
     return homogeneous[:, :2] / safe[:, None], depths
 
 
+def image_jacobians(points: np.ndarray, projection: np.ndarray) -> np.ndarray:
+    """How pixels move with world points [P, 3] in front of the camera, px a scene unit. [P, 2, 3]"""
+    pixels, depths = project(points, projection)
+    return (projection[:2, :3] - pixels[:, :, None] * projection[2, :3]) / np.maximum(depths, 1e-9)[:, None, None]
+
+
 def pixel_rays(K: np.ndarray, width: int, height: int) -> np.ndarray:
     """Camera-space rays with z = 1 through every pixel centre. [H, W, 3]"""
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)

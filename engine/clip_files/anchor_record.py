@@ -25,6 +25,7 @@ class StoredAnchors:
         features: [A, F]
         log_offset_scales, log_base_scales: Log of scene units. [A, 3]
         presence: Frames in which each exists; None for static ones. [A, M] bool
+        birth_frames, velocities, accelerations: Of those that travel, see engine.model.motion.AnchorMotion; else None.
     """
 
     positions: np.ndarray
@@ -33,14 +34,18 @@ class StoredAnchors:
     log_offset_scales: np.ndarray
     log_base_scales: np.ndarray
     presence: np.ndarray | None = None
+    birth_frames: np.ndarray | None = None
+    velocities: np.ndarray | None = None
+    accelerations: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.positions)
 
     def joined(self, others: StoredAnchors) -> StoredAnchors:
-        """These anchors, and others of the same kind behind them."""
-        pairs = {kind: (array, getattr(others, kind)) for kind, array in self.named().items()}
-        return StoredAnchors(**{kind: np.concatenate(pair) for kind, pair in pairs.items()})
+        """These anchors, and others behind them. They travel if both do."""
+        own, more = self.named(), others.named()
+        shared = [kind for kind in own if kind in more]
+        return StoredAnchors(**{kind: np.concatenate([own[kind], more[kind]]) for kind in shared})
 
     def named(self) -> dict[str, np.ndarray]:
         """The arrays that there are, by attribute."""
@@ -48,6 +53,8 @@ class StoredAnchors:
 
 
 _KINDS = tuple(attribute.name for attribute in fields(StoredAnchors))
+_MOTION = ("birth_frames", "velocities", "accelerations")
+_OPTIONAL = ("presence", *_MOTION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +118,8 @@ def _record(role: str, found: Mapping[tuple[str, str], np.ndarray]) -> AnchorRec
 
 
 def _stored(role: str, own: Mapping[str, np.ndarray]) -> StoredAnchors:
-    missing = [kind for kind in _KINDS if kind not in own and kind != "presence"]
+    wanted = _KINDS if any(kind in own for kind in _MOTION) else [kind for kind in _KINDS if kind not in _OPTIONAL]
+    missing = [kind for kind in wanted if kind not in own]
     if missing:
         raise RecordError(f"its {role} anchors have no {missing[0]}")
     n_rows = {kind: len(array) for kind, array in own.items()}

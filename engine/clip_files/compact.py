@@ -20,7 +20,14 @@ from engine.clip_files.clip_state import ClipState, write_coded_arrays
 from engine.clip_files.coding import CodedArray, CodingError, decode_array, encode_array
 from engine.errors import NonFiniteLoss, ProjectError
 
-_BITS = {"features": 7, "color_logits": 7, "log_offset_scales": 6, "log_base_scales": 6}
+_BITS = {
+    "features": 7,
+    "color_logits": 7,
+    "log_offset_scales": 6,
+    "log_base_scales": 6,
+    "velocities": 8,
+    "accelerations": 7,
+}
 """Bits per value of what a source clip's own anchors hold."""
 _TABLE_BITS = 7
 _LIGHT_BITS = 8

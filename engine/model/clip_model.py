@@ -221,6 +221,10 @@ class ClipModel(nn.Module):
         frames = [knot for knot, _ in self.knots(clip_time)]
         return anchors.presence[:, frames].any(1).nonzero()[:, 0]
 
+    def positions(self, role: str, clip_time: float) -> Tensor:
+        """Where the anchors of a set are at a time of the clip. Scene units. [A, 3]"""
+        return self.anchor_set(role).positions_at(clip_time * self.clip_length)
+
     def _all_rows(self, role: str) -> Tensor:
         return torch.arange(len(self.anchor_set(role)), device=self.backend.device)
 
@@ -240,6 +244,7 @@ class ClipModel(nn.Module):
                 rows=self.alive(role, clip_time) if rows is None else rows[role],
                 corners=self._corners.get(role),
                 decoded=self.lit_gaussians(role, clip_time) if self.is_constant(role) else None,
+                moved=self.positions(role, clip_time) if self.anchor_set(role).travels else None,
             )
             for role in self.roles()
         ]
@@ -308,8 +313,9 @@ class ClipModel(nn.Module):
             anchors = self.anchor_set(role)
             rows = np.arange(len(anchors)) if clip_time is None else host_array(self.alive(role, clip_time))
             reasons = self.reasons.get(role)
+            places = anchors.positions if clip_time is None else self.positions(role, clip_time)
             shown = (
-                host_array(anchors.positions)[rows],
+                host_array(places)[rows],
                 np.full(len(rows), ROLES.index(role), np.uint8),
                 np.full(len(rows), NO_REASON, np.uint8) if reasons is None else reasons[rows],
             )
@@ -375,7 +381,7 @@ def _copy(tensor: Tensor) -> np.ndarray:
 
 
 def _stored(anchors: AnchorSet) -> StoredAnchors:
-    tensors = {attribute.name: getattr(anchors, attribute.name) for attribute in fields(StoredAnchors)}
+    tensors = {attribute.name: getattr(anchors, attribute.name, None) for attribute in fields(StoredAnchors)}
     return StoredAnchors(**{kind: _copy(tensor) for kind, tensor in tensors.items() if tensor is not None})
 
 

@@ -27,12 +27,19 @@ class ChosenAnchors:
         rows: Rows of it, each at most once. [n] int64
         corners: Interpolation constants of all its anchors, or None for f_d = 0.
         decoded: Gaussians of all its anchors when they never change; only copied then, and frozen.
+        moved: Where all its anchors are at the time that is decoded, if they travel; None where they stay. [A, 3]
     """
 
     anchors: AnchorSet
     rows: Tensor
     corners: CornerTable | None = None
     decoded: Gaussians | None = None
+    moved: Tensor | None = None
+
+    @property
+    def places(self) -> Tensor:
+        """Where the anchors are, scene units. [A, 3]"""
+        return self.anchors.positions if self.moved is None else self.moved
 
 
 def decode_anchors(
@@ -53,7 +60,7 @@ def decode_anchors(
         backend: The backend that decodes, from engine.backends.
     Returns:
         K Gaussians per row, anchor-major, sets in order; rows of sets with `decoded` are frozen. Differentiable in
-        features, log scales, heads and field wherever these require a gradient.
+        features, log scales, places, heads and field wherever these require a gradient.
     Raises:
         ValueError: Rows out of range or given twice, or tensors that do not fit together; with both shapes.
         TypeError: A tensor without numbers, or one that the back end cannot work with.
@@ -86,6 +93,8 @@ def _check(part: ChosenAnchors, decoder: Decoder, field: SpatioTemporalField | N
             if shape != (n_gaussians, *width):
                 wanted = [n_gaussians, *width]
                 raise ValueError(f"{name} of decoded must be {wanted} for {n_anchors} anchors, got {list(shape)}")
+    if part.places.shape != (n_anchors, 3):
+        raise ValueError(f"moved must be [{n_anchors}, 3] for these anchors, got {list(part.places.shape)}")
     corners = part.corners
     if corners is None:
         return

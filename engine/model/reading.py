@@ -18,6 +18,7 @@ from engine.model.decoder import Decoder
 from engine.model.field import SpatioTemporalField
 from engine.model.host_array import host_array
 from engine.model.model_backend import ModelBackend
+from engine.model.motion import AnchorMotion
 
 
 def inherit(
@@ -44,6 +45,7 @@ def inherit(
             if role not in presence:
                 continue
             anchors.presence = presence[role]
+            anchors.stay()  # they travelled with what the reference clip shows
         if hidden and role in hidden:
             anchors = anchors.subset(~hidden[role])
         sets[role] = anchors
@@ -161,6 +163,8 @@ def _read_sets(state: ClipState, *, is_trainable: bool) -> dict[str, AnchorSet]:
 
 
 def _read_set(stored: StoredAnchors, *, is_trainable: bool) -> AnchorSet:
+    motion = (stored.birth_frames, stored.velocities, stored.accelerations)
+    travels = [_tensor(array) for array in motion if array is not None]
     return AnchorSet(
         positions=_tensor(stored.positions),
         color_logits=_tensor(stored.color_logits),
@@ -169,6 +173,7 @@ def _read_set(stored: StoredAnchors, *, is_trainable: bool) -> AnchorSet:
         log_base_scales=_tensor(stored.log_base_scales),
         presence=None if stored.presence is None else _tensor(stored.presence),
         is_trainable=is_trainable,
+        motion=AnchorMotion(*travels) if travels else None,
     )
 
 

@@ -210,7 +210,14 @@ class ClipTraining:
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains and name != "moving")
         self._learn_positions()
-        parameters = named_parameters(self.model, self.gains, self.config, self._cameras.pixels, extent=self.rig.extent)
+        parameters = named_parameters(
+            self.model,
+            self.gains,
+            self.config,
+            self._cameras.pixels,
+            extent=self.rig.extent,
+            spacing=self.moving_spacing or self.spacing,
+        )
         ratios = self.method.final_ratios(parameters, self.config)
         plan = PhasePlan(
             model=self.model,
@@ -276,16 +283,16 @@ class ClipTraining:
         dynamic = [role for role in self.model.roles() if self.model.anchor_set(role).is_dynamic]
         reaches = {role: reaches_of(self.model.anchor_set(role), REACH_SPACINGS * self.spacing) for role in dynamic}
         views = self.windows.views(self._cameras.first_views)
-        seen = {
-            role: [view.sees(self.model.anchor_set(role).positions.detach(), reach=reaches[role]) for view in views]
-            for role in dynamic
-        }
         found = []
         for item in items:
             camera_row, window, clip_time = self.place(item)
-            view_row = self.windows.row(camera_row, window)
-            if any(seen[role][view_row][self.model.alive(role, clip_time)].any() for role in dynamic):
-                found.append(item)
+            view = views[self.windows.row(camera_row, window)]
+            for role in dynamic:
+                alive = self.model.alive(role, clip_time)
+                positions = self.model.positions(role, clip_time).detach()[alive]
+                if view.sees(positions, reach=reaches[role][alive]).any():
+                    found.append(item)
+                    break
         return found
 
     def step(self, n: int = 1) -> StepStats:

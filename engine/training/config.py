@@ -344,6 +344,19 @@ class TrainConfig(msgspec.Struct, frozen=True):
         ),
     ] = "hull"
 
+    motion: Annotated[
+        str,
+        _choice(
+            GATE,
+            "Where anchors of what moves are, frame by frame.",
+            {
+                "travel": "they travel with what they are on, and are a source clip's own; with gate=hull and "
+                "inherit=moving",
+                "stay": "they keep their places, and the field carries all motion, as published",
+            },
+        ),
+    ] = "travel"
+
     tiles: Annotated[
         str,
         _choice(
@@ -472,6 +485,12 @@ class TrainConfig(msgspec.Struct, frozen=True):
     def learns_moving_heads(self) -> bool:
         """Whether the heads of moving parts keep learning where still parts no longer do."""
         return self.decoder == "moving" and self.keeps_static and not self.follows_previous
+
+    @property
+    def anchors_travel(self) -> bool:
+        """Whether anchors of what moves travel. In a source clip all of them are its own then."""
+        is_own = self.inherit in ("moving", "off") and self.residual != "none" and not self.follows_previous
+        return self.motion == "travel" and self.gate == "hull" and is_own
 
     @property
     def follows_previous(self) -> bool:

@@ -77,6 +77,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "decoder": "frozen",
         "field_tables": "shared",
         "gate": "off",
+        "motion": "stay",
         "tiles": "all",
         "storage": "exact",
     },

@@ -13,7 +13,8 @@ from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.source_clip_means import later_figures
 from app.evaluation.speed.frame_rates import FrameRates, RatesOf, kept_rates
-from app.lab.added.figures import missing, with_added_figures
+from app.lab.added.figures import with_added_figures
+from app.lab.added.lpips import why_missing
 from app.lab.flicker import flicker_figures
 from app.lab.pictures import RenderedPictures
 from app.project.opening.project_access import open_project
@@ -128,7 +129,7 @@ def kept_figures(place: Path, settings: ProjectSettings, scope: VariantScope) ->
 
 def _key(project: Project, scope: VariantScope) -> dict[str, Any]:
     """Everything that the figures depend on."""
-    lacking = missing() if scope.metrics == "all" else {"lpips": ""}
+    has_lpips = scope.metrics == "all" and why_missing() is None
     headers = [read_clip_header(project.clip_path(i)) for i in scope.clips]
     return {
         "clips": [None if header is None else header.fingerprint for header in headers],
@@ -137,8 +138,7 @@ def _key(project: Project, scope: VariantScope) -> dict[str, Any]:
         "precision": scope.precision,
         **({} if scope.cameras is None else {"cameras": list(scope.cameras)}),
         "schema": MEASURED_SCHEMA,
-        **({} if "lpips" in lacking else {"lpips": True}),
-        **({"tof": False} if "tof" in lacking else {}),
+        **({"lpips": True} if has_lpips else {}),
     }
 
 

@@ -1,4 +1,5 @@
-"""Adds tOF and LPIPS to the document of an evaluation, which has neither: they take optional packages and long.
+"""Adds tOF and LPIPS to the document of an evaluation, which has neither: they take long, and LPIPS an
+optional package.
 
 They are of held-out cameras, all where none is held out, and of evaluations with all metrics. They are kept in the
 project (PROJECT/evaluations/lab-*.json) until a clip changes.
@@ -17,7 +18,7 @@ import numpy as np
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS
 from app.lab.added import lpips
-from app.lab.added.tof import MIN_SIDE_PX, MissingPackage, Motion, motion_of, opencv, tof
+from app.lab.added.tof import MIN_SIDE_PX, Motion, motion_of, tof
 from app.lab.pictures import Pictures
 from engine.capture.exclusions import exclusion_key
 from engine.metrics.clips.summary import GROUPS, mean_of
@@ -46,25 +47,12 @@ Found = dict[str, dict[str, dict[str, float | None]]]
 """Figures by camera and frame, the latter as text."""
 
 
-def missing() -> dict[str, str]:
-    """Why a figure cannot be measured on this machine, by `tof` and `lpips`; empty where both can."""
-    found = {}
-    try:
-        opencv()
-    except MissingPackage as error:
-        found["tof"] = str(error)
-    if (reason := lpips.why_missing()) is not None:
-        found["lpips"] = reason
-    return found
-
-
 def with_added_figures(
     document: dict[str, Any],
     opened: TrainedProject,
     pictures: Pictures,
     *,
     on_progress: Callable[[int, int], None] = lambda done, n: None,
-    say: Callable[[str], None] = logger.warning,
 ) -> dict[str, Any]:
     """The document of an evaluation with LPIPS in its rows, means and columns, and tOF in its pairs and their means.
 
@@ -72,25 +60,22 @@ def with_added_figures(
         document: See app.evaluation.evaluation.evaluate_project; changed in place.
         pictures: Renders of the project.
         on_progress: Gets pictures done and pictures in all.
-        say: Receives a sentence on the missing package.
     Raises:
         ProjectError: A clip is damaged.
     """
     if document["metrics"] != "all":
         return document
-    lacking = missing()
-    if "tof" in lacking:
-        say(lacking["tof"])
+    why_no_lpips = lpips.why_missing()
     rows = [row for row in document["rows"] if row["is_held_out"]] or document["rows"]
-    path, key = _path(document, opened), _key(document, opened, lacking)
+    path, key = _path(document, opened), _key(document, opened, has_lpips=why_no_lpips is None)
     found = _read(path, key)
     if found is None:
-        found = _measured(rows, document, opened, pictures, lacking, on_progress)
+        found = _measured(rows, document, opened, pictures, on_progress, has_lpips=why_no_lpips is None)
         try:
             write_checked_json(path, {"key": key, "found": found})
         except OSError as error:
             logger.warning("tOF and LPIPS are not kept (%s) - %s", error.strerror or error, path)
-    _add_lpips(document, found, lacking.get("lpips"))
+    _add_lpips(document, found, why_no_lpips)
     _add_tof(document["seams"], found)
     return document
 
@@ -100,12 +85,13 @@ def _measured(
     document: dict[str, Any],
     opened: TrainedProject,
     pictures: Pictures,
-    lacking: dict[str, str],
     on_progress: Callable[[int, int], None],
+    *,
+    has_lpips: bool,
 ) -> Found:
     capture = opened.measured.capture
     found: Found = {}
-    if "lpips" in lacking and ("tof" in lacking or min(capture.picture_size) < MIN_SIDE_PX):
+    if not has_lpips and min(capture.picture_size) < MIN_SIDE_PX:
         return found
     last: dict[str, tuple[int, Motion | None]] = {}
     for n_done, row in enumerate(rows):  # clip by clip, each camera's frames in order
@@ -113,15 +99,13 @@ def _measured(
         pixels, image = pictures.pair(row["clip_index"], frame, camera)
         is_valid = capture.valid_in(capture.rig.names.index(camera), frame)
         shown = as_shown(image, document["precision"])
-        figures: dict[str, float | None] = {}
-        if "tof" not in lacking:
-            black = shown if is_valid is None else np.where(is_valid[..., None], shown, np.float32(0.0))
-            motion = motion_of(black, pixels, is_valid)
-            frame_before, before = last.get(camera, (-1, None))
-            is_pair = frame_before == frame - 1 and before is not None and motion is not None
-            figures["tof"] = tof(before, motion) if is_pair and before and motion else None
-            last[camera] = frame, motion
-        if "lpips" not in lacking:
+        black = shown if is_valid is None else np.where(is_valid[..., None], shown, np.float32(0.0))
+        motion = motion_of(black, pixels, is_valid)
+        frame_before, before = last.get(camera, (-1, None))
+        is_pair = frame_before == frame - 1 and before is not None and motion is not None
+        figures: dict[str, float | None] = {"tof": tof(before, motion) if is_pair and before and motion else None}
+        last[camera] = frame, motion
+        if has_lpips:
             figures |= _lpips_of(shown, pixels, is_valid)
         found.setdefault(camera, {})[str(frame)] = figures
         on_progress(n_done + 1, len(rows))
@@ -192,7 +176,7 @@ def _path(document: dict[str, Any], opened: TrainedProject) -> Path:
     return opened.project.folder / EVALUATIONS / f"lab-{document['precision']}.json"
 
 
-def _key(document: dict[str, Any], opened: TrainedProject, lacking: dict[str, str]) -> dict[str, Any]:
+def _key(document: dict[str, Any], opened: TrainedProject, *, has_lpips: bool) -> dict[str, Any]:
     """Everything that the figures depend on."""
     reference = opened.reference
     exclusions = opened.project.document.exclusions
@@ -206,7 +190,7 @@ def _key(document: dict[str, Any], opened: TrainedProject, lacking: dict[str, st
         "holdout": sorted(document["holdout"]),
         "precision": document["precision"],
         "excluded": exclusion_key(exclusions, (0, opened.capture.n_frames)),
-        "missing": sorted(lacking),
+        "missing": [] if has_lpips else ["lpips"],
     }
 
 

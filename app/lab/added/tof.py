@@ -8,13 +8,12 @@ middle part counts whose sides are multiples of 32 px and at least 16 px shorter
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 
-from engine.errors import EngineError
 from engine.metrics.pictures.colors import to_levels
 
 BLOCK_PX, MARGIN_PX = 32, 16
@@ -23,24 +22,6 @@ MIN_SIDE_PX = BLOCK_PX + MARGIN_PX
 """Pictures with a shorter side have no tOF."""
 PYRAMID_SCALE, N_LEVELS, WINDOW_PX, N_ITERATIONS, RADIUS_PX, SIGMA_PX = 0.5, 3, 15, 3, 5, 1.2
 _GREY = np.array([0.299, 0.587, 0.114], np.float32)
-
-
-class MissingPackage(EngineError):
-    """A figure needs an optional package that is not installed."""
-
-
-def opencv() -> Any:
-    """The module cv2.
-
-    Raises:
-        MissingPackage: It is not installed.
-    """
-    try:
-        return importlib.import_module("cv2")
-    except ImportError as error:
-        raise MissingPackage(
-            "tOF is left out: OpenCV is not installed.", hint="Install the extra `lab`: pip install 'clipgstream[lab]'."
-        ) from error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,11 +51,7 @@ def motion_of(image: np.ndarray, pixels: np.ndarray, is_valid: np.ndarray | None
 
 
 def tof(before: Motion, after: Motion) -> float | None:
-    """tOF of two neighbouring frames, px per frame; None where no pixel counts.
-
-    Raises:
-        MissingPackage: OpenCV is not installed.
-    """
+    """tOF of two neighbouring frames, px per frame; None where no pixel counts."""
     flow, truth = optical_flow(before.render, after.render), optical_flow(before.truth, after.truth)
     errors = np.linalg.norm(flow - truth, axis=-1)
     is_counted = np.zeros(errors.shape, bool)
@@ -90,11 +67,19 @@ def optical_flow(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
     Args:
         before, after: Grey levels. [H, W] uint8
-    Raises:
-        MissingPackage: OpenCV is not installed.
     """
-    return opencv().calcOpticalFlowFarneback(
-        before, after, None, PYRAMID_SCALE, N_LEVELS, WINDOW_PX, N_ITERATIONS, RADIUS_PX, SIGMA_PX, 0
+    flow: Any = None  # made by the function
+    return cv2.calcOpticalFlowFarneback(
+        before,
+        after,
+        flow,
+        PYRAMID_SCALE,
+        N_LEVELS,
+        WINDOW_PX,
+        N_ITERATIONS,
+        RADIUS_PX,
+        SIGMA_PX,
+        0,
     )
 
 

@@ -117,7 +117,7 @@ def write_report(
                 measuring=measuring,
             )
             document = with_added_figures(
-                document, trained, make_pictures(trained), on_progress=partial(on_stage, f"tOF of {name}"), say=say
+                document, trained, make_pictures(trained), on_progress=partial(on_stage, f"tOF of {name}")
             )
             rates = rates_of(trained)
         except (ProjectError, CaptureError) as error:

@@ -75,7 +75,7 @@ class CpuBackend:
     ) -> Gaussians:
         """See Backend. Without gradient for colour logits, which never learn."""
         gaussians = decode_cpu(chosen, decoder, field, knots)
-        if torch.is_grad_enabled() and any(part.anchors.positions.requires_grad for part in chosen):
+        if torch.is_grad_enabled() and any(part.places.requires_grad for part in chosen):
             return replace(gaussians, means=_with_positions(gaussians.means, chosen, decoder.gaussians_per_anchor))
         return gaussians
 
@@ -131,7 +131,7 @@ def _with_positions(means: Tensor, chosen: Sequence[ChosenAnchors], k: int) -> T
     """The same means, through which a gradient reaches the positions: a mean is a position and an offset."""
     steps = []
     for part in chosen:
-        positions = part.anchors.positions
+        positions = part.places
         steps.append((positions - positions.detach()).index_select(0, part.rows).repeat_interleave(k, 0))
     return means + torch.cat(steps)
 

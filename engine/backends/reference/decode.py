@@ -39,7 +39,7 @@ def decode_reference(
         parts.append(
             activate(
                 decoder.raw(anchors.features.index_select(0, rows), dynamic_features),
-                positions=anchors.positions[rows],
+                positions=part.places[rows],
                 color_logits=anchors.color_logits[rows],
                 log_offset_scales=anchors.log_offset_scales.index_select(0, rows),
                 log_base_scales=anchors.log_base_scales.index_select(0, rows),

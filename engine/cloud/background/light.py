@@ -95,15 +95,19 @@ class AnchorLight:
         return without_smallest(smooth, NO_CHANGE).astype(np.float32)
 
 
-def joined(before: np.ndarray, after: np.ndarray, *, own: np.ndarray) -> np.ndarray:
+def joined(beside: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Light where two clips meet: the mean of both sides, so that nothing jumps; a real jump, as of a lamp that is
     switched, stays one.
 
     Args:
-        before, after: Log brightness just before and just after. [A]
-        own: The one of them that lies in the clip.
+        beside, own: Log brightness on the far and on the near side of the border. [A]
     """
-    return np.where(np.abs(before - after) < JUMP_LOG, (before + after) / 2, own)
+    return np.where(_differs(beside - own), own, (beside + own) / 2)
+
+
+def met_by_plain(own: np.ndarray) -> np.ndarray:
+    """`joined` where the clip on the other side cannot move half way, since its light is always 0."""
+    return np.where(_differs(own), own, np.float32(0.0))
 
 
 def steady(first: np.ndarray, half_way: np.ndarray, last: np.ndarray) -> np.ndarray:
@@ -118,9 +122,13 @@ def steady(first: np.ndarray, half_way: np.ndarray, last: np.ndarray) -> np.ndar
         [A, 2]
     """
     at_all = np.stack([first, half_way, last])
-    is_even = np.abs(half_way - (first + last) / 2) < JUMP_LOG
+    is_even = ~_differs(half_way - (first + last) / 2)
     least = np.where((at_all > 0).all(0), at_all.min(0), np.where((at_all < 0).all(0), at_all.max(0), 0.0))
     return np.stack([np.where(is_even, first, least), np.where(is_even, last, least)], axis=1).astype(first.dtype)
+
+
+def _differs(change: np.ndarray) -> np.ndarray:
+    return np.abs(change) >= JUMP_LOG
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

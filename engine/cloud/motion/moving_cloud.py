@@ -1,6 +1,6 @@
 """Everything that moves in one clip as points: visual hulls of all its frames on one voxel grid, with presence.
 
-Not tracked over time: a point is a place, and `presence` says in which frames something's surface was there.
+A point is a place, and `presence` says in which frames something's surface was there; or it travels with the surface.
 Letters: M frames of the clip, C cameras.
 """
 
@@ -10,6 +10,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from engine.cloud.background.motion_masks import MotionMasks
 from engine.cloud.fusion import keep_inliers
 from engine.cloud.kept_results import Arrays, Keep, do_now
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility, surface_rows
+from engine.cloud.motion.surface_flow import surface_flow
+from engine.cloud.motion.travel import follow
 
 logger = logging.getLogger(__name__)
 
@@ -53,12 +56,20 @@ class MovingCloud:
         colors: White-balanced display colour in 0..1, mean over the frames it is present in. [P, 3] float32
         presence: On the hull's surface in that frame. [P, M] bool
         spacing: Voxel edge, scene units.
+        motion: Frames of birth [P], velocities and accelerations [P, 3] of points that travel, see
+            engine.model.motion.AnchorMotion; None where they stay. float32
     """
 
     points: np.ndarray
     colors: np.ndarray
     presence: np.ndarray
     spacing: float
+    motion: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    def chosen(self, rows: np.ndarray) -> MovingCloud:
+        """Some of the points. rows: [P] bool or [n] int64"""
+        motion = None if self.motion is None else tuple(array[rows] for array in self.motion)
+        return MovingCloud(self.points[rows], self.colors[rows], self.presence[rows], self.spacing, motion)  # pyright: ignore
 
 
 def build_moving_cloud(
@@ -72,6 +83,7 @@ def build_moving_cloud(
     valid_in: Callable[[int], np.ndarray | None] = lambda frame_in_clip: None,
     max_points: int = 30_000,
     voxel_size: float | None = None,
+    travels: bool = False,
     report: Report,
     keep: Keep = do_now,
 ) -> MovingCloud:
@@ -86,6 +98,7 @@ def build_moving_cloud(
         valid_in: Frame in clip to the pixels that count there; None for all. [C, H, W] bool
         max_points: The voxel grows until about no more than this many points remain over the clip.
         voxel_size: Voxel edge to use as it is, scene units; a source clip takes its reference's. None derives it.
+        travels: Whether points travel with the surface.
         report: Gets one line per step with counts and the reason.
         keep: Keeps what took long, under names that belong to these arguments alone.
     Returns:
@@ -150,13 +163,69 @@ def build_moving_cloud(
     is_kept = keep_inliers(points)
     points, presence = points[is_kept], presence[is_kept]
     started = time.perf_counter()
+    seen = _Seen(frames, masks, projections, near, size)
+    if travels and n_frames > 1:
+        cloud = _travelling(points, presence, seen, gains, keep)
+        lifetime = f" in {cloud.presence.sum(1).mean():.1f} frames each"
+    else:
+        places = keep(
+            "colours of moving points",
+            lambda: {"colors": _colors(lambda frame: points, presence, seen, gains)},
+        )
+        cloud = MovingCloud(points.astype(np.float32), places["colors"], presence, float(size))
+        lifetime = ""
+    report(f"Moving cloud: {len(cloud.points):,} points{lifetime}, {(~is_kept).sum():,} outliers removed")
+    logger.info("moving cloud followed and coloured in %.1f s", time.perf_counter() - started)
+    return cloud
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What cameras see of the hulls. `frames` and `masks` as in `build_moving_cloud`; near and size in scene units."""
+
+    frames: Callable[[int, int], np.ndarray]
+    masks: MotionMasks
+    projections: np.ndarray
+    near: float
+    size: float
+
+    def pictures(self, frame_in_clip: int) -> np.ndarray:
+        """Of all cameras. [C, H, W, 3] uint8"""
+        return np.stack([self.frames(row, frame_in_clip) for row in range(len(self.projections))])
+
+    def visibility(self, points: np.ndarray, frame_in_clip: int) -> tuple[np.ndarray, np.ndarray]:
+        """See `hull_visibility`."""
+        masks = self.masks.of_frame(frame_in_clip)
+        return hull_visibility(points, self.size, masks, self.projections, near=self.near)
+
+
+def _travelling(points: np.ndarray, presence: np.ndarray, seen: _Seen, gains: np.ndarray, keep: Keep) -> MovingCloud:
+    """The cloud whose points travel, from surface points [P, 3] and their presence [P, M]."""
+    n_frames = presence.shape[1]
+    surfaces = [points[presence[:, frame]] for frame in range(n_frames)]
+
+    def flow(frame: int) -> Arrays:
+        if len(surfaces[frame]) == 0:
+            return {"steps": np.zeros((0, 3))}
+        pixel, is_visible = seen.visibility(surfaces[frame], frame)
+        masks = seen.masks.of_frame(frame) | seen.masks.of_frame(frame + 1)
+        pictures = seen.pictures(frame), seen.pictures(frame + 1)
+        return {"steps": surface_flow(surfaces[frame], pixel, is_visible, pictures, masks, seen.projections)}
+
+    found = [keep(f"motion from frame {frame}", partial(flow, frame)) for frame in range(n_frames - 1)]
+    travellers = follow(surfaces, [arrays["steps"] for arrays in found], seen.size)
     colors = keep(
-        "colours of moving points",
-        lambda: {"colors": _colors(points, presence, frames, masks, projections, gains, size=size, near=near)},
+        "colours of travelling points",
+        lambda: {"colors": _colors(travellers.at, travellers.presence, seen, gains)},
     )["colors"]
-    report(f"Moving cloud: {len(points):,} points, {(~is_kept).sum():,} outliers removed")
-    logger.info("moving cloud coloured in %.1f s", time.perf_counter() - started)
-    return MovingCloud(points.astype(np.float32), colors, presence, float(size))
+    motion = travellers.birth_frames, travellers.velocities, travellers.accelerations
+    return MovingCloud(
+        travellers.points.astype(np.float32),
+        colors,
+        travellers.presence,
+        float(seen.size),
+        (motion[0].astype(np.float32), motion[1].astype(np.float32), motion[2].astype(np.float32)),
+    )
 
 
 def hull_votes(n_cameras: int) -> tuple[int, int]:
@@ -204,26 +273,17 @@ def _fuse(surfaces: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return voxels, presence
 
 
-def _colors(
-    points: np.ndarray,
-    presence: np.ndarray,
-    frames: Callable[[int, int], np.ndarray],
-    masks: MotionMasks,
-    projections: np.ndarray,
-    gains: np.ndarray,
-    *,
-    size: float,
-    near: float,
-) -> np.ndarray:
-    """Mean over the frames of each point's median colour, 0..1. [P, 3] float32"""
-    sums, counts = np.zeros((len(points), 3)), np.zeros(len(points))
-    n_frames, n_cameras, _, _ = masks.shape
-    for frame_in_clip in range(n_frames):
+def _colors(places: Callable[[int], np.ndarray], presence: np.ndarray, seen: _Seen, gains: np.ndarray) -> np.ndarray:
+    """Mean over the frames of each point's median colour, 0..1. [P, 3] float32
+
+    Args:
+        places: Frame in clip to where the points are. [P, 3]
+    """
+    sums, counts = np.zeros((len(presence), 3)), np.zeros(len(presence))
+    for frame_in_clip in range(presence.shape[1]):
         rows = np.flatnonzero(presence[:, frame_in_clip])
-        pictures = np.stack([frames(row, frame_in_clip) for row in range(n_cameras)])
-        frame_masks = masks.of_frame(frame_in_clip)
-        pixel, is_visible = hull_visibility(points[rows], size, frame_masks, projections, near=near)
-        colors = hull_colors(pictures, pixel, is_visible, gains)
+        pixel, is_visible = seen.visibility(places(frame_in_clip)[rows], frame_in_clip)
+        colors = hull_colors(seen.pictures(frame_in_clip), pixel, is_visible, gains)
         is_known = np.isfinite(colors[:, 0])
         sums[rows[is_known]] += colors[is_known]
         counts[rows[is_known]] += 1

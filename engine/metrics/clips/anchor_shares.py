@@ -80,7 +80,7 @@ def anchors_at(trained: TrainedClip, clip_time: float) -> tuple[np.ndarray, np.n
     for role, first in zip(trained.model.roles(), _first_rows(trained), strict=True):
         alive = host_array(trained.model.alive(role, clip_time))
         rows.append(first + alive)
-        positions.append(host_array(trained.model.anchor_set(role).positions)[alive].astype(np.float32))
+        positions.append(host_array(trained.model.positions(role, clip_time))[alive].astype(np.float32))
     return np.concatenate(rows), np.concatenate(positions)
 
 

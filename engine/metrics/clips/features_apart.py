@@ -33,6 +33,7 @@ def with_features(model: ClipModel, features: Features) -> ClipModel:
             log_base_scales=anchors.log_base_scales.detach(),
             presence=anchors.presence,
             is_trainable=False,
+            motion=None if anchors.motion is None else anchors.motion.map(torch.Tensor.detach),
         )
     return ClipModel(
         sets=sets,

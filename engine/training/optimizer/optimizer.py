@@ -1,7 +1,7 @@
 """Optimiser of a phase: Adam with one learning rate per kind of parameter, falling log-linearly to its end.
 
-Of the rates only that of positions carries a scene scale. The horizon is the phase's own number of steps, so every clip
-sees the whole schedule.
+Of the rates only those of positions and of motion carry a scene scale. The horizon is the phase's own number of steps,
+so every clip sees the whole schedule.
 """
 
 from __future__ import annotations
@@ -18,6 +18,11 @@ from engine.model.clip_model import ClipModel
 from engine.model.host_array import host_array
 from engine.training.config import TrainConfig
 
+_VELOCITY_LR, _ACCELERATION_LR = 2e-3, 2e-4
+"""Rates of motion, anchor spacings a frame, and a frame squared: either moves an anchor by about a hundredth of a
+spacing a step, five frames from its birth. Five times as much is worse."""
+_TRAVELLING_LR = 2.0
+"""Anchors that travel learn their features so many times as fast: what they are on looks alike in all their frames."""
 _HEADS = ("opacity", "color", "shape", "offset")
 Mark = tuple[int, dict[str, int]]
 """Counts of steps: of the phase, and of every parameter."""
@@ -30,12 +35,14 @@ def named_parameters(
     corrections: nn.Parameter | None = None,
     *,
     extent: float = 1.0,
+    spacing: float = 1.0,
 ) -> dict[str, tuple[nn.Parameter, float]]:
     """Trainable parameters by name with their initial rate; frozen ones are left out altogether.
 
     Args:
         corrections: Of cameras.
         extent: Of the cameras, scene units: the unit of the rate of positions.
+        spacing: Between anchors that move, scene units: the unit of the rates of their motion.
     """
     chosen: dict[str, tuple[nn.Parameter, float]] = {}
 
@@ -46,7 +53,11 @@ def named_parameters(
     for role in model.roles():
         anchors = model.anchor_set(role)
         add(f"sets.{role}.positions", anchors.positions, config.position_lr * extent)
-        add(f"sets.{role}.features", anchors.features, config.feature_lr)
+        if anchors.travels:
+            add(f"sets.{role}.velocities", anchors.velocities, _VELOCITY_LR * spacing)
+            add(f"sets.{role}.accelerations", anchors.accelerations, _ACCELERATION_LR * spacing)
+        faster = _TRAVELLING_LR if anchors.travels else 1.0
+        add(f"sets.{role}.features", anchors.features, config.feature_lr * faster)
         add(f"sets.{role}.log_offset_scales", anchors.log_offset_scales, config.scale_lr)
         add(f"sets.{role}.log_base_scales", anchors.log_base_scales, config.scale_lr)
     for head in _HEADS:

@@ -24,6 +24,7 @@ from engine.model.clip_model import ClipModel
 from engine.model.decoder import Decoder
 from engine.model.host_array import host_array
 from engine.model.model_backend import ModelBackend
+from engine.model.motion import AnchorMotion
 from engine.model.reading import inherit
 from engine.training.config import TrainConfig
 
@@ -80,6 +81,7 @@ def _fresh(
     presence: np.ndarray | None,
     config: TrainConfig,
     others: np.ndarray | None = None,
+    motion: AnchorMotion | None = None,
 ) -> AnchorSet:
     """Anchors with the start that the settings say.
 
@@ -100,6 +102,7 @@ def _fresh(
         spacing=torch.as_tensor(sizes),
         feature_dim=config.static_feature_dim,
         presence=present,
+        motion=motion,
     )
 
 
@@ -128,7 +131,13 @@ def moving_anchors(
         rows: [P] bool
         others: Anchors that are there already. [S, 3]
     """
-    return _fresh(cloud.points[rows], cloud.colors[rows], float(cloud.spacing), cloud.presence[rows], config, others)
+    chosen = cloud.chosen(rows)
+    motion = _motion_of(chosen)
+    return _fresh(chosen.points, chosen.colors, float(cloud.spacing), chosen.presence, config, others, motion)
+
+
+def _motion_of(cloud: MovingCloud) -> AnchorMotion | None:
+    return None if cloud.motion is None else AnchorMotion(*map(torch.from_numpy, cloud.motion))
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +190,8 @@ def add_residual(
     A point is covered when it lies inside the union of spheres around the inherited anchors that can change, each with
     the mean distance to its three nearest neighbours as radius. Covered points switch on the inherited anchor nearest
     to them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
-    anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
+    anchors. Where points travel all of them do: an inherited anchor was on something else. Source: ClipGStream,
+    geometry-aware deduplication, with the exact union.
 
     Args:
         choose: Chooses residual anchors, see engine.training.preparation.method.Method.choose_residual.
@@ -189,24 +199,20 @@ def add_residual(
     """
     is_new = np.ones(len(cloud.points), bool)
     inherited = [model.anchor_set(role) for role in covering if role in model.roles()]
-    n_used = 0
+    n_used, travels = 0, cloud.motion is not None
     if inherited and len(cloud.points):
         centers = np.concatenate([host_array(anchors.positions) for anchors in inherited])
         is_new = residual_rows(cloud.points, centers, mean_neighbor_distance(centers, k=3))
-        _, nearest = KDTree(centers).query(cloud.points[~is_new])
-        presence = np.zeros((len(centers), cloud.presence.shape[1]), bool)
-        np.logical_or.at(presence, nearest, cloud.presence[~is_new])
-        n_used = int(presence.any(1).sum())
-        parts = np.split(presence, np.cumsum([len(anchors) for anchors in inherited])[:-1])
-        for anchors, part in zip(inherited, parts, strict=True):
-            anchors.presence = torch.from_numpy(part).to(model.backend.device)
-    chosen = choose(cloud, is_new, n_used, config)
+        if not travels:
+            nearest = np.atleast_1d(KDTree(centers).query(cloud.points[~is_new])[1])
+            n_used = _switch_on(model, inherited, nearest, cloud.presence[~is_new])
+    chosen = choose(cloud, is_new | travels, n_used, config)
     if chosen.rows.any():
         others = [host_array(model.anchor_set(role).positions) for role in model.roles()]
         residual = moving_anchors(
             replace(cloud, presence=chosen.presence), chosen.rows, config, np.concatenate(others) if others else None
         )
-        if inherited and config.initial == "cloud":
+        if inherited and config.initial == "cloud" and not travels:
             _start_like_neighbors(residual, inherited)
         model.add_set("residual", residual)
     return Coverage(
@@ -217,6 +223,21 @@ def add_residual(
         share=float(chosen.is_reached.mean()) if len(is_new) else 1.0,
         reason=chosen.reason,
     )
+
+
+def _switch_on(model: ClipModel, inherited: Sequence[AnchorSet], nearest: np.ndarray, presence: np.ndarray) -> int:
+    """Inherited anchors exist where the points next to them do; returns how many.
+
+    Args:
+        nearest: The anchor nearest to each point, counted over all the sets. [n]
+        presence: Of the points. [n, M] bool
+    """
+    everywhere = np.zeros((sum(map(len, inherited)), presence.shape[1]), bool)
+    np.logical_or.at(everywhere, nearest, presence)
+    parts = np.split(everywhere, np.cumsum([len(anchors) for anchors in inherited])[:-1])
+    for anchors, part in zip(inherited, parts, strict=True):
+        anchors.presence = torch.from_numpy(part).to(model.backend.device)
+    return int(everywhere.any(1).sum())
 
 
 def adapt_moving(model: ClipModel, *, all_of_them: bool = False) -> None:

@@ -278,7 +278,8 @@ class ClipPreparation:
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing, vignetting=reference.vignetting)
         if "static" in self._method.covering(model):  # parts that can change learn their own light
             return parts
-        measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
+        plain = range(reference.header.start, reference.header.start + reference.header.n_frames)
+        measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report, plain=plain)
         return parts
 
     def keep_backgrounds(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> None:

@@ -418,7 +418,7 @@ def moving_cloud(
     voxel_size: float | None,
     keep: Keep = do_now,
 ) -> MovingCloud:
-    """Surface points of moving parts, fused over the frames of the clip, with the frames each exists in.
+    """Surface points of moving parts over the frames of the clip, with the frames each exists in.
 
     Args:
         voxel_size: The reference clip's for a source clip, so that the same place gives the same anchors; None
@@ -439,6 +439,7 @@ def moving_cloud(
         valid_in=pictures.valid_in_frame,
         max_points=config.max_moving_points,
         voxel_size=voxel_size,
+        travels=config.anchors_travel,
         report=say,
         keep=keep,
     )

@@ -10,7 +10,6 @@ inherited anchors: it hides the static anchor, in this clip alone, and puts one 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -25,9 +24,7 @@ from engine.model.host_array import host_array
 def without_static_regions(cloud: MovingCloud, regions: Sequence[GateRegion]) -> MovingCloud:
     """The moving points outside the regions marked as static."""
     is_kept = ~marked(cloud.points, regions, "static")
-    if is_kept.all():
-        return cloud
-    return replace(cloud, points=cloud.points[is_kept], colors=cloud.colors[is_kept], presence=cloud.presence[is_kept])
+    return cloud if is_kept.all() else cloud.chosen(is_kept)
 
 
 def decide(model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool) -> tuple[dict[str, np.ndarray], str]:

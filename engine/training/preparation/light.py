@@ -10,7 +10,7 @@ import torch
 from engine.camera.rig import CameraRig
 from engine.clip_files.roles import STATIC
 from engine.cloud.background.exposure import Exposure
-from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined, steady
+from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined, met_by_plain, steady
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.model.host_array import host_array
@@ -30,6 +30,8 @@ def measure_light(
     backgrounds: Backgrounds,
     exposures: Sequence[Exposure] | None,
     report: ReportProgress,
+    *,
+    plain: range,
 ) -> None:
     """Give a model that inherits static anchors as they are the light on them at the start and the end of its clip.
 
@@ -40,6 +42,7 @@ def measure_light(
         backgrounds: Their pictures in the reference clip when nothing moves.
         exposures: That of each background; None where no camera's exposure is looked at.
         report: Gets one line.
+        plain: Frames of the reference clip, which is drawn in no light but its own.
     """
     if STATIC not in model.roles():
         return
@@ -57,9 +60,15 @@ def measure_light(
     last = light_in(clip.stop - WINDOW_FRAMES, clip.stop)
     middle = (clip.start + clip.stop - WINDOW_FRAMES) // 2
     half_way = light_in(middle, middle + WINDOW_FRAMES)
-    before = light_in(clip.start - WINDOW_FRAMES, clip.start) if clip.start > 0 else first
-    after = light_in(clip.stop, clip.stop + WINDOW_FRAMES) if clip.stop < n_frames else last
-    logs = steady(joined(before, first, own=first), half_way, joined(last, after, own=last))
+
+    def joined_at(border: int, beside: range, own: np.ndarray) -> np.ndarray:
+        if border in (plain.start, plain.stop):
+            return met_by_plain(own)
+        return joined(light_in(beside.start, beside.stop), own) if 0 < border < n_frames else own
+
+    start = joined_at(clip.start, range(clip.start - WINDOW_FRAMES, clip.start), first)
+    stop = joined_at(clip.stop, range(clip.stop, clip.stop + WINDOW_FRAMES), last)
+    logs = steady(start, half_way, stop)
     share = 100 * float((logs != 0).any(1).mean())
     if share:
         model.light = torch.from_numpy(logs)

@@ -17,6 +17,12 @@ TRAINING = (
         settings={"position_lr": 1.6e-4, "position_final_ratio": 0.01, "inherit": "frozen"},
     ),
     Point(
+        "anchors over time",
+        "both",
+        paper="each at its position, at every time",
+        settings={"motion": "stay"},
+    ),
+    Point(
         "number of anchors",
         "released code",
         released="as the point clouds give them; none are removed later, and adding some is switched off for its own "

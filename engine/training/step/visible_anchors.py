@@ -61,6 +61,9 @@ class Sight:
         rows = {}
         for role in self._model.roles():
             key, anchors = (role, view_row), self._model.anchor_set(role)
+            if anchors.travels:
+                rows[role] = self._travelling_rows(role, view_row, clip_time)
+                continue
             if key not in self._seen or anchors.positions.requires_grad:
                 is_seen = self._views[view_row].sees(anchors.positions, reach=self.reaches[role])
                 self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
@@ -74,14 +77,30 @@ class Sight:
         known = self._rows.get((role, view_row, clip_time))
         if known is not None:
             return known
-        presence = self._model.anchor_set(role).presence
-        assert presence is not None
+        rows = (self._is_present(role, clip_time) & self._seen[role, view_row]).nonzero()[:, 0]
+        if is_kept:
+            self._remember(role, view_row, clip_time, rows)
+        return rows
+
+    def _travelling_rows(self, role: str, view_row: int, clip_time: float) -> Tensor:
+        """The same of a set whose anchors travel: found once, as they travelled at first."""
+        known = self._rows.get((role, view_row, clip_time))
+        if known is None:
+            positions = self._model.positions(role, clip_time).detach()
+            is_seen = self._views[view_row].sees(positions, reach=self.reaches[role])
+            known = (self._is_present(role, clip_time) & is_seen).nonzero()[:, 0]
+            self._remember(role, view_row, clip_time, known)
+        return known
+
+    def _is_present(self, role: str, clip_time: float) -> Tensor:
         if role not in self._present:
+            presence = self._model.anchor_set(role).presence
+            assert presence is not None
             self._present[role] = presence.T.contiguous()
         frames = [self._present[role][knot] for knot, _ in self._model.knots(clip_time)]
-        is_present = frames[0] if len(frames) == 1 else torch.logical_or(*frames)
-        rows = (is_present & self._seen[role, view_row]).nonzero()[:, 0]
-        if is_kept and self._n_bytes < MAX_BYTES:
+        return frames[0] if len(frames) == 1 else torch.logical_or(*frames)
+
+    def _remember(self, role: str, view_row: int, clip_time: float, rows: Tensor) -> None:
+        if self._n_bytes < MAX_BYTES:
             self._n_bytes += rows.nbytes
             self._rows[role, view_row, clip_time] = rows
-        return rows

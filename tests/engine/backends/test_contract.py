@@ -19,7 +19,7 @@ from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.joining import join_frozen
 from engine.raster import Gaussians, rasterize, tile_boxes
 from engine.training.step.losses import photometric_loss
-from tests.decode_scenes import ODD, Scene, backward
+from tests.decode_scenes import ODD, Scene, backward, moment
 
 EXACT = ReferenceBackend(dtype=torch.float64)
 TABLE = {
@@ -106,6 +106,7 @@ def test_decode(backend, knots):
                 anchors,
                 rows[role].to(path.device),
                 scene.field.corners(anchors.positions) if anchors.is_dynamic else None,
+                moved=anchors.positions_at(moment(knots)) if anchors.travels else None,
             )
             for role, anchors in scene.sets.items()
         ]

@@ -5,7 +5,7 @@ import pytest
 
 from engine.camera.projection import pixel_rays, to_world
 from engine.camera.rig import CameraRig
-from engine.cloud.background.light import LARGEST_LOG, NO_CHANGE, AnchorLight, joined
+from engine.cloud.background.light import LARGEST_LOG, NO_CHANGE, AnchorLight, joined, met_by_plain
 
 N_CAMERAS, WIDTH, HEIGHT = 10, 160, 120
 SHADOW, DARKER = 0.4, 0.85
@@ -130,5 +130,10 @@ def test_large_changes_are_bounded_and_small_ones_do_not_jump(measure):
 
 def test_both_sides_of_a_border_are_joined_unless_the_light_was_switched():
     before, after = np.array([0.1, 0.1, 0.0], np.float32), np.array([0.11, 0.4, 0.0], np.float32)
-    np.testing.assert_allclose(joined(before, after, own=before), [0.105, 0.1, 0.0], rtol=1e-6)
-    np.testing.assert_allclose(joined(before, after, own=after), [0.105, 0.4, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(joined(after, before), [0.105, 0.1, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(joined(before, after), [0.105, 0.4, 0.0], rtol=1e-6)
+
+
+def test_beside_the_reference_clip_light_begins_at_none_unless_it_was_switched():
+    own = np.array([0.01, -0.015, 0.0, 0.4, -0.1], np.float32)
+    np.testing.assert_array_equal(met_by_plain(own), np.array([0.0, 0.0, 0.0, 0.4, -0.1], np.float32))

@@ -144,7 +144,7 @@ def _require_float32(chosen: Sequence[ChosenAnchors], decoder: Decoder, field: S
         anchors = part.anchors
         tensors += [
             ("features", anchors.features),
-            ("positions", anchors.positions),
+            ("positions", part.places),
             ("color_logits", anchors.color_logits),
             ("log_offset_scales", anchors.log_offset_scales),
             ("log_base_scales", anchors.log_base_scales),
@@ -343,7 +343,7 @@ class _Kernels:
         return DecodeJob(
             **self._fixed,
             features=features,
-            positions=anchors.positions,
+            positions=part.places.detach(),
             color_logits=anchors.color_logits,
             log_offset_scales=log_offset_scales,
             log_base_scales=log_base_scales,

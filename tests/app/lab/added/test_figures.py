@@ -11,9 +11,8 @@ from scipy import ndimage
 
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import TrainedProject, open_trained
-from app.lab.added import figures, lpips, tof
+from app.lab.added import lpips
 from app.lab.added.figures import COLUMNS, with_added_figures
-from app.lab.added.tof import MissingPackage
 from app.lab.flicker import FLOW_FIGURES, flicker_figures
 from app.project.opening.project_access import open_project
 from engine.metrics.pictures.colors import to_levels
@@ -54,7 +53,6 @@ def evaluation(opened: TrainedProject, metrics: Any = "all") -> dict[str, Any]:
 
 
 def test_pairs_of_held_out_cameras_have_tof_and_it_is_kept(opened):
-    pytest.importorskip("cv2")
     pictures, told = Pictures(), []
     document = with_added_figures(
         evaluation(opened), opened, pictures, on_progress=lambda done, n: told.append((done, n))
@@ -86,29 +84,11 @@ def test_the_quick_choice_stays_as_it_is(opened):
     assert [flicker_figures(document["seams"]["rows"])[name] for name in FLOW_FIGURES] == [None, None, None]
 
 
-def test_without_opencv_tof_is_left_out_and_the_extra_named(opened, monkeypatch):
-    def refuse(name: str) -> None:
-        raise ImportError(name)
-
-    monkeypatch.setattr(tof.importlib, "import_module", refuse)
-    with pytest.raises(MissingPackage, match=r"OpenCV is not installed.*clipgstream\[lab\]"):
-        tof.opencv()
-    said: list[str] = []
-    pictures = Pictures()
-    document = with_added_figures(evaluation(opened), opened, pictures, say=said.append)
-    assert len(said) == 1
-    assert "clipgstream[lab]" in said[0]
-    assert {row["tof"] for row in document["seams"]["rows"]} == {None}
-    assert not pictures.asked
-    reasons = document["columns"]["lpips"]["why_missing"]
-    assert reasons == {"the package lpips is not installed": len(document["rows"])}
-
-
 def test_lpips_stands_in_rows_means_and_columns(opened, monkeypatch):
-    monkeypatch.setattr(figures, "missing", lambda: {"tof": "no flow"})
+    monkeypatch.setattr(lpips, "why_missing", lambda: None)
     monkeypatch.setattr(lpips, "lpips", lambda image, truth: 0.25)
     monkeypatch.setattr(lpips, "lpips_unscaled", lambda image, truth: 0.5)
-    document = with_added_figures(evaluation(opened), opened, Pictures(), say=lambda text: None)
+    document = with_added_figures(evaluation(opened), opened, Pictures())
     held_out, means = dict(zip(COLUMNS, (0.25, 0.25, 0.5), strict=True)), document["means"]
     for row in document["rows"]:
         assert {name: row[name] for name in COLUMNS} == (held_out if row["is_held_out"] else dict.fromkeys(COLUMNS))

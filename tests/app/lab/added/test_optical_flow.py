@@ -8,8 +8,6 @@ from app.lab.added.tof import grey_levels, optical_flow
 from engine.metrics.pictures.colors import to_levels
 from tests.engine.metrics.made_pictures import disturbed, scene
 
-pytest.importorskip("cv2")
-
 OPENCV = {
     (97, 131): [0.544614, -0.0152811, 0.291114, 0.081112, 0.00452593, 0.00250679, 0.978854, -0.0386926, 0.0634887],
     (20, 17): [0.98122, 0.0177419, 0.170559, 0.0354721, 1.01575, 0.031816, 1.02456, 0.0121529, 0.98607],

@@ -7,8 +7,6 @@ from scipy import ndimage
 from app.lab.added.tof import MIN_SIDE_PX, Motion, grey_levels, motion_of, tof
 from engine.metrics.pictures.colors import to_levels
 
-pytest.importorskip("cv2")
-
 
 def textured(shift_px: int = 0, size: tuple[int, int] = (96, 128)) -> np.ndarray:
     """A smooth random picture, moved to the right. [H, W, 3] float32 in 0..1"""
