@@ -56,21 +56,36 @@ class Variant:
 FULL = "full"
 MIN_STEPS_PER_FRAME = 20
 """Least number for a stream, also where the clips of "full" have fewer."""
+_STAY = "anchors of source clips keep their places, so compare with anchors-stay"
 VARIANTS = (
     Variant(FULL, "the settings as they are"),
     Variant("decoder-new", "without decoder inheritance (DI): new heads in every source clip", {"decoder": "new"}),
     Variant("decoder-finetune", "inherited heads keep learning in every source clip", {"decoder": "finetune"}),
-    Variant("residual-none", "without residual anchors: inherited anchors only", {"residual": "none"}),
+    Variant(
+        "anchors-stay",
+        "moving anchors of source clips keep their places, as published: where inherited ones cover them, these serve",
+        {"motion": "stay"},
+    ),
+    Variant(
+        "residual-none",
+        f"without residual anchors: inherited anchors only; {_STAY}",
+        {"residual": "none", "motion": "stay"},
+    ),
     Variant(
         "residual-full",
-        "without residual anchor compensation (RAC): all points of a clip next to the inherited anchors, however many",
-        {"residual": "full"},
+        "without residual anchor compensation (RAC): all points of a clip next to the inherited anchors, however many; "
+        f"{_STAY}",
+        {"residual": "full", "motion": "stay"},
     ),
-    Variant("inherit-frozen", "all inherited anchors stay as they are, as published", {"inherit": "frozen"}),
+    Variant(
+        "inherit-frozen",
+        f"all inherited anchors stay as they are, as published; {_STAY}",
+        {"inherit": "frozen", "motion": "stay"},
+    ),
     Variant(
         "inherit-trainable",
-        "without anchor inheritance (AI): inherited anchors keep learning in every source clip",
-        {"inherit": "trainable"},
+        f"without anchor inheritance (AI): inherited anchors keep learning in every source clip; {_STAY}",
+        {"inherit": "trainable", "motion": "stay"},
     ),
     Variant(
         "inherit-off",
@@ -80,13 +95,13 @@ VARIANTS = (
     ),
     Variant(
         "inherit-trainable-residual-full",
-        "without RAC and AI: all points of a clip, however many, and inherited anchors keep learning",
-        {"inherit": "trainable", "residual": "full"},
+        f"without RAC and AI: all points of a clip, however many, and inherited anchors keep learning; {_STAY}",
+        {"inherit": "trainable", "residual": "full", "motion": "stay"},
     ),
     Variant(
         "field-continue",
-        "one field continues from clip to clip, its last state shows all",
-        {"field": "continue"},
+        f"one field continues from clip to clip, its last state shows all; {_STAY}",
+        {"field": "continue", "motion": "stay"},
         shares_reference=True,
     ),
     Variant(

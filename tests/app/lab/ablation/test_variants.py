@@ -26,6 +26,8 @@ from engine.training.presets import PUBLISHED_SIZES, preset
 from tests.app.lab.ablation.runs import BY_NAME
 
 SIZES = PUBLISHED_SIZES
+STAY: dict[str, Any] = {"motion": "stay"}
+STAYING = ["anchors of source clips keep their places", "compare with anchors-stay"]
 OWN: dict[str, Any] = {"shares_reference": False}
 BASELINE: dict[str, Any] = {"is_baseline": True, "shares_reference": False}
 ON_REQUEST = BASELINE | {"is_on_request": True}
@@ -33,21 +35,22 @@ PINNED: dict[str, tuple[dict[str, Any], dict[str, Any], list[str]]] = {
     "full": ({}, {}, ["settings as they are"]),
     "decoder-new": ({"decoder": "new"}, {}, ["new heads in every source clip"]),
     "decoder-finetune": ({"decoder": "finetune"}, {}, ["inherited heads keep learning"]),
-    "residual-none": ({"residual": "none"}, {}, ["inherited anchors only"]),
-    "residual-full": ({"residual": "full"}, {}, ["all points of a clip", "however many"]),
-    "inherit-frozen": ({"inherit": "frozen"}, {}, ["all inherited anchors stay as they are"]),
-    "inherit-trainable": ({"inherit": "trainable"}, {}, ["inherited anchors keep learning"]),
+    "anchors-stay": (STAY, {}, ["source clips keep their places", "where inherited ones cover them, these serve"]),
+    "residual-none": ({"residual": "none"} | STAY, {}, ["inherited anchors only", *STAYING]),
+    "residual-full": ({"residual": "full"} | STAY, {}, ["all points of a clip", "however many", *STAYING]),
+    "inherit-frozen": ({"inherit": "frozen"} | STAY, {}, ["all inherited anchors stay as they are", *STAYING]),
+    "inherit-trainable": ({"inherit": "trainable"} | STAY, {}, ["inherited anchors keep learning", *STAYING]),
     "inherit-off": (
         {"inherit": "off"},
         {},
         ["its own anchors", "without a static phase", "reference clip's backgrounds"],
     ),
     "inherit-trainable-residual-full": (
-        {"inherit": "trainable", "residual": "full"},
+        {"inherit": "trainable", "residual": "full"} | STAY,
         {},
-        ["all points of a clip, however many", "inherited anchors keep learning"],
+        ["all points of a clip, however many", "inherited anchors keep learning", *STAYING],
     ),
-    "field-continue": ({"field": "continue"}, {}, ["one field continues from clip to clip"]),
+    "field-continue": ({"field": "continue"} | STAY, {}, ["one field continues from clip to clip", *STAYING]),
     "clips-shorter": ({}, OWN | {"cut": "shorter"}, ["half the length", "as many steps a frame"]),
     "clips-longer": ({}, OWN | {"cut": "longer"}, ["twice the length", "as many steps a frame"]),
     "reference-middle": ({}, OWN | {"is_reference_moved": True}, ["in the middle is the reference"]),
@@ -124,7 +127,7 @@ def test_beside_what_is_pinned_only_lengths_follow_from_how_a_variant_is_cut(bas
 def test_only_variants_whose_reference_clip_is_trained_alike_share_it():
     for variant in VARIANTS:
         is_source_only = variant.cut == "clips" and not variant.is_reference_moved and variant.overrides.keys() <= {
-            "decoder", "residual", "inherit", "field"}  # fmt: skip
+            "decoder", "residual", "inherit", "field", "motion"}  # fmt: skip
         # the first of independent clips is that of full by its words; the settings are those of the others
         assert variant.shares_reference == (is_source_only or variant.name == "independent"), variant.name
 
