@@ -204,12 +204,16 @@ def _travelling(points: np.ndarray, presence: np.ndarray, seen: _Seen, gains: np
     n_frames = presence.shape[1]
     surfaces = [points[presence[:, frame]] for frame in range(n_frames)]
 
+    held: dict[int, np.ndarray] = {}  # pictures of the next frame, which may come from a disk
+
     def flow(frame: int) -> Arrays:
+        before = held.pop(frame, None)
         if len(surfaces[frame]) == 0:
             return {"steps": np.zeros((0, 3))}
         pixel, is_visible = seen.visibility(surfaces[frame], frame)
         masks = seen.masks.of_frame(frame) | seen.masks.of_frame(frame + 1)
-        pictures = seen.pictures(frame), seen.pictures(frame + 1)
+        held[frame + 1] = seen.pictures(frame + 1)
+        pictures = seen.pictures(frame) if before is None else before, held[frame + 1]
         return {"steps": surface_flow(surfaces[frame], pixel, is_visible, pictures, masks, seen.projections)}
 
     found = [keep(f"motion from frame {frame}", partial(flow, frame)) for frame in range(n_frames - 1)]

@@ -172,6 +172,44 @@ def test_moving_cloud_follows_the_sphere_through_the_clip() -> None:
     assert np.array_equal(cloud.colors, again.colors)
 
 
+@pytest.mark.slow
+def test_points_that_travel_stay_on_the_sphere() -> None:
+    rig = dome_rig()
+    positions = [CENTER + np.array([0.05 * m, 0.0, 0.02 * m]) for m in range(4)]
+    flags = np.stack([sphere_masks(rig, position, RADIUS) for position in positions])
+
+    def picture(row: int, frame_in_clip: int) -> np.ndarray:
+        return np.where(flags[frame_in_clip, row][..., None], [200, 100, 50], [0, 255, 0]).astype(np.uint8)
+
+    bounds: dict[str, Any] = {"bounds_min": np.full(3, -1.5), "bounds_max": np.full(3, 1.8)}
+    still, cloud, again = (
+        build_moving_cloud(
+            picture,
+            MotionMasks.of(flags),
+            rig,
+            np.ones((len(rig), 3)),
+            **bounds,
+            travels=travels,
+            report=lambda line: None,
+        )
+        for travels in (False, True, True)
+    )
+    assert still.motion is None
+    assert cloud.motion is not None
+    assert len(cloud.points) < 0.7 * len(still.points)
+    births, velocities, accelerations = cloud.motion
+    for m, position in enumerate(positions):
+        since = (m - births)[:, None]
+        here = (cloud.points + since * (velocities + since * accelerations))[cloud.presence[:, m]]
+        assert len(here) > 0.8 * still.presence[:, m].sum()
+        assert np.median(np.abs(np.linalg.norm(here - position, axis=1) - RADIUS)) < 1.5 * cloud.spacing
+    assert np.median(np.abs(cloud.colors * 255 - [200, 100, 50])) < 2.0
+    for name in ("points", "colors", "presence"):
+        assert np.array_equal(getattr(cloud, name), getattr(again, name))
+    for ours, theirs in zip(cloud.motion, again.motion or (), strict=True):
+        assert np.array_equal(ours, theirs)
+
+
 @pytest.mark.parametrize("n_frames", [1, 2])
 def test_nothing_moving_gives_an_empty_cloud(n_frames: int) -> None:
     rig = dome_rig(4)
