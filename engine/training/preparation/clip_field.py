@@ -18,11 +18,19 @@ _MOST_LOG2 = 20
 """log2 of the most table entries where every anchor is in the field, so that each has as many as with the gate."""
 
 
-def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator) -> str:
+def fit_field(
+    model: ClipModel,
+    *,
+    spacing: float,
+    config: TrainConfig,
+    generator: torch.Generator,
+    around: Tensor | None = None,
+) -> str:
     """Attach a fresh field over the dynamic anchors alive in this clip; none when nothing moves. Says its size.
 
     Args:
         spacing: Distance between moving anchors, scene units.
+        around: Further positions that its box has to hold. [n, 3]
     Raises:
         PreparationError: Its tables would be too large.
     """
@@ -33,6 +41,9 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
     # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
     ends = (0.0, 1.0) if is_published else (0.005, 0.995)
     lower, upper = (positions.quantile(end, dim=0) for end in ends)
+    if around is not None:
+        lower = torch.minimum(lower, around.quantile(ends[0], dim=0))
+        upper = torch.maximum(upper, around.quantile(ends[1], dim=0))
     margin = 0.0 if is_published else spacing
     side = max(float((upper - lower).max()), 4 * spacing) + 2 * margin
     n_levels = config.field_levels or config.field_max_levels

@@ -67,6 +67,9 @@ from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
 from engine.training.step.training_cameras import TrainingCameras
 
+_HEADS_SEED_STEP = 7_919
+"""From the seed of a clip to that of its new heads."""
+
 
 @dataclass(frozen=True, slots=True)
 class ClipParts:
@@ -268,7 +271,8 @@ class ClipPreparation:
             backgrounds = kept or self._backgrounds_of(reference, model, gains)
         exposures = exposures_in(backgrounds.images) if self._has_drift else None
         drift = no_drift(pictures) if exposures is None else remove_drift(pictures, exposures, self._report)
-        self._method.choose_decoder(model, seed=self._seed)
+        # other random starts than those of the reference clip, and of other clips
+        self._method.choose_decoder(model, seed=self._seed + _HEADS_SEED_STEP * (1 + self._clip.clip_index))
         if self._method.builds_static and self._config.cloud == "frames":
             model.replace_sets({})  # everything comes from the clip's own cloud
         elif self._method.builds_static:
@@ -276,7 +280,7 @@ class ClipPreparation:
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points):,} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing, vignetting=reference.vignetting)
-        if "static" in self._method.covering(model):  # parts that can change learn their own light
+        if not self._method.has_light:
             return parts
         plain = range(reference.header.start, reference.header.start + reference.header.n_frames)
         measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report, plain=plain)

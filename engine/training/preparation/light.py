@@ -33,10 +33,10 @@ def measure_light(
     *,
     plain: range,
 ) -> None:
-    """Give a model that inherits static anchors as they are the light on them at the start and the end of its clip.
+    """Give a model that inherits static anchors the light on them at the start and the end of its clip.
 
     Args:
-        model: Of a clip; one whose static anchors learn, or change over time, or that has none, stays as it is.
+        model: Of a clip; one whose static anchors change over time, or that has none, stays as it is.
         pictures: Of the clip, in the exposure of the backgrounds.
         rig: Training cameras.
         backgrounds: Their pictures in the reference clip when nothing moves.
@@ -47,7 +47,7 @@ def measure_light(
     if STATIC not in model.roles():
         return
     anchors = model.anchor_set(STATIC)
-    if anchors.is_trainable or anchors.is_dynamic:
+    if anchors.is_dynamic:
         return
     clip, n_frames = pictures.clip, pictures.capture.n_frames
     points = host_array(anchors.positions).astype(np.float64)

@@ -30,6 +30,7 @@ class Method:
         learns_inherited: Whether all inherited anchors keep learning; they are stored with the clip then.
         learns_heads: Whether heads learn in a source clip, all or those of what moves.
         builds_static: Whether a source clip has its own static anchors in place of all inherited ones.
+        has_light: Whether inherited still parts are given the light of the clip.
         obeys_regions: Whether regions that the user marks count.
         has_active_tiles: Whether a step of a source clip may leave out tiles that nothing learning touches.
         keeps_unread_entries: Whether entries of the field that no anchor of the clip reads are stored.
@@ -38,6 +39,7 @@ class Method:
     learns_inherited = False
     learns_heads = True
     builds_static = False
+    has_light = True
     obeys_regions = True
     has_active_tiles = True
     keeps_unread_entries = False

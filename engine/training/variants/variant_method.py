@@ -20,6 +20,7 @@ from engine.model.decoder import Decoder
 from engine.model.reading import read_field
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import ResidualAnchors, adapt_heads, adapt_moving
+from engine.training.preparation.clip_field import fit_field
 from engine.training.preparation.method import Method
 
 _FINAL_RATIOS = {
@@ -66,6 +67,7 @@ class VariantMethod(Method):
         self._field_goes_on = config.field == "continue"
         self.learns_inherited = self._inherit == "trainable"
         self.builds_static = self._inherit == "off"
+        self.has_light = not self.builds_static and self._gate != "off"
         self.obeys_regions = self._gate != "off"
         self.has_active_tiles = config.tiles == "active"
         # the field may show this clip as the next one leaves it, which reads other entries
@@ -140,8 +142,12 @@ class VariantMethod(Method):
         previous: ClipState | None,
         generator: torch.Generator,
     ) -> str:
-        if self._field_goes_on and previous is not None and previous.header.field:
-            return _continue_field(model, previous, clip)
+        if self._field_goes_on:
+            if previous is not None and previous.header.field:
+                return _continue_field(model, previous, clip)
+            # later clips move elsewhere in the same scene
+            around = model.anchor_set("static").positions.detach().float().cpu() if "static" in model.roles() else None
+            return fit_field(model, spacing=spacing, config=config, generator=generator, around=around)
         return super().attach_field(model, clip, config, spacing=spacing, previous=previous, generator=generator)
 
     def final_ratios(self, names: Iterable[str], config: TrainConfig) -> dict[str, float]:
@@ -159,6 +165,7 @@ class StreamingMethod(VariantMethod):
 
     def __init__(self, config: TrainConfig) -> None:
         super().__init__(config.going_on())
+        self.has_light = False  # the clip before has learned its own
 
     def base(self, reference: ClipState | None, previous: ClipState | None) -> ClipState | None:
         return reference if previous is None else merged(previous)

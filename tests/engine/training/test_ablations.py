@@ -30,7 +30,8 @@ SWITCHES: dict[str, dict[str, str]] = {
     "none": {"residual": "none"},
     "all_points": {"residual": "full"},
     "trainable": {"inherit": "trainable"},
-    "moving": {"inherit": "moving"},
+    "moving": {"inherit": "moving", "motion": "stay"},
+    "travel": {"inherit": "moving"},
     "off": {"inherit": "off"},
     "both": {"inherit": "trainable", "residual": "full"},
     "continue": {"field": "continue"},
@@ -45,6 +46,7 @@ LEARNS: dict[str, set[str]] = {
     "all_points": {"residual", "field"},
     "trainable": {"static", "moving", "residual", "field"},
     "moving": {"adapted", "residual", "field"},
+    "travel": {"residual", "field"},
     "off": {"static", "residual", "field"},
     "both": {"static", "moving", "residual", "field"},
     "continue": {"residual", "field"},
@@ -116,9 +118,9 @@ def test_a_clip_stores_what_it_learned_and_nothing_it_inherits(source_clips, nam
     arrays = source_clips[name].arrays
     assert learned_parts(key for key in arrays if not key.startswith("inherited.")) == STORES[name]
     inherited = {key for key in arrays if key.startswith("inherited.")}
-    if not {"static", "off"} & (LEARNS[name] | {name}):  # static anchors as they are, in the light of the clip
+    if name != "off":  # static anchors in the light of the clip
         inherited.discard("inherited.static.light")
-    is_kept = not {"moving", "adapted"} & LEARNS[name] and name != "off"
+    is_kept = not {"moving", "adapted"} & LEARNS[name] and name not in ("off", "travel")
     assert inherited == ({"inherited.moving.presence"} if is_kept else set())
 
 
@@ -203,7 +205,7 @@ def test_moving_anchors_that_learn_on_are_those_that_the_clip_uses(tiny, source_
     presence = source_clips["full"].arrays["inherited.moving.presence"]
     is_used = presence.any(1)
     assert 0 < is_used.sum() < len(is_used)
-    model = tiny.prepared(1, inherit="moving").model
+    model = tiny.prepared(1, inherit="moving", motion="stay").model
     assert model.roles() == ["static", "residual", "adapted"]
     adapted = model.anchor_set("adapted")
     for name in ("positions", "color_logits", "features", "log_base_scales", "log_offset_scales"):
