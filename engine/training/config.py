@@ -406,7 +406,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
             "Anchors of the reference clip in a source clip.",
             {
                 "frozen": "they keep feature and scales",
-                "moving": "static ones do; moving ones that the clip uses keep learning",
+                "moving": "static ones do; moving ones that the clip uses keep learning, or make room for its own with "
+                "motion=travel",
                 "trainable": "all are starting values that keep learning",
                 "off": "none; the clip builds its own and inherits only the decoder",
             },

@@ -51,6 +51,7 @@ class Method:
     def words(self, config: TrainConfig) -> str:
         """How a source clip treats the parts that it takes over, in one line."""
         moving = ", moving ones keep learning" if config.inherit == "moving" else ""
+        moving = ", moving ones replaced by such as travel" if config.anchors_travel else moving
         return f"inherited anchors kept{moving}, decoder kept for still parts"
 
     def choose_decoder(self, model: ClipModel, *, seed: int) -> None:

@@ -74,9 +74,10 @@ class VariantMethod(Method):
         self.keeps_unread_entries = self._field_goes_on
 
     def words(self, config: TrainConfig) -> str:
+        moving = "replaced by such as travel" if config.anchors_travel else "learning"
         anchors = {
             "frozen": "kept",
-            "moving": "kept if static, learning if moving",
+            "moving": f"kept if static, {moving} if moving",
             "trainable": "learning",
             "off": "left out",
         }
