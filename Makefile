@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run check test coverage lint types fmt bench faults soak docs screenshots golden clean
+.PHONY: help setup run check test coverage lint types fmt bench faults figures soak docs screenshots golden clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 16
@@ -64,6 +64,11 @@ faults: setup ## damage files and captures, contend for locks, kill trainings an
 
 soak: setup ## one hour of use by a program: does the window hold more and more memory or handles? MINUTES=60
 	@$(BIN)/python -m tests.soak.soak --minutes $(or $(MINUTES),60) $(if $(PROJECT),--project "$(PROJECT)")
+
+figures: setup ## train and measure the sample for docs/results, and fill the documents
+	@rm -rf out/figures/sample out/figures/sample.json
+	@$(BIN)/python -m tests.benchmarks.figures out/figures sample
+	@$(BIN)/python -m tests.documents write
 
 docs: setup ## fill the generated parts of the documents: keys, commands, settings
 	@$(BIN)/python -m tests.documents write

@@ -11,6 +11,7 @@ from tests.documents.edits import edits_table
 from tests.documents.exports import export_tables
 from tests.documents.gestures import gesture_tables
 from tests.documents.keys import key_tables
+from tests.documents.ledger import headline_table, quality_table
 from tests.documents.published import differences_table, published_table
 from tests.documents.settings import presets_table, settings_tables
 
@@ -25,6 +26,8 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "presets": presets_table,
     "published": published_table,
     "differences": differences_table,
+    "quality": quality_table,
+    "headline": headline_table,
 }
 """What each block is filled with."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
