@@ -83,15 +83,13 @@ class Sight:
         return rows
 
     def _travelling_rows(self, role: str, view_row: int, clip_time: float) -> Tensor:
-        """The same of a set whose anchors travel: found anew while their motion learns, so that a training that was
-        interrupted looks at the same ones."""
+        """The same of a set whose anchors travel: found once, as they travelled at first."""
         known = self._rows.get((role, view_row, clip_time))
         if known is None:
-            positions = self._model.positions(role, clip_time)
-            is_seen = self._views[view_row].sees(positions.detach(), reach=self.reaches[role])
+            positions = self._model.positions(role, clip_time).detach()
+            is_seen = self._views[view_row].sees(positions, reach=self.reaches[role])
             known = (self._is_present(role, clip_time) & is_seen).nonzero()[:, 0]
-            if not positions.requires_grad:
-                self._remember(role, view_row, clip_time, known)
+            self._remember(role, view_row, clip_time, known)
         return known
 
     def _is_present(self, role: str, clip_time: float) -> Tensor:

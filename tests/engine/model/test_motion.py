@@ -132,18 +132,6 @@ def test_cameras_look_where_anchors_are():
         np.testing.assert_array_equal(shown.own_positions[-len(places) :], places)
 
 
-def test_cameras_follow_motion_that_learns_and_remember_where_it_does_not():
-    model, view = clip(velocity=0.0), make_view(ClipRecipe(40))
-    sight, anchors = Sight(model, [view], reach=0.1), model.anchor_set("residual")
-    assert len(sight.rows(0, 0.9)["residual"])
-    with torch.no_grad():
-        anchors.velocities.fill_(50.0)
-    assert not len(sight.rows(0, 0.9)["residual"])
-    model.requires_grad_(requires_grad=False)
-    still = Sight(model, [view], reach=0.1)
-    assert still.rows(0, 0.9)["residual"] is still.rows(0, 0.9)["residual"]
-
-
 def host_positions(model: ClipModel, clip_time: float) -> np.ndarray:
     return model.anchor_set("residual").positions_at(10 * clip_time).detach().numpy()
 
