@@ -31,7 +31,8 @@ class Checkpoint:
         backgrounds: Of the training cameras.
         place: The place that the training has reached.
         reaches: The reach expected of each anchor's Gaussians when the phase began, scene units, by role; none in
-            checkpoints of earlier versions. [A] float32 each
+            checkpoints of earlier versions. [A] float32 each. With the motion that sets began with, see
+            engine.training.step.visible_anchors.Sight.
         cameras: The learned corrections of their poses and focal lengths; None where these do not learn. [C, 7] float32
     """
 

@@ -10,6 +10,7 @@ from torch import Tensor
 from engine.camera.rig import CameraRig
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, reaches_of
+from engine.model.motion import AnchorMotion
 
 
 def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
@@ -21,6 +22,7 @@ def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
     ]
 
 
+_MOTION = ("velocities", "accelerations")
 MAX_BYTES = 256 << 20
 """Memory for rows of moving anchors, of each camera and frame; rows that do not fit are found at every step."""
 
@@ -34,6 +36,7 @@ class Sight:
         reach: How far beyond its anchor a Gaussian may lie, scene units; farther where anchors are larger.
         reaches: The same anchor by anchor, where that was decided before: sizes are learned, and the visible anchors
             stay those at the beginning of a phase. By role, [A] each; those that do not fit the model are decided anew.
+            With them, for the same reason, the motion of sets that travel, [A, 3] each.
     """
 
     def __init__(
@@ -51,6 +54,9 @@ class Sight:
             if known is None or known.shape != (len(anchors),):
                 known = reaches_of(anchors, reach)
             self.reaches[role] = known
+            for kind in _MOTION if anchors.travels else ():
+                first, now = (reaches or {}).get(f"{role}.{kind}"), getattr(anchors, kind).detach()
+                self.reaches[f"{role}.{kind}"] = now.clone() if first is None or first.shape != now.shape else first
         self._seen: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._present: dict[str, Tensor] = {}  # of dynamic sets, a row a frame; [M, A]
         self._rows: dict[tuple[str, int, float], Tensor] = {}  # of dynamic sets
@@ -86,7 +92,9 @@ class Sight:
         """The same of a set whose anchors travel: found once, as they travelled at first."""
         known = self._rows.get((role, view_row, clip_time))
         if known is None:
-            positions = self._model.positions(role, clip_time).detach()
+            anchors, first = self._model.anchor_set(role), (self.reaches[f"{role}.{kind}"] for kind in _MOTION)
+            motion = AnchorMotion(anchors.birth_frames, *first)
+            positions = anchors.positions.detach() + motion.away(clip_time * self._model.clip_length)
             is_seen = self._views[view_row].sees(positions, reach=self.reaches[role])
             known = (self._is_present(role, clip_time) & is_seen).nonzero()[:, 0]
             self._remember(role, view_row, clip_time, known)

@@ -132,6 +132,18 @@ def test_cameras_look_where_anchors_are():
         np.testing.assert_array_equal(shown.own_positions[-len(places) :], places)
 
 
+def test_what_cameras_see_is_decided_when_a_phase_begins_also_where_it_is_taken_up_again():
+    model, view = clip(velocity=0.0), make_view(ClipRecipe(40))
+    sight, anchors = Sight(model, [view], reach=0.1), model.anchor_set("residual")
+    rows = sight.rows(0, 0.9)["residual"]
+    assert len(rows)
+    with torch.no_grad():
+        anchors.velocities.fill_(50.0)
+    assert sight.rows(0, 0.9)["residual"] is rows
+    assert torch.equal(Sight(model, [view], reach=0.1, reaches=sight.reaches).rows(0, 0.9)["residual"], rows)
+    assert not len(Sight(model, [view], reach=0.1).rows(0, 0.9)["residual"])
+
+
 def host_positions(model: ClipModel, clip_time: float) -> np.ndarray:
     return model.anchor_set("residual").positions_at(10 * clip_time).detach().numpy()
 
