@@ -153,7 +153,7 @@ class AnchorSet(nn.Module):
         """Some of these anchors, in their order. A copy.
 
         Args:
-            is_chosen: [A] bool, or rows [n] int64.
+            is_chosen: [A] bool
             presence: Takes the place of their own. [n, M] bool
             is_trainable: None leaves it.
         """

@@ -97,7 +97,7 @@ def visible_rows(model: ClipModel, view: View, clip_time: float, *, reach: float
     for role in model.roles():
         alive = model.alive(role, clip_time)
         anchors = model.anchor_set(role)
-        positions = model.positions(role, clip_time)[alive]
+        positions = model.positions(role, clip_time).detach()[alive]
         rows[role] = alive[view.sees(positions, reach=reaches_of(anchors, reach)[alive])]
     return rows
 

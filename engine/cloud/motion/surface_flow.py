@@ -26,8 +26,6 @@ SOFT_PX = 0.7
 _RIDGE = 1e-3
 """Of the mean square of how a point's image moves: along a ray that all cameras share, nothing is known."""
 
-cv2.setNumThreads(1)  # each camera has a thread here
-
 
 def picture_flow(before: np.ndarray, after: np.ndarray, is_moving: np.ndarray, pixel: np.ndarray) -> np.ndarray:
     """How far pixels of one camera move until the next frame.
@@ -74,6 +72,7 @@ def surface_flow(
     Returns:
         Scene units; 0 where too few cameras tell. [P, 3] float64
     """
+    cv2.setNumThreads(1)  # each camera has a thread here
     is_used = is_visible & (pixel >= 0)
 
     def seen_by(camera: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

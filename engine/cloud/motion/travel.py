@@ -31,14 +31,12 @@ class Travellers:
     Attributes:
         points: Where they are at birth, scene units. [P, 3] float64
         birth_frames: [P] int64
-        birth_rows: The surface point of that frame. [P] int64
         velocities, accelerations: See engine.model.motion.AnchorMotion. [P, 3] float64
         presence: On the surface in that frame. [P, M] bool
     """
 
     points: np.ndarray
     birth_frames: np.ndarray
-    birth_rows: np.ndarray
     velocities: np.ndarray
     accelerations: np.ndarray
     presence: np.ndarray
@@ -79,7 +77,7 @@ def follow(surfaces: Sequence[np.ndarray], steps: Sequence[np.ndarray], spacing:
                 is_there &= tree.query(positions)[0] < STRAY_SPACINGS * spacing
                 paths[:, frame], presence[:, frame] = positions - surfaces[birth][rows], is_there
         velocities, accelerations = _parabolas(paths, presence, birth)
-        part = Travellers(surfaces[birth][rows], np.full(len(rows), birth), rows, velocities, accelerations, presence)
+        part = Travellers(surfaces[birth][rows], np.full(len(rows), birth), velocities, accelerations, presence)
         parts.append(part)
         _cover(covered, surfaces, part, spacing)
     return Travellers(*(np.concatenate([getattr(part, name) for part in parts]) for name in Travellers.__slots__))

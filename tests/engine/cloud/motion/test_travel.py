@@ -42,7 +42,7 @@ def test_a_ball_on_a_parabola_is_the_same_points_in_all_frames():
     assert len(found.points) == len(ball())
     assert found.presence.all()
     assert set(found.birth_frames) == {5}
-    np.testing.assert_array_equal(found.points, surfaces[5][found.birth_rows])
+    np.testing.assert_array_equal(found.points, surfaces[5])
     # the fit leans a little towards no acceleration, so that one frame alone says nothing of it
     np.testing.assert_allclose(found.accelerations, np.tile(acceleration, (len(found.points), 1)), atol=1e-4)
     np.testing.assert_allclose(found.at(0), surfaces[0], atol=0.1 * SPACING)
