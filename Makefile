@@ -65,9 +65,10 @@ faults: setup ## damage files and captures, contend for locks, kill trainings an
 soak: setup ## one hour of use by a program: does the window hold more and more memory or handles? MINUTES=60
 	@$(BIN)/python -m tests.soak.soak --minutes $(or $(MINUTES),60) $(if $(PROJECT),--project "$(PROJECT)")
 
-figures: setup ## train and measure the sample for docs/results, and fill the documents
-	@rm -rf out/figures/sample out/figures/sample.json
-	@$(BIN)/python -m tests.benchmarks.figures out/figures sample
+figures: setup ## measure the short tables of docs/results again, all with LONG=1 BASKETBALL=folder, and fill the documents
+	@rm -rf out/figures
+	@$(BIN)/python -m tests.benchmarks.figures out/figures $(if $(LONG),--all,--short) \
+		$(if $(BASKETBALL),--basketball "$(BASKETBALL)")
 	@$(BIN)/python -m tests.documents write
 
 docs: setup ## fill the generated parts of the documents: keys, commands, settings

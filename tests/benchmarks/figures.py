@@ -1,96 +1,224 @@
-"""Measures the figures of the first table of docs/results.md, and writes them to the ledger in docs/results.
+"""Measures the tables of docs/results.md and writes each to the ledger, docs/results/NAME.json.
 
-    python -m tests.benchmarks.figures OUT sample
-    python -m tests.benchmarks.figures OUT basketball --capture PATH [--remark TEXT] [--commit HASH]
+    python -m tests.benchmarks.figures OUT NAME... [--basketball PATH] [--remark TEXT] [--commit HASH]
+    python -m tests.benchmarks.figures OUT --short | --all [--basketball PATH]
 
-Trains the first clips of a capture as a project in OUT/NAME, measures it (OUT/NAME.json), and writes the file
-docs/results/NAME.json; then fill the documents with `make docs`. A project that is trained there already is only
-measured, and measurements that are there are taken as they are: give the commit that they are of. `make figures` does
-all this for the sample.
+Captures and trainings of a table lie in OUT/NAME, and are taken up where they are there already. Tables of the
+basketball are left out without --basketball. Before it begins it says how long it will take, from how long each took
+the last time. Fill the documents with `make docs` afterwards; `make figures` does all this for the short tables, and
+`make figures LONG=1 BASKETBALL=PATH` for all.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import shlex
 import subprocess
 import sys
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from app.cli.cli import main as clipgstream
 from app.lab.machine import describe_machine
 from app.project.opening.project_access import open_project
 from engine.clip_files.clip_state import read_clip_header
-from tests.documents.ledger import SCHEMA, ClipRow, Entry, write_entry
+from tests.documents.fingerprint import fingerprint
+from tests.documents.ledger import LEDGER, Calm, ClipRow, ClipsEntry, TableEntry, entry, write_entry
+from tests.documents.printed import printed_tables
 
 ROOT = Path(__file__).resolve().parents[2]
+SAMPLE = ROOT / "assets" / "sample"
+_CLIPGSTREAM = "import sys; from app.cli.cli import main; sys.exit(main(sys.argv[1:]))"
+HOLDOUT = "0,10,15,30"
+"""Of the basketball, as others hold out."""
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
-    """What is trained of a capture. A value.
+class Clips:
+    """Clips that are trained as they are by default. A value.
 
     Attributes:
         title: Of the capture, for a table.
         clips: First clip and the one behind the last.
         holdout: Cameras that training leaves out; "" takes those of the capture.
-        capture: Where it is, if the project has it.
     """
 
     title: str
     clips: str
     holdout: str = ""
-    capture: Path | None = None
+    is_of_basketball: bool = False
+    is_long: bool = False
 
 
-CAPTURES = {
-    "sample": Measured("sample, 320x240, 18 training cameras", "0:2", capture=ROOT / "assets" / "sample"),
-    "basketball": Measured("CMU Panoptic basketball, 640x360, 27 training cameras", "0:4", "0,10,15,30"),
+@dataclass(frozen=True, slots=True)
+class Printed:
+    """A table that commands print. A value.
+
+    Attributes:
+        commands: "clipgstream ..." or "python -m ..."; CAPTURE, OUT and DIR stand for the capture, the folder of this
+            table and a project in it. What the last one prints is the table.
+        which: Among the tables that it prints.
+        columns: Those that are kept, by their headings; empty keeps all.
+    """
+
+    title: str
+    commands: tuple[str, ...]
+    which: int = 0
+    columns: tuple[str, ...] = ()
+    seeds: tuple[int, ...] = ()
+    is_of_basketball: bool = False
+    is_long: bool = True
+
+
+def _ablation(title: str, options: str, *, is_of_basketball: bool = False) -> Printed:
+    command = f"clipgstream ablate CAPTURE --project OUT/ablation --preset toy --no-fps --quiet {options}"
+    return Printed(title, (command,), is_of_basketball=is_of_basketball)
+
+
+TABLES: dict[str, Clips | Printed] = {
+    "sample": Clips("sample, 320x240, 18 training cameras", "0:2"),
+    "basketball": Clips(
+        "CMU Panoptic basketball, 640x360, 27 training cameras", "0:4", HOLDOUT, is_of_basketball=True, is_long=True
+    ),
+    "hard-cases": Printed("hard cases", ("python -m tests.benchmarks.bench_hard_cases OUT",), seeds=(0,)),
+    "long-captures": Printed(
+        "changing exposure and light",
+        ("python -m tests.benchmarks.bench_long_captures OUT --every 5 --set passes=6",),
+        which=-1,
+        seeds=(0,),
+    ),
+    "length": Printed(
+        "length",
+        (
+            "python -m tests.benchmarks.bench_length OUT --lengths 30,300 --stream-frames 300 --independent-frames 300 "
+            "--set passes=1",
+        ),
+        seeds=(0,),
+    ),
+    "mending": Printed("mending", ("python -m tests.benchmarks.bench_mending OUT",), seeds=(0,)),
+    "kernels": Printed("kernels", ("clipgstream bench --full --out OUT --quiet",), is_long=False),
+    "steps": Printed("training steps", ("clipgstream bench --full --out OUT --quiet",), which=1, is_long=False),
+    "timeline": Printed("timeline", ("python -m tests.benchmarks.bench_timeline",), is_long=False),
 }
 _FIGURES = ("psnr", "psnr_fit", "psnr_moving", "psnr_rest", "psnr_fit_rest", "ssim", "flip")
 
 
 def main() -> None:
-    """Measure one capture."""
+    """Measure the tables that are named."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("name", choices=CAPTURES)
-    parser.add_argument("--capture", type=Path)
-    parser.add_argument("--remark", default="")
-    parser.add_argument("--commit")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(TABLES))
+    parser.add_argument("--short", action="store_true", help="the tables that take a few minutes")
+    parser.add_argument("--all", action="store_true", help="all tables: hours")
+    parser.add_argument("--basketball", type=Path, help="folder of the CMU Panoptic basketball")
+    parser.add_argument("--remark", default="", help="what else has to be known, such as other work on the machine")
+    parser.add_argument("--commit", help="of what lies in OUT; by default that of the code")
     arguments = parser.parse_args()
-    what = CAPTURES[arguments.name]
-    capture = arguments.capture or what.capture
-    if capture is None:
-        parser.error(f"{arguments.name} does not come with the program: give its folder with --capture")
+    if unknown := [name for name in arguments.names if name not in TABLES]:
+        parser.error(f"there is no table {', '.join(unknown)}; known are {', '.join(TABLES)}")
+    chosen = {
+        name: what
+        for name, what in TABLES.items()
+        if name in arguments.names or arguments.all or (arguments.short and not what.is_long)
+    }
+    if not chosen:
+        parser.error(f"name one of {', '.join(TABLES)}, or give --short or --all")
+    if arguments.basketball is None:
+        left_out = [name for name, what in chosen.items() if what.is_of_basketball]
+        if set(left_out) & set(arguments.names):
+            parser.error(f"{', '.join(left_out)} needs a capture that does not come with the program: --basketball")
+        chosen = {name: what for name, what in chosen.items() if name not in left_out}
     commit = arguments.commit or _commit()
-    project, figures = arguments.out / arguments.name, arguments.out / f"{arguments.name}.json"
-    options = ["--clips", what.clips, *(["--holdout", what.holdout] if what.holdout else [])]
+    say(forecast(list(chosen)))
+    for name, what in chosen.items():
+        folder = arguments.out / name
+        folder.mkdir(parents=True, exist_ok=True)
+        capture = arguments.basketball if what.is_of_basketball else SAMPLE
+        start, common = time.monotonic(), {"commit": commit, "machine": _machine(), "remark": arguments.remark}
+        measure = measured_clips if isinstance(what, Clips) else measured_table
+        made = measure(what, folder, capture, common)
+        if not made.took_s:
+            made = msgspec.structs.replace(made, took_s=round(time.monotonic() - start, 1))
+        say(str(write_entry(name, made)))
+
+
+def forecast(names: Sequence[str]) -> str:
+    """How long tables will take, in words: as long as the last time."""
+    took = {name: entry(name).took_s if (LEDGER / f"{name}.json").exists() else None for name in names}
+    known = [seconds for seconds in took.values() if seconds is not None]
+    unknown = [name for name, seconds in took.items() if seconds is None]
+    text = f"{', '.join(names)}: about {sum(known) / 60:.0f} minutes, as long as the last time"
+    return text + (f"; not known of {', '.join(unknown)}" if unknown else "")
+
+
+def say(text: str) -> None:
+    """A line on the screen, at once."""
+    print(text, flush=True)
+
+
+def measured_clips(what: Clips, folder: Path, capture: Path, common: dict[str, Any]) -> ClipsEntry:
+    """Train clips and measure them; measurements that are there are taken as they are."""
+    project, figures, brief = folder / "project", folder / "figures.json", folder / "fingerprint"
+    options = f"--clips {what.clips}{f' --holdout {what.holdout}' if what.holdout else ''}"
     if not figures.exists():
-        for command in (
-            ["train", str(capture), "--project", str(project), *options],
-            ["eval", str(project), "--json", str(figures)],
-        ):
-            if code := clipgstream(command):
+        for command in (f"train CAPTURE --project DIR {options}", "eval DIR --json FILE"):
+            places = {"CAPTURE": str(capture), "DIR": str(project), "FILE": str(figures)}
+            if code := clipgstream([places.get(word, word) for word in shlex.split(command)]):
                 sys.exit(code)
-    commands = [f"clipgstream train CAPTURE --project DIR {' '.join(options)}", "clipgstream eval DIR --json FILE"]
-    made = Entry(
-        schema=SCHEMA,
+    document = json.loads(figures.read_text("utf-8"))
+    return ClipsEntry(
         title=what.title,
-        commands=commands,
-        commit=commit,
+        commands=[f"clipgstream train CAPTURE --project DIR {options}", "clipgstream eval DIR --json FILE"],
         day=datetime.fromtimestamp(figures.stat().st_mtime, UTC).date().isoformat(),
-        machine=_machine(),
-        seed=0,
-        remark=arguments.remark,
-        rows=_rows(project, json.loads(figures.read_text("utf-8"))),
+        seeds=[0],
+        rows=_rows(project, document),
+        calm=_calm(document["seams"]),
+        fingerprint=fingerprint(brief),
+        **common,
     )
-    sys.stdout.write(f"{write_entry(arguments.name, made)}\n")
+
+
+def measured_table(what: Printed, folder: Path, capture: Path, common: dict[str, Any]) -> TableEntry:
+    """Run commands and keep the table that the last one prints."""
+    printed = folder / "printed.txt"
+    if not printed.exists():
+        text = ""
+        for command in what.commands:
+            text = _run(command, {"CAPTURE": str(capture), "OUT": str(folder), "DIR": str(folder / "project")})
+        printed.write_text(text, "utf-8")
+    headings, *rows = printed_tables(printed.read_text("utf-8"))[what.which]
+    kept = [headings.index(name) for name in what.columns or headings]
+    return TableEntry(
+        title=what.title,
+        commands=list(what.commands),
+        day=datetime.fromtimestamp(printed.stat().st_mtime, UTC).date().isoformat(),
+        seeds=list(what.seeds),
+        columns=[headings[i] for i in kept],
+        rows=[[row[i] for i in kept] for row in rows],
+        **common,
+    )
+
+
+def _run(command: str, places: dict[str, str]) -> str:
+    """What a command prints on standard output; its code ends this program where it is not 0."""
+    program, *words = [
+        "/".join(places.get(part, part) for part in word.split("/")) if word.split("/")[0] in places else word
+        for word in shlex.split(command)
+    ]
+    start = ["-P", "-c", _CLIPGSTREAM] if program == "clipgstream" else []
+    say(command)
+    done = subprocess.run([sys.executable, *start, *words], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        sys.exit(done.returncode)
+    return done.stdout
 
 
 def _rows(folder: Path, document: dict[str, Any]) -> list[ClipRow]:
@@ -115,6 +243,22 @@ def _rows(folder: Path, document: dict[str, Any]) -> list[ClipRow]:
             )
         )
     return found
+
+
+def _calm(seams: dict[str, Any]) -> Calm:
+    means = seams["means"]["held_out"]
+    inside, at = means["interior"], means["boundary"]
+
+    def levels(name: str) -> tuple[float, float]:
+        return round(255 * inside[name], 3), round(255 * at[name], 3)
+
+    return Calm(
+        render=levels("change_static"),
+        truth=levels("truth_change_static"),
+        moving_ratio=round(means["ratio_moving"], 3),
+        moving_ratio_truth=round(means["truth_ratio_moving"], 3),
+        boundaries=[round(boundary["ratio_static"], 3) for boundary in seams["boundaries"]],
+    )
 
 
 def _mean(values: list[float | None]) -> float:

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+from tests.documents.answers import answers_table
 from tests.documents.commands import command_sections
 from tests.documents.edits import edits_table
 from tests.documents.exports import export_tables
 from tests.documents.gestures import gesture_tables
 from tests.documents.keys import key_tables
-from tests.documents.ledger import headline_table, quality_table
+from tests.documents.ledger import (
+    HEADLINE,
+    beside_published_table,
+    calm_table,
+    headline_table,
+    ledger_table,
+    names,
+    quality_table,
+)
 from tests.documents.published import differences_table, published_table
 from tests.documents.settings import presets_table, settings_tables
 
@@ -28,6 +38,10 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "differences": differences_table,
     "quality": quality_table,
     "headline": headline_table,
+    "answers": answers_table,
+    "calm": calm_table,
+    "beside-published": beside_published_table,
+    **{f"table-{name}": partial(ledger_table, name) for name in names() if name not in HEADLINE},
 }
 """What each block is filled with."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
