@@ -26,17 +26,17 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from app.cli.cli import main as clipgstream
 from app.lab.machine import describe_machine
 from app.project.opening.project_access import open_project
 from engine.clip_files.clip_state import read_clip_header
 from tests.documents.fingerprint import fingerprint
-from tests.documents.ledger import LEDGER, Calm, ClipRow, ClipsEntry, TableEntry, entry, write_entry
+from tests.documents.ledger import LEDGER, Calm, ClipRow, ClipsEntry, Entry, TableEntry, entry, write_entry
 from tests.documents.printed import printed_tables
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = ROOT / "assets" / "sample"
-_CLIPGSTREAM = "import sys; from app.cli.cli import main; sys.exit(main(sys.argv[1:]))"
+_CLIPGSTREAM = "import sys; sys.path.insert(0, '.'); from app.cli.cli import main; sys.exit(main(sys.argv[1:]))"
+"""Of this folder's code, whatever is installed; spawned processes import nothing from it."""
 HOLDOUT = "0,10,15,30"
 """Of the basketball, as others hold out."""
 
@@ -63,24 +63,26 @@ class Printed:
     """A table that commands print. A value.
 
     Attributes:
-        commands: "clipgstream ..." or "python -m ..."; CAPTURE, OUT and DIR stand for the capture, the folder of this
-            table and a project in it. What the last one prints is the table.
-        which: Among the tables that it prints.
+        commands: "clipgstream ...", "python -m ..." or "make ..."; SAMPLE, BASKETBALL, OUT and DIR stand for the two
+            captures, the folder of this table and a project in it. What the last one prints is the table.
+        which: Among the tables that it prints; None takes every line as a row.
         columns: Those that are kept, by their headings; empty keeps all.
     """
 
     title: str
     commands: tuple[str, ...]
-    which: int = 0
+    which: int | None = 0
     columns: tuple[str, ...] = ()
     seeds: tuple[int, ...] = ()
-    is_of_basketball: bool = False
     is_long: bool = True
 
+    @property
+    def is_of_basketball(self) -> bool:
+        """Whether a command reads that capture."""
+        return any("BASKETBALL" in command for command in self.commands)
 
-def _ablation(title: str, options: str, *, is_of_basketball: bool = False) -> Printed:
-    command = f"clipgstream ablate CAPTURE --project OUT/ablation --preset toy --no-fps --quiet {options}"
-    return Printed(title, (command,), is_of_basketball=is_of_basketball)
+
+_TRAIN_SAMPLE = "clipgstream train SAMPLE --project DIR --clips 0:2"
 
 
 TABLES: dict[str, Clips | Printed] = {
@@ -106,7 +108,16 @@ TABLES: dict[str, Clips | Printed] = {
     "mending": Printed("mending", ("python -m tests.benchmarks.bench_mending OUT",), seeds=(0,)),
     "kernels": Printed("kernels", ("clipgstream bench --full --out OUT --quiet",), is_long=False),
     "steps": Printed("training steps", ("clipgstream bench --full --out OUT --quiet",), which=1, is_long=False),
-    "timeline": Printed("timeline", ("python -m tests.benchmarks.bench_timeline",), is_long=False),
+    "doctor": Printed("the capture doctor", ("python -m tests.benchmarks.bench_doctor SAMPLE BASKETBALL",)),
+    "synchronisation": Printed(
+        "offsets in time", ("python -m tests.benchmarks.bench_synchronisation SAMPLE BASKETBALL",), seeds=(0, 1)
+    ),
+    "gl": Printed("OpenGL against the rasterizer", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_gl DIR")),
+    "timeline": Printed("the timeline", ("python -m tests.benchmarks.bench_timeline",), is_long=False),
+    "window": Printed("the window", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_window DIR --no-training")),
+    "opening": Printed("opening", ("python -m tests.benchmarks.bench_opening OUT",), which=None),
+    "large": Printed("a project of 1,000 clips", ("python -m tests.benchmarks.bench_project",), which=None),
+    "faults": Printed("faults", ("make --silent faults",), which=None),
 }
 _FIGURES = ("psnr", "psnr_fit", "psnr_moving", "psnr_rest", "psnr_fit_rest", "ssim", "flip")
 
@@ -139,15 +150,27 @@ def main() -> None:
     commit = arguments.commit or _commit()
     say(forecast(list(chosen)))
     for name, what in chosen.items():
-        folder = arguments.out / name
+        folder = arguments.out / folder_name(name)
         folder.mkdir(parents=True, exist_ok=True)
-        capture = arguments.basketball if what.is_of_basketball else SAMPLE
+        places = {"SAMPLE": str(SAMPLE), "BASKETBALL": str(arguments.basketball), "OUT": str(folder)}
+        trained = arguments.out / "sample" if isinstance(what, Printed) and _TRAIN_SAMPLE in what.commands else folder
+        places |= {"DIR": str(trained / "project"), "FILE": str(folder / "figures.json")}
         start, common = time.monotonic(), {"commit": commit, "machine": _machine(), "remark": arguments.remark}
-        measure = measured_clips if isinstance(what, Clips) else measured_table
-        made = measure(what, folder, capture, common)
+        if isinstance(what, Clips):
+            made: Entry = measured_clips(what, folder, places, common)
+        else:
+            made = measured_table(what, folder, places, common)
         if not made.took_s:
             made = msgspec.structs.replace(made, took_s=round(time.monotonic() - start, 1))
         say(str(write_entry(name, made)))
+
+
+def folder_name(name: str) -> str:
+    """Of what a table leaves behind: tables that the same commands print share it."""
+    what = TABLES[name]
+    if isinstance(what, Clips):
+        return name
+    return next(one for one, of in TABLES.items() if isinstance(of, Printed) and of.commands == what.commands)
 
 
 def forecast(names: Sequence[str]) -> str:
@@ -161,22 +184,23 @@ def forecast(names: Sequence[str]) -> str:
 
 def say(text: str) -> None:
     """A line on the screen, at once."""
-    print(text, flush=True)
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
-def measured_clips(what: Clips, folder: Path, capture: Path, common: dict[str, Any]) -> ClipsEntry:
+def measured_clips(what: Clips, folder: Path, places: dict[str, str], common: dict[str, Any]) -> ClipsEntry:
     """Train clips and measure them; measurements that are there are taken as they are."""
-    project, figures, brief = folder / "project", folder / "figures.json", folder / "fingerprint"
+    project, figures, brief = Path(places["DIR"]), Path(places["FILE"]), folder / "fingerprint"
+    capture = "BASKETBALL" if what.is_of_basketball else "SAMPLE"
     options = f"--clips {what.clips}{f' --holdout {what.holdout}' if what.holdout else ''}"
+    commands = [f"clipgstream train {capture} --project DIR {options}", "clipgstream eval DIR --json FILE"]
     if not figures.exists():
-        for command in (f"train CAPTURE --project DIR {options}", "eval DIR --json FILE"):
-            places = {"CAPTURE": str(capture), "DIR": str(project), "FILE": str(figures)}
-            if code := clipgstream([places.get(word, word) for word in shlex.split(command)]):
-                sys.exit(code)
+        for command in commands:
+            _run(command, places)
     document = json.loads(figures.read_text("utf-8"))
     return ClipsEntry(
         title=what.title,
-        commands=[f"clipgstream train CAPTURE --project DIR {options}", "clipgstream eval DIR --json FILE"],
+        commands=commands,
         day=datetime.fromtimestamp(figures.stat().st_mtime, UTC).date().isoformat(),
         seeds=[0],
         rows=_rows(project, document),
@@ -186,15 +210,15 @@ def measured_clips(what: Clips, folder: Path, capture: Path, common: dict[str, A
     )
 
 
-def measured_table(what: Printed, folder: Path, capture: Path, common: dict[str, Any]) -> TableEntry:
+def measured_table(what: Printed, folder: Path, places: dict[str, str], common: dict[str, Any]) -> TableEntry:
     """Run commands and keep the table that the last one prints."""
     printed = folder / "printed.txt"
     if not printed.exists():
         text = ""
         for command in what.commands:
-            text = _run(command, {"CAPTURE": str(capture), "OUT": str(folder), "DIR": str(folder / "project")})
+            text = _run(command, places)
         printed.write_text(text, "utf-8")
-    headings, *rows = printed_tables(printed.read_text("utf-8"))[what.which]
+    headings, *rows = _table_in(printed.read_text("utf-8"), what.which)
     kept = [headings.index(name) for name in what.columns or headings]
     return TableEntry(
         title=what.title,
@@ -207,15 +231,18 @@ def measured_table(what: Printed, folder: Path, capture: Path, common: dict[str,
     )
 
 
+def _table_in(printed: str, which: int | None) -> list[list[str]]:
+    if which is None:
+        return [["what was printed"], *([line.strip()] for line in printed.splitlines() if line.strip())]
+    return printed_tables(printed)[which]
+
+
 def _run(command: str, places: dict[str, str]) -> str:
     """What a command prints on standard output; its code ends this program where it is not 0."""
-    program, *words = [
-        "/".join(places.get(part, part) for part in word.split("/")) if word.split("/")[0] in places else word
-        for word in shlex.split(command)
-    ]
-    start = ["-P", "-c", _CLIPGSTREAM] if program == "clipgstream" else []
+    program, *words = [places.get(word, word) for word in shlex.split(command)]
+    start = {"clipgstream": [sys.executable, "-P", "-c", _CLIPGSTREAM], "python": [sys.executable]}
     say(command)
-    done = subprocess.run([sys.executable, *start, *words], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    done = subprocess.run([*start.get(program, [program]), *words], cwd=ROOT, stdout=subprocess.PIPE, text=True)
     if done.returncode:
         sys.exit(done.returncode)
     return done.stdout

@@ -56,7 +56,7 @@ class _Measured(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fie
 
     Attributes:
         title: Of the capture, or of what was measured.
-        commands: What was run, one after the other; CAPTURE, DIR, OUT and FILE stand for paths.
+        commands: What was run, one after the other; SAMPLE, BASKETBALL, CAPTURE, DIR, OUT and FILE stand for paths.
         commit: Of the code; "" where it was not written down.
         day: ISO date.
         machine: Processor, cores and versions, one line.
@@ -231,7 +231,7 @@ def beside_published_table() -> str:
     n_frames = f"{10 * len(ours.rows)} of {N_FRAMES}"
     words = f"this program, the first {len(ours.rows)} clips"
     figures = f"{ours.mean('psnr'):.2f}", f"{ours.mean('ssim'):.3f}", "not measured"
-    lines = [(words, n_frames, *figures, "[basketball.json](results/basketball.json)")]
+    lines: list[tuple[str, ...]] = [(words, n_frames, *figures, "[basketball.json](results/basketball.json)")]
     for one in published_of("basketball"):
         others = ("" if value is None else f"{value:.3f}" for value in (one.ssim, one.lpips))
         method = f"{one.method}, {one.caveat}" if one.caveat else one.method

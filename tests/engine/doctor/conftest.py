@@ -22,26 +22,27 @@ N_SHARED = 45
 
 @pytest.fixture
 def matches_in() -> Callable[[CameraRig], list[PairMatches]]:
-    """matches_in(rig): what SIFT would find between neighbours, some of it wrong."""
+    """matches_in(rig): see made_matches."""
+    return made_matches
 
-    def make(rig: CameraRig) -> list[PairMatches]:
-        rng = np.random.default_rng(5)
-        places = rng.uniform([-1.9, -1.9, 0.0], [1.9, 1.9, 2.0], (3000, 3))
-        width, height = (int(value) for value in rig.image_sizes[0])
-        seen = [project(places, matrix) for matrix in projection_matrices(rig)]
-        is_seen = [is_in_picture(*one, width, height) & (one[1] > 0.3) for one in seen]
-        pairs = []
-        for a, b in neighbour_pairs(rig):
-            rows = np.flatnonzero(is_seen[a] & is_seen[b])
-            rows = rng.permutation(rows)[:N_SHARED]
-            here = seen[a][0][rows] + rng.normal(0, NOISE_PX, (len(rows), 2))
-            there = seen[b][0][rows] + rng.normal(0, NOISE_PX, (len(rows), 2))
-            is_wrong = rng.uniform(size=len(rows)) < WRONG_SHARE
-            there[is_wrong] = rng.uniform(0, [width, height], (int(is_wrong.sum()), 2))
-            pairs.append(PairMatches(a, b, here, there, np.stack([rows, rows], -1)))
-        return pairs
 
-    return make
+def made_matches(rig: CameraRig) -> list[PairMatches]:
+    """What SIFT would find between neighbours, some of it wrong."""
+    rng = np.random.default_rng(5)
+    places = rng.uniform([-1.9, -1.9, 0.0], [1.9, 1.9, 2.0], (3000, 3))
+    width, height = (int(value) for value in rig.image_sizes[0])
+    seen = [project(places, matrix) for matrix in projection_matrices(rig)]
+    is_seen = [is_in_picture(*one, width, height) & (one[1] > 0.3) for one in seen]
+    pairs = []
+    for a, b in neighbour_pairs(rig):
+        rows = np.flatnonzero(is_seen[a] & is_seen[b])
+        rows = rng.permutation(rows)[:N_SHARED]
+        here = seen[a][0][rows] + rng.normal(0, NOISE_PX, (len(rows), 2))
+        there = seen[b][0][rows] + rng.normal(0, NOISE_PX, (len(rows), 2))
+        is_wrong = rng.uniform(size=len(rows)) < WRONG_SHARE
+        there[is_wrong] = rng.uniform(0, [width, height], (int(is_wrong.sum()), 2))
+        pairs.append(PairMatches(a, b, here, there, np.stack([rows, rows], -1)))
+    return pairs
 
 
 def with_focal(rig: CameraRig, camera: int, factor: float) -> CameraRig:
