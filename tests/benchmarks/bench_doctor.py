@@ -53,7 +53,7 @@ def named(rig: CameraRig, pairs: Sequence[PairMatches]) -> list[tuple[str, ...]]
 def rows_of(title: str, rig: CameraRig, pairs: Sequence[PairMatches], every: int) -> list[tuple[str, ...]]:
     """One row without an error and one for each kind."""
     alarms = len(named(rig, pairs))
-    missed_px = np.median([error.median_px for error in pair_errors(rig, pairs)])
+    missed_px = np.nanmedian([error.median_px for error in pair_errors(rig, pairs)])
     rows = [(title, f"none (misses by {missed_px:.2f} px)", "", str(alarms))]
     for error, make in ERRORS.items():
         found = [(camera, named(make(rig, camera), pairs)) for camera in range(0, len(rig), every)]
