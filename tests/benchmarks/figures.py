@@ -85,6 +85,38 @@ class Printed:
 _TRAIN_SAMPLE = "clipgstream train SAMPLE --project DIR --clips 0:2"
 
 
+PAPER_ROWS = (
+    "full,anchors-stay,decoder-new,residual-none,residual-full,inherit-trainable,inherit-trainable-residual-full,"
+    "field-continue,independent,gate-off,schedule-inherited"
+)
+_PAPER_SCHEME = "--set gate=off --set cloud=frames --set field_max_levels=16"
+_COLUMNS = (
+    "",
+    "PSNR",
+    "moving",
+    "static",
+    "SSIM",
+    "DSSIM1",
+    "DSSIM MS",
+    "DSSIM r2",
+    "tOF px",
+    "flicker inside /255",
+    "flicker borders /255",
+    "seam ratio static",
+    "MB",
+    "s per later clip",
+    "FPS CPU",
+)
+
+
+def _ablation(title: str, options: str, *, seeds: tuple[int, ...], variants: str = PAPER_ROWS) -> Printed:
+    """Rows of the paper's ablations, three clips each, with the smallest models and schedules."""
+    of_seeds = f"--seeds {','.join(map(str, seeds))}"
+    command = f"--project OUT --preset toy --n-clips 3 --variants {variants} {of_seeds} --metrics all --quiet"
+    return Printed(title, (f"clipgstream ablate {options} {command}",), columns=_COLUMNS, seeds=seeds)
+
+
+_BASKETBALL = f"BASKETBALL --scale 0.5 --holdout {HOLDOUT} --set passes=3"
 TABLES: dict[str, Clips | Printed] = {
     "sample": Clips("sample, 320x240, 18 training cameras", "0:2"),
     "basketball": Clips(
@@ -108,6 +140,14 @@ TABLES: dict[str, Clips | Printed] = {
     "mending": Printed("mending", ("python -m tests.benchmarks.bench_mending OUT",), seeds=(0,)),
     "kernels": Printed("kernels", ("clipgstream bench --full --out OUT --quiet",), is_long=False),
     "steps": Printed("training steps", ("clipgstream bench --full --out OUT --quiet",), which=1, is_long=False),
+    "ablation-sample": _ablation("sample, this program's scheme", "SAMPLE --set passes=4", seeds=(0, 1, 2)),
+    "ablation-sample-paper": _ablation(
+        "sample, the paper's scheme", f"SAMPLE --set passes=4 {_PAPER_SCHEME}", seeds=(0, 1, 2)
+    ),
+    "ablation-basketball": _ablation("basketball, this program's scheme", _BASKETBALL, seeds=(0, 1)),
+    "ablation-basketball-paper": _ablation(
+        "basketball, the paper's scheme", f"{_BASKETBALL} {_PAPER_SCHEME}", seeds=(0, 1)
+    ),
     "doctor": Printed("the capture doctor", ("python -m tests.benchmarks.bench_doctor SAMPLE BASKETBALL",)),
     "synchronisation": Printed(
         "offsets in time", ("python -m tests.benchmarks.bench_synchronisation SAMPLE BASKETBALL",), seeds=(0, 1)
