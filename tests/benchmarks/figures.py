@@ -4,7 +4,7 @@
     python -m tests.benchmarks.figures OUT --short | --all [--basketball PATH]
 
 Captures and trainings of a table lie in OUT/NAME, and are taken up where they are there already. Tables of the
-basketball are left out without --basketball. Before it begins it says how long it will take, from how long each took
+basketball are left out without --basketball; its later frames are in a folder beside it, PATH_later. Before it begins it says how long it will take, from how long each took
 the last time. Fill the documents with `make docs` afterwards; `make figures` does all this for the short tables, and
 `make figures LONG=1 BASKETBALL=PATH` for all.
 """
@@ -47,15 +47,20 @@ class Clips:
 
     Attributes:
         title: Of the capture, for a table.
-        clips: First clip and the one behind the last.
-        holdout: Cameras that training leaves out; "" takes those of the capture.
+        training: What follows `clipgstream train`: the capture and options.
+        makes: A command that makes the capture first, if one does; CAPTURE stands for its folder.
     """
 
     title: str
-    clips: str
-    holdout: str = ""
-    is_of_basketball: bool = False
-    is_long: bool = False
+    training: str
+    makes: str = ""
+    is_long: bool = True
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """As of Printed."""
+        made = (self.makes,) if self.makes else ()
+        return (*made, f"clipgstream train {self.training} --project DIR", "clipgstream eval DIR --json FILE")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +68,8 @@ class Printed:
     """A table that commands print. A value.
 
     Attributes:
-        commands: "clipgstream ...", "python -m ..." or "make ..."; SAMPLE, BASKETBALL, OUT and DIR stand for the two
-            captures, the folder of this table and a project in it. What the last one prints is the table.
+        commands: "clipgstream ...", "python -m ..." or "make ..."; SAMPLE, BASKETBALL and LATER stand for captures, OUT
+            and DIR for the folder of this table and a project in it. What the last one prints is the table.
         which: Among the tables that it prints; None takes every line as a row.
         columns: Those that are kept, by their headings; empty keeps all.
     """
@@ -75,11 +80,6 @@ class Printed:
     columns: tuple[str, ...] = ()
     seeds: tuple[int, ...] = ()
     is_long: bool = True
-
-    @property
-    def is_of_basketball(self) -> bool:
-        """Whether a command reads that capture."""
-        return any("BASKETBALL" in command for command in self.commands)
 
 
 _TRAIN_SAMPLE = "clipgstream train SAMPLE --project DIR --clips 0:2"
@@ -118,9 +118,20 @@ def _ablation(title: str, options: str, *, seeds: tuple[int, ...], variants: str
 
 _BASKETBALL = f"BASKETBALL --scale 0.5 --holdout {HOLDOUT} --set passes=3"
 TABLES: dict[str, Clips | Printed] = {
-    "sample": Clips("sample, 320x240, 18 training cameras", "0:2"),
+    "sample": Clips("sample, 320x240, 18 training cameras", "SAMPLE --clips 0:2", is_long=False),
     "basketball": Clips(
-        "CMU Panoptic basketball, 640x360, 27 training cameras", "0:4", HOLDOUT, is_of_basketball=True, is_long=True
+        "CMU Panoptic basketball, 640x360, 27 training cameras", f"BASKETBALL --clips 0:4 --holdout {HOLDOUT}"
+    ),
+    "far-clips": Clips(
+        "basketball, frames 0 to 19 and 100 to 119",
+        f"CAPTURE --clips 0:4 --holdout {HOLDOUT}",
+        makes="python -m tests.benchmarks.join_panoptic BASKETBALL LATER CAPTURE",
+    ),
+    "full-size": Clips(
+        "the sample's scene, 1920x1080, 18 training cameras",
+        "CAPTURE --clips 0:2",
+        makes="python -m app.lab.synthetic --out CAPTURE --width 1920 --height 1080 --cameras 20 --frames 20 "
+        "--clip-length 10 --supersampling 2",
     ),
     "hard-cases": Printed("hard cases", ("python -m tests.benchmarks.bench_hard_cases OUT",), seeds=(0,)),
     "long-captures": Printed(
@@ -183,7 +194,7 @@ def main() -> None:
     if not chosen:
         parser.error(f"name one of {', '.join(TABLES)}, or give --short or --all")
     if arguments.basketball is None:
-        left_out = [name for name, what in chosen.items() if what.is_of_basketball]
+        left_out = [name for name, what in chosen.items() if is_of_basketball(what)]
         if set(left_out) & set(arguments.names):
             parser.error(f"{', '.join(left_out)} needs a capture that does not come with the program: --basketball")
         chosen = {name: what for name, what in chosen.items() if name not in left_out}
@@ -195,6 +206,7 @@ def main() -> None:
         places = {"SAMPLE": str(SAMPLE), "BASKETBALL": str(arguments.basketball), "OUT": str(folder)}
         trained = arguments.out / "sample" if isinstance(what, Printed) and _TRAIN_SAMPLE in what.commands else folder
         places |= {"DIR": str(trained / "project"), "FILE": str(folder / "figures.json")}
+        places |= {"CAPTURE": str(folder / "capture"), "LATER": f"{arguments.basketball}_later"}
         start, common = time.monotonic(), {"commit": commit, "machine": _machine(), "remark": arguments.remark}
         if isinstance(what, Clips):
             made: Entry = measured_clips(what, folder, places, common)
@@ -203,6 +215,11 @@ def main() -> None:
         if not made.took_s:
             made = msgspec.structs.replace(made, took_s=round(time.monotonic() - start, 1))
         say(str(write_entry(name, made)))
+
+
+def is_of_basketball(what: Clips | Printed) -> bool:
+    """Whether a command reads that capture."""
+    return any("BASKETBALL" in command for command in what.commands)
 
 
 def folder_name(name: str) -> str:
@@ -231,21 +248,18 @@ def say(text: str) -> None:
 def measured_clips(what: Clips, folder: Path, places: dict[str, str], common: dict[str, Any]) -> ClipsEntry:
     """Train clips and measure them; measurements that are there are taken as they are."""
     project, figures, brief = Path(places["DIR"]), Path(places["FILE"]), folder / "fingerprint"
-    capture = "BASKETBALL" if what.is_of_basketball else "SAMPLE"
-    options = f"--clips {what.clips}{f' --holdout {what.holdout}' if what.holdout else ''}"
-    commands = [f"clipgstream train {capture} --project DIR {options}", "clipgstream eval DIR --json FILE"]
     if not figures.exists():
-        for command in commands:
+        for command in what.commands:
             _run(command, places)
     document = json.loads(figures.read_text("utf-8"))
     return ClipsEntry(
         title=what.title,
-        commands=commands,
+        commands=list(what.commands),
         day=datetime.fromtimestamp(figures.stat().st_mtime, UTC).date().isoformat(),
         seeds=[0],
         rows=_rows(project, document),
         calm=_calm(document["seams"]),
-        fingerprint=fingerprint(brief),
+        fingerprint=fingerprint(brief) if what.training.startswith(("SAMPLE", "BASKETBALL")) else {},
         **common,
     )
 

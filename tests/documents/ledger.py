@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -175,10 +175,15 @@ IN_LAB = ("ablation", "paper", "equal")
 
 
 def quality_table() -> str:
+    """The clips of the headline."""
+    return _clips_table(HEADLINE)
+
+
+def _clips_table(names: Sequence[str]) -> str:
     """A row per clip, and one per capture of more than two; below it where they come from."""
     header = "capture", "clip", "PSNR", "PSNR fit", "moving pixels", "other pixels", "other, fit", "SSIM", "FLIP"
     lines: list[tuple[str, ...]] = []
-    for name in HEADLINE:
+    for name in names:
         found = clips_entry(name)
         for row in found.rows:
             title = found.title if row is found.rows[0] else ""
@@ -188,7 +193,7 @@ def quality_table() -> str:
         if len(found.rows) > 2:
             seconds = tuple(f"{found.total(kind):.0f}" for kind in ("preparation_s", "training_s"))
             lines.append(("", "all", *_figures(found.mean), *seconds, f"{found.total('n_bytes') / 1e6:.2f}"))
-    sources = "\n".join(source(name) for name in HEADLINE)
+    sources = "\n".join(source(name) for name in names)
     return f"{table((*header, 'preparation s', 'training s', 'MB'), lines)}\n\n{sources}"
 
 
@@ -241,7 +246,9 @@ def beside_published_table() -> str:
 
 def ledger_table(name: str) -> str:
     """The table of a file, and where it comes from."""
-    found = table_entry(name)
+    found = entry(name)
+    if isinstance(found, ClipsEntry):
+        return _clips_table((name,))
     return f"{table(found.columns, found.rows)}\n\n{source(name)}"
 
 
