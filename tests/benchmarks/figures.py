@@ -4,9 +4,9 @@
     python -m tests.benchmarks.figures OUT --short | --all [--basketball PATH]
 
 Captures and trainings of a table lie in OUT/NAME, and are taken up where they are there already. Tables of the
-basketball are left out without --basketball; its later frames are in a folder beside it, PATH_later. Before it begins it says how long it will take, from how long each took
-the last time. Fill the documents with `make docs` afterwards; `make figures` does all this for the short tables, and
-`make figures LONG=1 BASKETBALL=PATH` for all.
+basketball are left out without --basketball; its later frames are in a folder beside it, PATH_later. Before it begins
+it says how long it will take, from how long each took the last time. Fill the documents with `make docs` afterwards;
+`make figures` does all this for the short tables, and `make figures LONG=1 BASKETBALL=PATH` for all.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from app.lab.machine import describe_machine
 from app.project.opening.project_access import open_project
 from engine.clip_files.clip_state import read_clip_header
 from tests.documents.fingerprint import fingerprint
-from tests.documents.ledger import LEDGER, Calm, ClipRow, ClipsEntry, Entry, TableEntry, entry, write_entry
+from tests.documents.ledger import HEADLINE, LEDGER, Calm, ClipRow, ClipsEntry, Entry, TableEntry, entry, write_entry
 from tests.documents.printed import printed_tables
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -132,6 +132,18 @@ TABLES: dict[str, Clips | Printed] = {
         "CAPTURE --clips 0:2",
         makes="python -m app.lab.synthetic --out CAPTURE --width 1920 --height 1080 --cameras 20 --frames 20 "
         "--clip-length 10 --supersampling 2",
+    ),
+    "paper-sample": Clips("sample, `--preset paper`", "SAMPLE --preset paper --clips 0:2"),
+    "paper-equal-steps": Clips(
+        "sample, default settings with as many steps",
+        "SAMPLE --set joint_steps=6120 --set source_steps=6120 --clips 0:2",
+    ),
+    "paper-basketball": Clips(
+        "basketball at half size, `--preset paper`",
+        f"BASKETBALL --preset paper --scale 0.5 --clips 0:1 --holdout {HOLDOUT}",
+    ),
+    "paper-basketball-default": Clips(
+        "basketball at half size, default settings", f"BASKETBALL --scale 0.5 --clips 0:1 --holdout {HOLDOUT}"
     ),
     "hard-cases": Printed("hard cases", ("python -m tests.benchmarks.bench_hard_cases OUT",), seeds=(0,)),
     "long-captures": Printed(
@@ -259,7 +271,7 @@ def measured_clips(what: Clips, folder: Path, places: dict[str, str], common: di
         seeds=[0],
         rows=_rows(project, document),
         calm=_calm(document["seams"]),
-        fingerprint=fingerprint(brief) if what.training.startswith(("SAMPLE", "BASKETBALL")) else {},
+        fingerprint=fingerprint(brief) if what in map(TABLES.get, HEADLINE) else {},
         **common,
     )
 
