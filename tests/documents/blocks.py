@@ -12,6 +12,7 @@ from tests.documents.exports import export_tables
 from tests.documents.gestures import gesture_tables
 from tests.documents.keys import key_tables
 from tests.documents.ledger import headline_table, quality_table
+from tests.documents.paper import paper_tables
 from tests.documents.published import differences_table, published_table
 from tests.documents.settings import presets_table, settings_tables
 
@@ -26,6 +27,7 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "presets": presets_table,
     "published": published_table,
     "differences": differences_table,
+    "paper": paper_tables,
     "quality": quality_table,
     "headline": headline_table,
 }

@@ -8,12 +8,14 @@ from app.evaluation.headless import TrainedProject
 from app.lab.pictures import Pictures
 from app.lab.report.comparison import Compared
 from app.lab.report.page.parts import Section
+from app.lab.report.paper_figures.beside_tables import paper_ablations_section, paper_tables_section
 from app.lab.report.paper_figures.by_hand import Places
 from app.lab.report.paper_figures.change_maps import change_maps_section
 from app.lab.report.paper_figures.crops import crops_section
 from app.lab.report.paper_figures.features import features_section
 from app.lab.report.paper_figures.over_length import clip_length_section, sequence_length_section
 from app.lab.report.paper_figures.pictured import pictured_projects
+from engine.capture.capture_summary import describe
 
 STEPS = 3
 """How often `tick` is called."""
@@ -27,8 +29,8 @@ def paper_sections(
     places: Places,
     tick: Callable[[], None],
 ) -> list[Section]:
-    """Maps and crops where there are two projects, or a place was chosen by hand; figures over length where lengths
-    differ; static and dynamic features always.
+    """Tables of the paper where some fit; maps and crops where there are two projects, or a place was chosen by hand;
+    figures over length where lengths differ; static and dynamic features always.
 
     Args:
         compared: The page's own project first.
@@ -37,7 +39,7 @@ def paper_sections(
     """
     projects, left_out = pictured_projects(compared, own_pictures, opened, make_pictures)
     has_others = len(projects) > 1
-    sections: list[Section | None] = []
+    sections = [paper_ablations_section(compared), paper_tables_section(compared, describe(opened.capture))]
     if has_others or places.boundary is not None or places.camera is not None:
         sections.append(change_maps_section(projects, places, left_out))
     tick()
