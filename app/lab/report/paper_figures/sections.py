@@ -15,9 +15,10 @@ from app.lab.report.paper_figures.crops import crops_section
 from app.lab.report.paper_figures.features import features_section
 from app.lab.report.paper_figures.over_length import clip_length_section, sequence_length_section
 from app.lab.report.paper_figures.pictured import pictured_projects
+from app.lab.report.paper_figures.spheres import spheres_section
 from engine.capture.capture_summary import describe
 
-STEPS = 3
+STEPS = 4
 """How often `tick` is called."""
 
 
@@ -30,7 +31,7 @@ def paper_sections(
     tick: Callable[[], None],
 ) -> list[Section]:
     """Tables of the paper where some fit; maps and crops where there are two projects, or a place was chosen by hand;
-    figures over length where lengths differ; static and dynamic features always.
+    figures over length where lengths differ; static and dynamic features, and spheres around anchors, always.
 
     Args:
         compared: The page's own project first.
@@ -47,6 +48,8 @@ def paper_sections(
         sections.append(crops_section(projects, places, left_out))
     tick()
     sections.append(features_section(projects[0]))
+    tick()
+    sections.append(spheres_section(projects[0], opened, places))
     tick()
     if len(compared) > 1:
         sections += [clip_length_section(compared), sequence_length_section(compared)]
