@@ -219,6 +219,7 @@ class ClipTraining:
             spacing=self.moving_spacing or self.spacing,
         )
         ratios = self.method.final_ratios(parameters, self.config)
+        is_over = self.method.inherits_schedule and self._base is not None
         plan = PhasePlan(
             model=self.model,
             gains=self.gains,
@@ -227,7 +228,7 @@ class ClipTraining:
             windows=self.windows,
             is_valid=self.pictures.is_valid,
             parameters={name: parameter for name, (parameter, _) in parameters.items()},
-            schedule=schedule_of(parameters, self.config, n_steps=n_steps, final_ratios=ratios),
+            schedule=schedule_of(parameters, self.config, n_steps=n_steps, final_ratios=ratios, is_over=is_over),
             reach=REACH_SPACINGS * self.spacing,
             reaches=reaches,
             has_rest=name in ("source", "moving") and self.method.has_active_tiles and not self.gains.requires_grad,

@@ -425,6 +425,17 @@ class TrainConfig(msgspec.Struct, frozen=True):
             },
         ),
     ] = "per_clip"
+    schedule: Annotated[
+        str,
+        _choice(
+            SHARING,
+            "Learning rates of a source clip.",
+            {
+                "per_clip": "they begin anew and fall again, as published",
+                "inherited": "they stay where those of the reference clip ended",
+            },
+        ),
+    ] = "per_clip"
     independent: Annotated[
         bool, setting(SHARING, "Every clip is trained as a reference clip is, and shares nothing with the others.")
     ] = False
@@ -449,7 +460,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
             )
         changed = self.difference()
         kept = ("frozen", "moving")
-        shared = [name for name in ("decoder", "residual", "inherit") if changed.get(name, "frozen") not in kept]
+        sharing = ("decoder", "residual", "inherit", "schedule")
+        shared = [name for name in sharing if changed.get(name, "frozen") not in kept]
         if self.independent and shared:
             listed = ", ".join(f"{name}={getattr(self, name)}" for name in shared)
             raise ProjectError(

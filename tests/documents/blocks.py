@@ -22,6 +22,7 @@ from tests.documents.ledger import (
     names,
     quality_table,
 )
+from tests.documents.paper import paper_tables
 from tests.documents.published import differences_table, published_table
 from tests.documents.settings import presets_table, settings_tables
 
@@ -36,6 +37,7 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "presets": presets_table,
     "published": published_table,
     "differences": differences_table,
+    "paper": paper_tables,
     "quality": quality_table,
     "headline": headline_table,
     "answers": answers_table,

@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     from app.lab.ablation.curves import curve_lines
     from app.lab.ablation.report import REPORT, write_ablation_report
     from app.lab.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, run_ablation
-    from app.lab.ablation.table import as_text
+    from app.lab.ablation.table import as_text, paper_text
     from app.lab.ablation.variants import VARIANTS, chosen_variants, own_row, with_source_steps
     from app.lab.report.write import PAGE_FILE
 
@@ -174,6 +174,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     else:
         compared = "".join(f"\n{sentence}" for sentence in curve_lines(document["curves"]))
         print(f"{as_text(document['lines'])}\n{compared}\n{document['definition']}")
+        if document["paper"]:
+            print(f"\n{paper_text(document['paper'])}\n")
         if document["rendering"] is not None:
             print(document["rendering"]["words"])
     line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")

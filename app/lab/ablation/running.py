@@ -22,6 +22,7 @@ from app.lab.ablation.curves import curves_of
 from app.lab.ablation.measuring import VariantFigures, VariantScope, kept_figures, measure
 from app.lab.ablation.table import DEFINITION, VariantResult, as_csv, summarize
 from app.lab.ablation.variants import Variant, rank, settings_of, variant_called
+from app.lab.paper_tables import beside_ablations
 from app.project.opening.project_access import check_settings, create_project, open_project
 from app.project.project import Project
 from app.status import TrainingStatus
@@ -90,7 +91,7 @@ def run_ablation(
     Returns:
         JSON-able: schema, capture, holdout, clip_length, n_clips, metrics, precision, seeds, words (what each variant
         is), definition (of flicker and seam ratios), rendering (`rendering_of`; null where no frame rates were
-        measured), lines (`summarize`), curves (`curves_of`) and results per seed.
+        measured), lines (`summarize`), curves (`curves_of`), paper (`beside_ablations`) and results per seed.
     Raises:
         ProjectError, CaptureError: Bad input.
         TrainingError: A clip failed; what was finished is kept.
@@ -135,6 +136,7 @@ def run_ablation(
             "rendering": rendering,
             "lines": (lines := summarize(results)),
             "curves": curves_of(lines),
+            "paper": beside_ablations(lines),
             "results": [{"variant": r.variant, "seed": r.seed, "n_frames": r.n_frames, **r.figures} for r in results],
         }
         write_text(folder / RESULT_FILE, json_text(document, indent=1) + "\n")

@@ -11,6 +11,7 @@ import numpy as np
 
 from app.csv_text import csv_text
 from app.lab.flicker import definition_of
+from app.lab.paper_tables import ANOTHER_CAPTURE, FIGURES, OWN_FIGURES
 
 COLUMNS: dict[str, tuple[str, int]] = {
     "psnr": ("PSNR", 2),
@@ -86,6 +87,25 @@ def as_text(lines: Sequence[dict[str, Any]]) -> str:
             text = "-" if value is None else f"{value:.{decimals}f}"
             cells.append(text if spread is None else f"{text} ±{spread:.{decimals}f}")
         rows.append(cells)
+    return _aligned(rows)
+
+
+def paper_text(rows: Sequence[dict[str, Any]]) -> str:
+    """Rows of `beside_ablations` for a terminal; empty without any. Figures that no variant has are left out."""
+    if not rows:
+        return ""
+    cells = [["", "row of the paper"], *([row["variant"], row["paper_row"]] for row in rows)]
+    for column, names in OWN_FIGURES.items():
+        measured = [(name, *COLUMNS[name]) for name in names if any(row[name] is not None for row in rows)]
+        printed = [(f"paper_{column}", "paper", FIGURES[column].n_digits)] if measured else []
+        for name, title, decimals in measured + printed:
+            cells[0].append(title)
+            for line, row in zip(cells[1:], rows, strict=True):
+                line.append("-" if row[name] is None else f"{row[name]:.{decimals}f}")
+    return f"{_aligned(cells)}\n{ANOTHER_CAPTURE}"
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> str:
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return "\n".join("  ".join(cell.rjust(w) if i else cell.ljust(w) for i, (cell, w) in enumerate(
         zip(row, widths, strict=True))) for row in rows)  # fmt: skip

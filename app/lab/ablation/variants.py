@@ -13,7 +13,7 @@ from typing import Any
 
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.training.config import config_of, parse_overrides
+from engine.training.config import TrainConfig, config_of, parse_overrides
 from engine.training.presets import PUBLISHED_SIZES
 
 
@@ -105,6 +105,11 @@ VARIANTS = (
         shares_reference=True,
     ),
     Variant(
+        "schedule-inherited",
+        "source clips begin no new schedule: all that they learn stays at the rates that the reference clip ended with",
+        {"schedule": "inherited"},
+    ),
+    Variant(
         "clips-shorter", "clips of half the length, with as many steps a frame", cut="shorter", shares_reference=False
     ),
     Variant(
@@ -118,7 +123,9 @@ VARIANTS = (
     ),
     Variant(
         "gate-off",
-        "every anchor at every time, as published; the field has the levels and entries for all of them",
+        "every anchor at every time, as published; the field has the levels and entries for all of them. So anchors of "
+        "all clips keep their places, still ones cover points of later clips too, there is no light layer, marked "
+        "regions do not count, and still parts of the reference clip learn until its end",
         {"gate": "off", "field_max_levels": 16},
         shares_reference=False,
     ),
@@ -128,6 +135,19 @@ VARIANTS = (
         "that inherits; the first is that of full",
         {"independent": True, "backgrounds": "clip"},
         is_baseline=True,
+    ),
+    *(
+        Variant(
+            f"independent-{cut}",
+            f"independent clips of {length} the length, with as many steps a frame; the first is that of clips-{cut}",
+            {"independent": True, "backgrounds": "clip"},
+            is_baseline=True,
+            cut=cut,
+            shares_reference=False,
+            reference_of=f"clips-{cut}",
+            is_on_request=True,
+        )
+        for cut, length in (("shorter", "half"), ("longer", "twice"))
     ),
     Variant(
         "field-joint",
@@ -228,7 +248,7 @@ def own_row(text: str) -> Variant:
     return Variant(name, settings, overrides, shares_reference=is_of_source, is_on_request=True)
 
 
-_OF_SOURCE_CLIPS = {"decoder", "residual", "inherit", "field", "source_steps"}
+_OF_SOURCE_CLIPS = {"decoder", "residual", "inherit", "field", "schedule", "source_steps"}
 """Settings that leave the reference clip as it is."""
 
 
@@ -240,7 +260,8 @@ def rank(name: str) -> tuple[int, int]:
 
 
 def chosen_variants(names: Sequence[str] | None) -> list[Variant]:
-    """Variants by name, in the order of the table; all but those on request for None. "full" is always there.
+    """Variants by name, in the order of the table; all but those on request for None. "full" is always there, and so is
+    a variant whose reference clip another one shares.
 
     Raises:
         ProjectError: There is no such variant.
@@ -253,7 +274,8 @@ def chosen_variants(names: Sequence[str] | None) -> list[Variant]:
         )
     if names is None:
         return [variant for variant in VARIANTS if not variant.is_on_request]
-    return [variant for variant in VARIANTS if variant.name in {*names, FULL}]
+    needed = {*names, FULL, *(variant.reference_of for variant in VARIANTS if variant.name in names)}
+    return [variant for variant in VARIANTS if variant.name in needed]
 
 
 def settings_of(
@@ -269,16 +291,12 @@ def settings_of(
         n_capture_frames: Where the chosen frames end before the capture does, they are cut without a remainder, because
             the last clip would continue beyond them.
     """
-    from engine.training.config import TrainConfig
-
     overrides = base | variant.overrides
     config = TrainConfig(**base)
+    is_alone = variant.overrides.get("independent", False)
     if variant.cut == "clips":
-        if variant.overrides.get("independent"):
-            n_steps = config.n_source_steps(n_cameras * clips[0].n_frames)
-            n_static = 0 if config.cloud == "frames" else config.n_static_steps(n_cameras)
-            n_static = min(n_static, n_steps // 2)  # of a short schedule, so that both phases have some
-            overrides |= {"static_steps": n_static, "joint_steps": n_steps - n_static}
+        if is_alone:
+            overrides |= _alone(config, config.n_source_steps(n_cameras * clips[0].n_frames), n_cameras)
         return overrides, clips[0].clip_length, range(len(clips))
     n_frames = clips[-1].stop
     n_first, *n_others = (n_cameras * clip.n_frames for clip in clips)
@@ -291,7 +309,8 @@ def settings_of(
         )
         source_steps = config.n_source_steps(n_first)
         steps = {"joint_steps": joint_steps, "source_steps": source_steps}
-        overrides |= {name: max(round(n * length / clip_length), 1) for name, n in steps.items()}
+        steps = {name: max(round(n * length / clip_length), 1) for name, n in steps.items()}
+        overrides |= _alone(config, steps["source_steps"], n_cameras) if is_alone else steps
         return overrides, length, range(-(-n_frames // length))
     if variant.cut == "whole":
         return overrides | {"joint_steps": joint_steps + rest}, n_frames, range(1)
@@ -299,6 +318,13 @@ def settings_of(
     if variant.cut == "first":
         return overrides, 1, range(1)
     return overrides | {"source_steps": max(rest // max(n_frames - 1, 1), MIN_STEPS_PER_FRAME)}, 1, range(n_frames)
+
+
+def _alone(config: TrainConfig, n_steps: int, n_cameras: int) -> dict[str, int]:
+    """Steps of the phases of an independent clip that has as many as one that inherits."""
+    n_static = 0 if config.cloud == "frames" else config.n_static_steps(n_cameras)
+    n_static = min(n_static, n_steps // 2)  # of a short schedule, so that both phases have some
+    return {"static_steps": n_static, "joint_steps": n_steps - n_static}
 
 
 def _other_length(clip_length: int, n_frames: int, *, is_shorter: bool, is_end: bool) -> int:

@@ -35,7 +35,7 @@ def published_section(compared: Sequence[Compared], capture: Mapping[str, Any]) 
     if not is_protocol(capture["format"], first.holdout, sizes):
         return None
     sequence = sequence_of(Path(capture["path"]))
-    alike = [one for one in compared if _is_alike(one, compared[0])]
+    alike = [one for one in compared if is_alike(one, compared[0])]
     rows = [*(_own(one, sequence) for one in alike), *(_printed(one) for one in published_of(sequence))]
     said = [CAVEATS]
     if sequence is None:
@@ -46,7 +46,8 @@ def published_section(compared: Sequence[Compared], capture: Mapping[str, Any]) 
     return Section("published", "Next to published figures", [*said, Table("published", "Held out", _COLUMNS, rows)])
 
 
-def _is_alike(one: Compared, first: Compared) -> bool:
+def is_alike(one: Compared, first: Compared) -> bool:
+    """Whether figures of two projects are of the same capture, scale and held-out cameras."""
     own, other = one.facts.settings, first.facts.settings
     same_capture = own.fingerprint == other.fingerprint and own.scale == other.scale
     return same_capture and set(own.holdout) == set(other.holdout)

@@ -79,6 +79,7 @@ def schedule_of(
     *,
     n_steps: int,
     final_ratios: Mapping[str, float] | None = None,
+    is_over: bool = False,
 ) -> Schedule:
     """How fast they learn.
 
@@ -87,9 +88,12 @@ def schedule_of(
         config: Final ratio of the rates and the norm to clip at.
         n_steps: Steps of the phase, over which rates fall.
         final_ratios: Of parameters whose rates end elsewhere, by name.
+        is_over: Whether the rates have fallen before, and stay at their ends.
     """
     rates = {name: rate for name, (_, rate) in parameters.items()}
     ratios = dict.fromkeys(parameters, config.final_lr_ratio) | dict(final_ratios or {})
+    if is_over:
+        rates, ratios = {name: rate * ratios[name] for name, rate in rates.items()}, dict.fromkeys(ratios, 1.0)
     return Schedule(n_steps, rates, ratios, config.max_gradient_norm)
 
 

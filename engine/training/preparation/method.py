@@ -34,6 +34,7 @@ class Method:
         obeys_regions: Whether regions that the user marks count.
         has_active_tiles: Whether a step of a source clip may leave out tiles that nothing learning touches.
         keeps_unread_entries: Whether entries of the field that no anchor of the clip reads are stored.
+        inherits_schedule: Whether the rates of a source clip stay where those of the reference clip ended.
     """
 
     learns_inherited = False
@@ -43,6 +44,7 @@ class Method:
     obeys_regions = True
     has_active_tiles = True
     keeps_unread_entries = False
+    inherits_schedule = False
 
     def base(self, reference: ClipState | None, previous: ClipState | None) -> ClipState | None:
         """The reference clip that a clip inherits from; None for a clip that inherits nothing."""

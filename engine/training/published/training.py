@@ -104,6 +104,7 @@ TRAINING = (
         "of most rates",
         here="with the clip",
         reason="the paper comes first: there a schedule spans a training",
+        settings={"schedule": "per_clip"},
     ),
     Point(
         "Adam",

@@ -47,7 +47,7 @@ def method_of(config: TrainConfig, *, previous: ClipState | None) -> Method:
 
 def _is_product(config: TrainConfig) -> bool:
     default = TrainConfig()
-    names = ["gate", "tiles", "decoder", "residual", "field_form", "initial", *_FINAL_RATIOS.values()]
+    names = ["gate", "tiles", "decoder", "residual", "field_form", "initial", "schedule", *_FINAL_RATIOS.values()]
     is_default = all(getattr(config, name) == getattr(default, name) for name in names)
     return is_default and config.inherit in ("frozen", "moving") and config.field != "continue"
 
@@ -72,6 +72,7 @@ class VariantMethod(Method):
         self.has_active_tiles = config.tiles == "active"
         # the field may show this clip as the next one leaves it, which reads other entries
         self.keeps_unread_entries = self._field_goes_on
+        self.inherits_schedule = config.schedule == "inherited"
 
     def words(self, config: TrainConfig) -> str:
         moving = "replaced by such as travel" if config.anchors_travel else "learning"

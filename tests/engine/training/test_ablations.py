@@ -35,6 +35,7 @@ SWITCHES: dict[str, dict[str, str]] = {
     "off": {"inherit": "off"},
     "both": {"inherit": "trainable", "residual": "full"},
     "continue": {"field": "continue"},
+    "schedule": {"schedule": "inherited"},
     "per_frame": {"field_tables": "per_frame"},
 }
 LEARNS: dict[str, set[str]] = {
@@ -50,6 +51,7 @@ LEARNS: dict[str, set[str]] = {
     "off": {"static", "residual", "field"},
     "both": {"static", "moving", "residual", "field"},
     "continue": {"residual", "field"},
+    "schedule": {"residual", "field"},
     "per_frame": {"residual", "field"},
 }
 """What a source clip learns, and so what it stores, with each switch."""
@@ -275,6 +277,21 @@ def test_a_table_for_all_frames_or_one_for_each(tiny, tables, n_tables):
     assert state.header.field.is_shared == (tables == "shared")
 
 
+def first_move(training: ClipTraining) -> float:
+    """How far the first step moves the parameter that it moves farthest: about the highest rate."""
+    before = {name: parameter.detach().clone() for name, parameter in training.model.named_parameters()}
+    take_steps(training, 1)
+    return max(float((p.detach() - before[name]).abs().max()) for name, p in training.model.named_parameters())
+
+
+def test_a_source_clip_can_stay_at_the_rates_that_the_reference_clip_ended_with(tiny, tmp_path):
+    anew, inherited = (first_move(tiny.prepared(1, schedule=name)) for name in ("per_clip", "inherited"))
+    assert inherited == pytest.approx(TrainConfig().final_lr_ratio * anew, rel=1e-3)
+    reference = tiny.prepared(0, is_source=False, schedule="inherited", prep_dir=tmp_path)
+    assert reference.method.inherits_schedule
+    assert first_move(reference) == first_move(tiny.prepared(0, is_source=False, prep_dir=tmp_path))
+
+
 # ---------------------------------------------------------------- clips on their own
 
 
@@ -353,6 +370,7 @@ def test_merging_makes_residual_anchors_moving_ones(streamed):
         ({"independent": True, "field": "continue"}, "cannot continue"),
         ({"independent": True, "decoder": "new", "inherit": "off"}, "decoder=new, inherit=off would have no effect"),
         ({"independent": True, "residual": "full"}, "residual=full would have no effect"),
+        ({"independent": True, "schedule": "inherited"}, "schedule=inherited would have no effect"),
         ({"inherit": "off", "residual": "none"}, "with nothing that moves"),
         ({"start": "previous"}, "needs independent=true"),
         ({"decoder": "fresh"}, "'frozen', 'finetune' or 'new'"),

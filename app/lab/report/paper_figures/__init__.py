@@ -1,1 +1,1 @@
-"""Figures of the paper: projects side by side at the same place, and over the length of clips and sequences."""
+"""Figures and tables of the paper: projects side by side at the same place, and over lengths of clips and sequences."""

@@ -10,10 +10,17 @@ import numpy as np
 
 from app.lab.figures import new_figure, plain_texts, png_of
 from app.lab.report.charts import WIDTH_INCHES, add_color_bar, map_options, shortened
+from app.playback.modes import hues
 
 MAX_COLUMNS = 5
 """Maps side by side; more begin another row."""
 _DPI = 150
+_FADED = 0.35
+"""Contrast of a picture that others are drawn over."""
+_TIMES = 3
+"""How many times a part of a picture is enlarged."""
+_MAX_MIDDLES = 400
+"""Dots that are tried as the middle of that part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +92,71 @@ def draw_picture_rows(titles: Sequence[str], rows: Sequence[tuple[str, Sequence[
         for axes, title in zip(grid[0], titles, strict=True):
             axes.set_title(title, loc="left", fontsize=9)
         return png_of(figure)
+
+
+def draw_spheres(
+    truth: np.ndarray, centers: np.ndarray, radii: np.ndarray, *, outside: np.ndarray, inside: np.ndarray
+) -> bytes:
+    """Spheres as circles and anchors as dots over a faint picture, and again over the part with most of those outside.
+
+    Args:
+        truth: [H, W, 3] uint8
+        centers, radii: Of the spheres, px. [S, 2], [S]
+        outside, inside: Anchors, px. [P, 2] each
+    """
+    height, width = truth.shape[:2]
+    grey = 255.0 - _FADED * (255.0 - truth.mean(-1))
+    with plain_texts():
+        cell_inches = 0.49 * WIDTH_INCHES
+        figure = new_figure(WIDTH_INCHES, cell_inches * height / width + 0.3, dpi=_DPI)
+        whole, part = figure.subplots(1, 2)
+        dots = next((places for places in (outside, inside) if len(places)), centers)
+        x, y, part_width, part_height = _most_of(dots, width, height)
+        for axes, (left, top, across, down), size in (
+            (whole, (0, 0, width, height), 1.0),
+            (part, (x, y, part_width, part_height), 6.0),
+        ):
+            axes.imshow(grey, cmap="gray", vmin=0, vmax=255)
+            _add_circles(axes, centers, radii, linewidth=0.08 * size)
+            for places, color, share in (
+                (centers, hues.SKY, 0.7),
+                (inside, hues.GREEN, 1.0),
+                (outside, hues.VERMILLION, 1.6),
+            ):
+                axes.scatter(places[:, 0], places[:, 1], s=share * size, color=[color], linewidths=0, zorder=3)
+            axes.set(xlim=(left, left + across), ylim=(top + down, top), xticks=[], yticks=[])
+        whole.set_title("whole picture", loc="left", fontsize=8)
+        part.set_title(f"{_TIMES} times as large", loc="left", fontsize=8)
+        return png_of(figure)
+
+
+def _most_of(dots: np.ndarray, width: int, height: int) -> tuple[float, float, float, float]:
+    """A third of the picture around one of its dots [P, 2], so that it holds most others: left, top, width, height."""
+    size = np.array([width, height])
+    shown = dots[((dots >= 0) & (dots < size)).all(1)]
+    middles = shown[:: len(shown) // _MAX_MIDDLES + 1] if len(shown) else size[None] / 2
+    corners = np.clip(middles - size / (2 * _TIMES), 0, size - size / _TIMES)
+    counts = [int(((shown >= corner) & (shown < corner + size / _TIMES)).all(1).sum()) for corner in corners]
+    left, top = corners[int(np.argmax(counts))]
+    return float(left), float(top), width / _TIMES, height / _TIMES
+
+
+def _add_circles(axes: Any, centers: np.ndarray, radii: np.ndarray, *, linewidth: float) -> None:
+    from matplotlib.collections import EllipseCollection
+
+    axes.add_collection(
+        EllipseCollection(
+            2 * radii,
+            2 * radii,
+            np.zeros(len(radii)),
+            units="xy",
+            offsets=centers,
+            offset_transform=axes.transData,
+            facecolors="none",
+            edgecolors=hues.SKY,
+            linewidths=linewidth,
+        )
+    )
 
 
 def as_8bit(picture: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ _FIGURES = {
 }
 """Name to heading, unit and decimals."""
 _MINUTES = {"minutes": ("Time", "min", 2)}
-_GOES_WITH_LENGTH = ("clip_length", "joint_steps", "source_steps", "seed")
+_GOES_WITH_LENGTH = ("clip_length", "static_steps", "joint_steps", "source_steps", "seed")
 """Settings in which projects that differ by clip length only may differ: steps are those of the frames of a clip."""
 
 

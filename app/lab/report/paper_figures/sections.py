@@ -8,14 +8,17 @@ from app.evaluation.headless import TrainedProject
 from app.lab.pictures import Pictures
 from app.lab.report.comparison import Compared
 from app.lab.report.page.parts import Section
+from app.lab.report.paper_figures.beside_tables import paper_ablations_section, paper_tables_section
 from app.lab.report.paper_figures.by_hand import Places
 from app.lab.report.paper_figures.change_maps import change_maps_section
 from app.lab.report.paper_figures.crops import crops_section
 from app.lab.report.paper_figures.features import features_section
 from app.lab.report.paper_figures.over_length import clip_length_section, sequence_length_section
 from app.lab.report.paper_figures.pictured import pictured_projects
+from app.lab.report.paper_figures.spheres import spheres_section
+from engine.capture.capture_summary import describe
 
-STEPS = 3
+STEPS = 4
 """How often `tick` is called."""
 
 
@@ -27,8 +30,8 @@ def paper_sections(
     places: Places,
     tick: Callable[[], None],
 ) -> list[Section]:
-    """Maps and crops where there are two projects, or a place was chosen by hand; figures over length where lengths
-    differ; static and dynamic features always.
+    """Tables of the paper where some fit; maps and crops where there are two projects, or a place was chosen by hand;
+    figures over length where lengths differ; static and dynamic features, and spheres around anchors, always.
 
     Args:
         compared: The page's own project first.
@@ -37,7 +40,7 @@ def paper_sections(
     """
     projects, left_out = pictured_projects(compared, own_pictures, opened, make_pictures)
     has_others = len(projects) > 1
-    sections: list[Section | None] = []
+    sections = [paper_ablations_section(compared), paper_tables_section(compared, describe(opened.capture))]
     if has_others or places.boundary is not None or places.camera is not None:
         sections.append(change_maps_section(projects, places, left_out))
     tick()
@@ -45,6 +48,8 @@ def paper_sections(
         sections.append(crops_section(projects, places, left_out))
     tick()
     sections.append(features_section(projects[0]))
+    tick()
+    sections.append(spheres_section(projects[0], opened, places))
     tick()
     if len(compared) > 1:
         sections += [clip_length_section(compared), sequence_length_section(compared)]

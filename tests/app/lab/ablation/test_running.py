@@ -61,6 +61,13 @@ def test_the_reference_clip_of_full_is_not_trained_again(runner):
     assert full.read_bytes() == other.read_bytes()
 
 
+def test_clips_on_their_own_of_another_length_begin_with_the_first_clip_of_those_that_inherit(runner):
+    runner.run(["independent-shorter"], settings=replace(runner.settings, clip_length=2))
+    trained = {name: [clip for of, clip in runner.launched if of == name] for name, _ in runner.launched}
+    assert trained["clips-shorter-seed0"][0] == 0
+    assert trained["independent-shorter-seed0"] == trained["clips-shorter-seed0"][1:]
+
+
 def test_source_clips_of_several_lengths_share_the_reference_clip_of_their_family(runner):
     variants = [with_source_steps(BY_NAME[name], n) for name in (FULL, "published", "decoder-new") for n in (4, 8)]
     document = runner.run(variants=variants)

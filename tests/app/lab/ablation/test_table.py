@@ -51,3 +51,15 @@ def test_the_file_has_full_precision():
     assert [row["variant"] for row in rows] == ["full", "other"]
     assert float(rows[0]["psnr_std"]) == math.sqrt(8.0)
     assert rows[1]["psnr"] == ""
+
+
+def test_every_figure_that_a_row_is_judged_by_has_a_column_with_a_mean_and_a_spread():
+    judged = {
+        *("psnr", "psnr_moving", "psnr_rest", "ssim", "dssim1", "dssim_range2", "dssim_ms", "tof", "flicker_inside"),
+        *("flicker_borders", "seam_ratio_static", "megabytes", "minutes", "fps_cpu", "fps_gl"),
+    }
+    assert judged <= COLUMNS.keys()
+    results = [VariantResult("full", seed, dict.fromkeys(judged, 1.0 + seed)) for seed in (0, 1)]
+    (line,) = summarize(results)
+    assert {line[name] for name in judged} == {1.5}
+    assert [line[f"{name}_std"] for name in judged] == pytest.approx([math.sqrt(0.5)] * len(judged))

@@ -23,6 +23,7 @@ from engine.training.clip_training import seed_of
 from engine.training.config import TrainConfig
 from engine.training.phases import phases_of
 from engine.training.presets import PUBLISHED_SIZES, preset
+from engine.training.variants.variant_method import method_of
 from tests.app.lab.ablation.runs import BY_NAME
 
 SIZES = PUBLISHED_SIZES
@@ -51,14 +52,36 @@ PINNED: dict[str, tuple[dict[str, Any], dict[str, Any], list[str]]] = {
         ["all points of a clip, however many", "inherited anchors keep learning", *STAYING],
     ),
     "field-continue": ({"field": "continue"} | STAY, {}, ["one field continues from clip to clip", *STAYING]),
+    "schedule-inherited": (
+        {"schedule": "inherited"},
+        {},
+        ["no new schedule", "all that they learn", "the rates that the reference clip ended with"],
+    ),
     "clips-shorter": ({}, OWN | {"cut": "shorter"}, ["half the length", "as many steps a frame"]),
     "clips-longer": ({}, OWN | {"cut": "longer"}, ["twice the length", "as many steps a frame"]),
     "reference-middle": ({}, OWN | {"is_reference_moved": True}, ["in the middle is the reference"]),
-    "gate-off": ({"gate": "off", "field_max_levels": 16}, OWN, ["every anchor at every time", "levels and entries"]),
+    "gate-off": (
+        {"gate": "off", "field_max_levels": 16},
+        OWN,
+        [
+            *("every anchor at every time", "levels and entries", "all clips keep their places", "still ones cover"),
+            *("no light layer", "marked regions do not count", "learn until its end"),
+        ],
+    ),
     "independent": (
         {"independent": True, "backgrounds": "clip"},
         {"is_baseline": True},
         ["share nothing", "clouds of its own frames", "its own seed", "as many steps", "the first is that of full"],
+    ),
+    "independent-shorter": (
+        {"independent": True, "backgrounds": "clip"},
+        ON_REQUEST | {"cut": "shorter", "reference_of": "clips-shorter"},
+        ["independent clips of half the length", "as many steps a frame", "the first is that of clips-shorter"],
+    ),
+    "independent-longer": (
+        {"independent": True, "backgrounds": "clip"},
+        ON_REQUEST | {"cut": "longer", "reference_of": "clips-longer"},
+        ["independent clips of twice the length", "as many steps a frame", "the first is that of clips-longer"],
     ),
     "field-joint": ({}, BASELINE | {"cut": "whole"}, ["one clip, and so one field, for all frames", "all steps"]),
     "frame-stream": (
@@ -112,13 +135,14 @@ def test_beside_what_is_pinned_only_lengths_follow_from_how_a_variant_is_cut(bas
     for variant in VARIANTS:
         settings, *_ = settings_of(variant, base, clips=clips, n_cameras=10, n_capture_frames=12)
         steps = {
-            "clips": {"static_steps", "joint_steps"} if variant.name == "independent" else set(),
+            "clips": set(),
             "shorter": {"joint_steps", "source_steps"},
             "longer": {"joint_steps", "source_steps"},
             "frames": {"joint_steps", "source_steps"},
             "whole": {"joint_steps"},
             "first": {"joint_steps"},
         }[variant.cut]
+        steps = {"static_steps", "joint_steps"} if variant.name.startswith("independent") else steps
         changed = {name for name, value in settings.items() if base.get(name) != value}
         assert changed - steps == {name for name, value in variant.overrides.items() if base.get(name) != value}
         assert base | variant.overrides == {name: settings[name] for name in settings.keys() - (steps - base.keys())}
@@ -127,7 +151,7 @@ def test_beside_what_is_pinned_only_lengths_follow_from_how_a_variant_is_cut(bas
 def test_only_variants_whose_reference_clip_is_trained_alike_share_it():
     for variant in VARIANTS:
         is_source_only = variant.cut == "clips" and not variant.is_reference_moved and variant.overrides.keys() <= {
-            "decoder", "residual", "inherit", "field", "motion"}  # fmt: skip
+            "decoder", "residual", "inherit", "field", "motion", "schedule"}  # fmt: skip
         # the first of independent clips is that of full by its words; the settings are those of the others
         assert variant.shares_reference == (is_source_only or variant.name == "independent"), variant.name
 
@@ -143,6 +167,15 @@ def test_independent_clips_are_trained_as_long_as_those_of_full(base):
         alone = phases_of(config, **sizes, is_source=False)
         assert sum(n for _, n in alone) == sum(n for _, n in in_full)
         assert all(n > 0 for _, n in alone)
+    for cut in ("shorter", "longer"):
+        own, of_full = (
+            settings_of(BY_NAME[name], base, clips=clips, n_cameras=n_cameras, n_capture_frames=30)
+            for name in (f"independent-{cut}", f"clips-{cut}")
+        )
+        assert own[1:] == of_full[1:], "the same clips"
+        sizes = {"n_cameras": n_cameras, "n_frames": own[1], "n_windows": 1}
+        alone = phases_of(TrainConfig(**own[0]), **sizes, is_source=False)
+        assert sum(n for _, n in alone) == of_full[0]["source_steps"]
     seeds = [seed_of(config, clip, seed) for seed in range(3) for clip in clips]
     assert len(set(seeds)) == len(seeds)
     assert {seed_of(TrainConfig(**base), clip, 5) for clip in clips} == {5}
@@ -155,6 +188,7 @@ def test_variants_are_chosen_by_name_in_the_order_of_the_table_with_full_beside_
     assert {"published", "full"} - {variant.name for variant in usual} == {"published"}
     assert [v.name for v in chosen_variants(["published"])] == [FULL, "published"]
     assert [v.name for v in chosen_variants([FULL])] == [FULL]
+    assert [v.name for v in chosen_variants(["independent-longer"])] == [FULL, "clips-longer", "independent-longer"]
     with pytest.raises(ProjectError, match="called nonsense") as caught:
         chosen_variants(["full", "nonsense"])
     assert "decoder-new" in caught.value.hint
@@ -181,6 +215,10 @@ def test_a_variant_changes_what_it_names_and_trains_as_long_as_full(variant):
             assert (changed, clip_length, chosen) == ({"joint_steps", "source_steps"}, 1, range(10))
             assert config.n_joint_steps(100) == joint
             assert n_steps - 9 < config.n_joint_steps(100) + 9 * config.n_source_steps(100) <= n_steps
+        case "shorter" | "longer" if variant.overrides:
+            length = {"shorter": 2, "longer": 8}[variant.cut]
+            assert (changed, clip_length) == ({"static_steps", "joint_steps"}, length)
+            assert config.static_steps + config.joint_steps == source[0] * length / 4
         case "shorter" | "longer":
             length = {"shorter": 2, "longer": 8}[variant.cut]
             assert (changed, clip_length, chosen) == ({"joint_steps", "source_steps"}, length, range(-(-10 // length)))
@@ -190,6 +228,17 @@ def test_a_variant_changes_what_it_names_and_trains_as_long_as_full(variant):
             assert (changed, clip_length, chosen) == ({"joint_steps"}, 1, range(1))
             assert config.n_joint_steps(100) == joint
     assert n_frames_covered == (1 if variant.cut == "first" else 10)
+
+
+def test_every_anchor_at_every_time_leaves_out_all_that_its_words_say():
+    config, full = (TrainConfig(**BY_NAME[name].overrides) for name in ("gate-off", FULL))
+    method = method_of(config, previous=None)
+    assert full.anchors_travel
+    assert not config.anchors_travel
+    assert {method.has_light, method.obeys_regions} == {False}
+    sizes = {"n_cameras": 10, "n_frames": 4, "n_windows": 1, "is_source": False}
+    assert [name for name, _ in phases_of(config, **sizes)] == ["static", "joint"]
+    assert sum(n for _, n in phases_of(config, **sizes)) == sum(n for _, n in phases_of(full, **sizes))
 
 
 def test_settings_of_full_stay_in_every_variant_and_a_frame_has_its_least_steps():

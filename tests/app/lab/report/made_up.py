@@ -18,6 +18,7 @@ from app.evaluation.evaluation import EvaluationScope, Frames
 from app.evaluation.headless import TrainedProject
 from app.lab.report.paper_figures.crop_sheet import Sheet
 from app.lab.report.write import write_report
+from app.playback.modes.coverage import CoveredSpace
 from app.project.opening.project_access import create_project, default_settings
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
@@ -89,6 +90,10 @@ class FakePictures:
         truth = _noise(frame_index, camera).random((24, 32), np.float32) * 0.1
         change = _noise(frame_index, camera, self._name).random((24, 32), np.float32) * 0.1
         return SeamMaps(change, truth, np.maximum(change - truth, 0), truth < 0.05)
+
+    def covered(self, clip_index):
+        places = _noise(clip_index).random((20, 3), np.float32)
+        return CoveredSpace(places[:12], np.full(12, 0.1, np.float32), places[12:], places[12:, 0] - 0.3, clip_index)
 
 
 def _noise(*what: object) -> np.random.Generator:
@@ -183,6 +188,7 @@ def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         "comparison": ("draw_speed_error",),
         "paper_figures.change_maps": ("draw_change_maps",),
         "paper_figures.features": ("draw_picture_rows",),
+        "paper_figures.spheres": ("draw_spheres",),
         "paper_figures.over_length": ("draw_over_length",),
     }.items():
         for name in names:

@@ -180,6 +180,14 @@ def test_rates_fall_to_their_final_ratio():
     assert moved == pytest.approx([-1.0, -0.1])
 
 
+def test_a_schedule_that_is_over_stays_where_it_ended():
+    parameters = {name: (nn.Parameter(torch.zeros(1)), 2.0) for name in ("one", "other")}
+    config = TrainConfig(final_lr_ratio=0.1)
+    schedule = schedule_of(parameters, config, n_steps=100, final_ratios={"other": 0.5}, is_over=True)
+    assert schedule.rates == {"one": pytest.approx(0.2), "other": 1.0}
+    assert schedule.final_ratios == {"one": 1.0, "other": 1.0}
+
+
 def test_strided_gradient_is_taken():
     parameters = {"block": (nn.Parameter(torch.zeros(6, 4)), 0.1)}
     parameters["block"][0].grad = torch.arange(24.0).reshape(4, 6).T - 11.5

@@ -38,6 +38,7 @@ def test_numbers_and_which_clips_there_are_leave_the_method_as_it_is(settings):
         {"field": "continue"},
         {"field_form": "published"},
         {"initial": "published"},
+        {"schedule": "inherited"},
     ],
 )
 def test_any_other_decision_is_a_variant(settings):

@@ -10,7 +10,7 @@ from PIL import Image
 
 from app.lab.report.paper_figures.by_hand import InsetWindow
 from app.lab.report.paper_figures.crop_sheet import SHEET_WIDTH_PX, Tile, draw_crops
-from app.lab.report.paper_figures.drawing import ChangeColumn, draw_change_maps, draw_picture_rows
+from app.lab.report.paper_figures.drawing import ChangeColumn, draw_change_maps, draw_picture_rows, draw_spheres
 from app.lab.report.paper_figures.length_chart import LengthPanel, Series, draw_over_length
 
 
@@ -86,3 +86,22 @@ def test_equal_figures_are_equal_files(rng):
         first = draw()
         assert first == draw()
         assert pixels_of(first).shape[1] > 900
+
+
+def test_spheres_are_drawn_also_where_there_are_none_or_no_dots(rng):
+    truth, none = rng.integers(0, 255, (48, 64, 3), dtype=np.uint8), np.zeros((0, 2))
+    places, radii = rng.random((30, 2)) * (64, 48), np.full(30, 4.0)
+
+    def n_colored(centers: np.ndarray, radii: np.ndarray, **dots: np.ndarray) -> list[int]:
+        png = draw_spheres(truth, centers, radii, **dots)
+        assert png == draw_spheres(truth, centers, radii, **dots)
+        red, green, blue = pixels_of(png).astype(int).reshape(-1, 3).T
+        return [int((high > low + 40).sum()) for high, low in ((blue, red), (red, blue), (green, red))]
+
+    blue, red, _ = n_colored(places, radii, outside=none, inside=none)
+    assert blue > 1000
+    assert red == 0
+    _, red, _ = n_colored(none, none[:, 0], outside=places, inside=none)
+    assert red > 20
+    assert n_colored(none, none[:, 0], outside=none, inside=places)[2] > 20
+    assert n_colored(none, none[:, 0], outside=none, inside=none) == [0, 0, 0]

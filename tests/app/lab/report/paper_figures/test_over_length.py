@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from app.lab.ablation.variants import settings_of
 from app.lab.report.paper_figures import over_length
 from app.lab.report.paper_figures.over_length import clip_length_section, sequence_length_section
 from app.project.opening.project_access import default_settings
 from engine.capture.capture import open_capture
+from engine.capture.clip import split_clips
+from tests.app.lab.ablation.runs import BY_NAME
 from tests.app.lab.report.paper_figures.made_up import clip, compared
 
 
@@ -90,3 +93,22 @@ def test_only_projects_that_differ_by_clip_length_alone_are_joined(settings, dra
     assert [x for x, _ in panels[0].series[0].points] == [3, 6]
     assert [row["project"] for row in next(section.tables()).rows] == ["p", "longer", "other"]
     assert clip_length_section(projects[:1]) is None
+
+
+def test_clips_that_inherit_and_clips_on_their_own_have_a_curve_each(settings, drawn):
+    """Over three lengths of clips, with settings as an ablation makes them."""
+    clips = {length: [clip(i, start, length) for i, start in enumerate(range(0, 12, length))] for length in (3, 6, 12)}
+    projects = []
+    for name, cuts in (("clips", ("shorter", "", "longer")), ("independent", ("shorter", "", "longer"))):
+        for length, cut in zip(clips, cuts, strict=True):
+            variant = BY_NAME[f"{name}-{cut}" if cut else {"clips": "full"}.get(name, name)]
+            overrides, own_length, _ = settings_of(
+                variant, {}, clips=split_clips(12, 6), n_cameras=40, n_capture_frames=12
+            )
+            assert own_length == length
+            changed = replace(settings, clip_length=length, overrides=overrides)
+            projects.append(compared(variant.name, clips[length], settings=changed))
+    assert clip_length_section(projects) is not None
+    (panels,) = drawn
+    assert [[x for x, _ in series.points] for series in panels[0].series] == [[3, 6, 12]] * 2
+    assert [series.label for series in panels[0].series] == ["clips-shorter", "independent-shorter"]
