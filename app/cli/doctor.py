@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from app.background.kernels import use_threads
 from app.training.worker.worker import n_training_threads
 from engine.kernels.cache import UNWRITABLE, cache_state
+from engine.machine import memory_bytes
 from engine.parallel import n_cores
 from engine.user_folders import cache_dir, data_dir
 
@@ -81,9 +82,8 @@ def _cores() -> MachineFinding:
 
 
 def _memory() -> MachineFinding:
-    try:
-        n_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
+    n_bytes = memory_bytes()
+    if n_bytes is None:
         return MachineFinding("Memory", "unknown")
     return MachineFinding("Memory", f"{n_bytes / 2**30:.1f} GB", n_bytes > 3 * 2**30)
 

@@ -34,6 +34,7 @@ from engine.errors import ProjectError, TrainingError
 from engine.storage.files import atomic_path
 from engine.storage.json_files import json_text
 from engine.training.preparation.kept_clouds import CLOUD_FILES
+from engine.training.preparation.picture_store import check_room
 
 if TYPE_CHECKING:
     from engine.metrics.pictures.colors import Precision
@@ -93,7 +94,7 @@ def run_ablation(
         is), definition (of flicker and seam ratios), rendering (`rendering_of`; null where no frame rates were
         measured), lines (`summarize`), curves (`curves_of`), paper (`beside_ablations`) and results per seed.
     Raises:
-        ProjectError, CaptureError: Bad input.
+        ProjectError, CaptureError: Bad input, or pictures of a variant for which there is no room.
         TrainingError: A clip failed; what was finished is kept.
         KeyboardInterrupt: Likewise.
     """
@@ -110,6 +111,8 @@ def run_ablation(
     found = _finished(folder, capture, settings, clips, all_clips)
     first_of: dict[tuple[str, int], Path] = {}  # project that trains the reference clip of a family
     for task in todo:
+        if (task.variant.name, task.settings.seed) not in found:
+            task.check_room(folder)
         first_of.setdefault((task.variant.family, task.settings.seed), task.place(folder))
     for n_done, task in enumerate(todo):
         variant, seed = task.variant, task.settings.seed
@@ -196,6 +199,21 @@ class _Task:
             base, seed=seed, overrides=overrides, clip_length=clip_length, reference_clip=reference_clip
         )
         check_settings(self.settings, capture)
+
+    def check_room(self, folder: Path) -> None:
+        """Check that there is room for the pictures of its longest clip.
+
+        Raises:
+            ProjectError, DiskError: There is not.
+        """
+        width, height = self.capture.picture_size
+        n_frames = max(clip.n_frames for clip in self.settings.clips(self.capture.n_frames))
+        n_cameras = len(self.capture.rig) - len(self.settings.holdout)
+        try:
+            check_room((n_cameras, n_frames, height, width), self.place(folder))
+        except ProjectError as error:
+            hint = f"Leave {self.variant.name} out. {error.hint}"
+            raise type(error)(f"{self.variant.name}: {error.message}", hint=hint, path=error.path) from error
 
     def place(self, folder: Path) -> Path:
         """The folder of its project."""

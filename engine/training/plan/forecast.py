@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from engine.clip_files.clip_header import ClipHeader
-from engine.training.preparation.picture_store import MAX_BYTES
+from engine.training.preparation.picture_store import Shape, bytes_of
 
 _START_S, _CAMERA_S, _PICTURE_S = {True: 2.5, False: 3.5}, 0.45, 5e-3
 """Rough preparation: of a source clip or not; of a camera whose depths are found; of a picture."""
@@ -89,13 +89,12 @@ def rough_preparation_s(*, n_cameras: int, n_pictures: int, is_source: bool, is_
     return _START_S[is_source] + (0.0 if is_source else _CAMERA_S * n_cameras) + _PICTURE_S * n_pictures
 
 
-def rough_memory_mb(*, n_pixels: int, n_pictures: int, n_read: int) -> float:
+def rough_memory_mb(shape: Shape, *, n_read: int) -> float:
     """Most that the training process holds, 10^6 bytes: the program, the pictures, and the cache they come through.
 
     Args:
-        n_pixels: Of one picture.
-        n_pictures: To train on.
+        shape: Of the pictures to train on.
         n_read: Pictures read at one time, backgrounds included.
     """
-    pictures_mb = min(3e-6 * n_pixels * n_pictures, MAX_BYTES / 1e6)
-    return _PROGRAM_MB + pictures_mb + min(3e-6 * n_pixels * n_read, _CACHE_MB)
+    _, _, height, width = shape
+    return _PROGRAM_MB + bytes_of(shape)[0] / 1e6 + min(3e-6 * height * width * n_read, _CACHE_MB)

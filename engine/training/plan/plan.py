@@ -253,7 +253,7 @@ def make_plan(
         is_by_frame=config.cloud == "frames",
     )
     memory_mb = median_of([known.memory_mb for known in same]) or rough_memory_mb(
-        n_pixels=footage.n_pixels, n_pictures=n_pictures, n_read=n_read
+        (footage.n_cameras, clip.n_frames, footage.height, footage.width), n_read=n_read
     )
     disk_mb = None if stays_still else median_of([known.disk_mb for known in same])
     return TrainingPlan(

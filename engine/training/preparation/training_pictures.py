@@ -97,7 +97,8 @@ class TrainingPictures:
             seen = [Rendition.of(gain, lens, rig.Ks[camera], rig.image_sizes[camera]) for gain in gains]
             if any(not rendition.is_plain for rendition in seen):
                 pictures = self._pixels.of_camera(row)
-                corrected = [one.to_scene(picture) for one, picture in zip(seen, pictures, strict=True)]
-                self._pixels.put(row, np.stack(corrected))
+                for frame, one in enumerate(seen):
+                    pictures[frame] = one.to_scene(pictures[frame])
+                self._pixels.put(row, pictures)
 
         map_ordered(correct, range(self._pixels.n_cameras))

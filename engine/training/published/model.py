@@ -32,8 +32,9 @@ MODEL = (
         "size of the field",
         "released code",
         paper="a 4D hash grid and a fully fused MLP, of no stated size",
-        released="16 levels of 4 values, from 16 cells on and twice as many at every level; 2^17 entries a level by "
-        "default and 2^20 for its Long 360 capture; 128 values in the network's hidden layer, no biases",
+        released="16 levels of 4 values, from 16 cells on and twice as many at every level; 128 values in the "
+        "network's hidden layer, no biases; 2^17 entries a level by default (`paper`), 2^20 for Long 360 "
+        "(`paper-long360`; 2^17 in its parallel scripts), 2^19 for VRU (`paper-vru`), 2^16 or 2^17 for N3DV",
         settings={
             "field_levels": 16,
             "field_channels": 4,
@@ -85,7 +86,8 @@ MODEL = (
         "neither",
         released="16 times 2^l less one, shifted by half a cell; a level without hashing if its knots in space and "
         "time fit the table",
-        here="16 times 2^l, not shifted; likewise with the frames of the clip as knots in time",
+        here="16 times 2^l, not shifted; likewise with the frames of the clip as knots in time; a level that fits the "
+        "table in space alone is hashed in time alone",
         reason="how tiny-cuda-nn lays out its grid is its own choice, and the grid here is another one",
         settings={"field_base_cells": 16, "field_growth": 2.0},
     ),
@@ -126,8 +128,10 @@ MODEL = (
         "what a camera decodes",
         "neither",
         released="anchors whose own ellipsoid lies in the picture",
-        here="anchors that lie in the picture or within four of their sizes of it",
-        reason="a Gaussian may lie beside its anchor, and is expected within that distance",
+        here="anchors that lie in the picture or within four of their sizes of it, as they are at the start of a "
+        "training",
+        reason="a Gaussian may lie beside its anchor, and is expected within that distance; an interrupted "
+        "training sees the same anchors again",
     ),
     Point(
         "rasterizer",

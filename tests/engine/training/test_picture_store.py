@@ -2,13 +2,16 @@
 
 import errno
 import os
+import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from engine.errors import DiskError
-from engine.training.preparation.picture_store import PictureStore
+from engine.errors import DiskError, ProjectError
+from engine.training.preparation import picture_store
+from engine.training.preparation.picture_store import PictureStore, bytes_of, check_room
 
 SHAPE = (4, 3, 5, 7)
 CAMERA_BYTES = 3 * 5 * 7 * 3
@@ -44,6 +47,43 @@ def test_other_pictures_are_refused(tmp_path: Path):
         store.put(0, pictures(0)[:2])
     with pytest.raises(ValueError, match="must be uint8"):
         store.put(0, pictures(0).astype(np.float32))
+
+
+LONG = (32, 1400, 1080, 1920)
+"""One clip of all frames of a capture."""
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> dict[str, int | None]:
+    """Memory and free disk of a made machine of four cores; may be changed."""
+    has: dict[str, int | None] = {"memory": 64 * 10**9, "free": 10**12}
+    monkeypatch.setattr(picture_store, "memory_bytes", lambda: has["memory"])
+    monkeypatch.setattr(picture_store, "n_cores", lambda: 4)
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(free=has["free"]))
+    return has
+
+
+def test_memory_for_long_clips_is_that_of_a_camera_on_every_core(machine: dict[str, int | None], tmp_path: Path):
+    camera_bytes = 1400 * 1080 * 1920 * 3
+    assert bytes_of(LONG) == (4 * camera_bytes, 32 * camera_bytes)
+    assert bytes_of(SHAPE) == (4 * CAMERA_BYTES, 0)
+    assert bytes_of(SHAPE, max_bytes=3 * CAMERA_BYTES) == (4 * CAMERA_BYTES, CAMERA_BYTES)
+    check_room(LONG, tmp_path / "new")
+    machine["memory"] = None  # not known
+    check_room(LONG, tmp_path / "new")
+
+
+def test_pictures_without_room_are_refused_before_any_is_read(machine: dict[str, int | None], tmp_path: Path):
+    said = "1,400 frames of 32 cameras, 1920 x 1080, are 278.7 GB of pictures; "
+    machine["free"] = 77 * 10**9
+    with pytest.raises(DiskError, match=f"{said}278.7 GB of them have to be in a file, and the disk has 77.0 GB free"):
+        PictureStore(LONG, tmp_path / "new")
+    machine["memory"] = 16 * 10**9
+    expected = f"{said}reading them takes 34.8 GB of memory, and this machine has 16.0 GB. Choose shorter clips"
+    with pytest.raises(ProjectError, match=expected) as caught:
+        PictureStore(LONG, tmp_path / "new")
+    assert not isinstance(caught.value, DiskError), "bad input"
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_full_disk_is_said_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

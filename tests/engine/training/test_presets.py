@@ -1,4 +1,4 @@
-"""Presets: the published settings of "paper", rate by rate. That all are valid and their sizes: test_ablation."""
+"""Presets: the published settings of "paper", rate by rate. That all are valid: tests/app/lab/ablation."""
 
 from collections.abc import Iterable
 

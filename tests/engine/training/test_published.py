@@ -14,6 +14,7 @@ from engine.backends.backend import ADAM_EPSILON
 from engine.backends.table import backend_called
 from engine.camera.depth_range import NEAR_SHARE
 from engine.clip_files.clip_header import FieldShape
+from engine.cloud.fusion import N_PLANE_NEIGHBORS, Samples, fuse_tiers
 from engine.cloud.motion.dedup import residual_rows
 from engine.cloud.stereo.depth.depth_scene import WORKING_PIXELS
 from engine.cloud.stereo.frames_cloud import FRAME_SPACING_PX
@@ -23,13 +24,15 @@ from engine.model.clip_view import REACH_SPACINGS
 from engine.model.decoder import Decoder
 from engine.model.field import SpatioTemporalField
 from engine.model.field_sizes import derive_cells
-from engine.model.grid import corner_table
+from engine.model.grid import corner_table, time_keys
 from engine.training.config import SETTINGS, TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer, schedule_of
+from engine.training.plan.synthetic_clip import ClipRecipe, make_clip, make_view
 from engine.training.presets import preset
 from engine.training.published.point import Point
 from engine.training.published.points import POINTS
 from engine.training.step.order import ShuffledOrder
+from engine.training.step.visible_anchors import Sight
 
 PAPER = TrainConfig(**preset("paper"))
 DIFFERENCES = [point for point in POINTS if point.is_difference]
@@ -79,8 +82,13 @@ def knots_lie_on_frames() -> None:
     assert corners.indices.shape == (5, 3, 8)
 
 
-def cells_double_from_sixteen() -> None:
+def cells_double_from_sixteen_and_space_is_hashed_apart_from_time() -> None:
     assert field_shape().cells == (16, 32, 64)
+    n_entries, places = 2**17, np.random.default_rng(1).random((50, 3))
+    corners, keys = corner_table(places, (32,), n_entries), time_keys((32,), n_entries, 10)
+    assert 33**3 < n_entries < 10 * 33**3
+    assert int(corners.indices.max()) < 33**3
+    assert keys[1, 0] == 3674653429 % n_entries
 
 
 def the_field_is_float32_and_starts_as_released() -> None:
@@ -111,6 +119,13 @@ def heads_are_equally_wide() -> None:
 
 def depth_maps_are_as_small_as_said() -> None:
     assert WORKING_PIXELS == 160 * 90
+
+
+def noise_is_flattened() -> None:
+    points = np.random.default_rng(1).normal(size=(2000, 3)) * [1.0, 1.0, 0.02]
+    flat = fuse_tiers([Samples(points, np.tile([0.0, 0.0, 1.0], (2000, 1)), points)], spacing=0.1)[0]
+    assert flat[:, 2].std() < 0.5 * points[:, 2].std()
+    assert N_PLANE_NEIGHBORS == 20
 
 
 def voxels_are_four_pixels() -> None:
@@ -157,6 +172,13 @@ def adam_divides_by_what_is_said() -> None:
 
 def anchors_beside_the_picture_are_decoded() -> None:
     assert REACH_SPACINGS == 4.0
+    model, view = make_clip(ClipRecipe(40), backend=backend_called("cpu")), make_view(ClipRecipe(40))
+    sight = Sight(model, [view], reach=0.1)
+    before = {role: reaches.clone() for role, reaches in sight.reaches.items()}
+    for role in model.roles():
+        model.anchor_set(role).log_offset_scales.data += 5.0
+    sight.rows(0, 0.5)
+    assert all(torch.equal(sight.reaches[role], reaches) for role, reaches in before.items())
 
 
 def limits_of_the_rasterizer_are_those() -> None:
@@ -166,11 +188,12 @@ def limits_of_the_rasterizer_are_those() -> None:
 CHECKS: dict[str, Callable[[], None]] = {
     "scales of an anchor": anchors_have_six_scales,
     "knots in time": knots_lie_on_frames,
-    "cells of a level": cells_double_from_sixteen,
+    "cells of a level": cells_double_from_sixteen_and_space_is_hashed_apart_from_time,
     "numbers in the field": the_field_is_float32_and_starts_as_released,
     "outside of the box": places_outside_are_the_nearest_inside,
     "head of offsets": heads_are_equally_wide,
     "stereo": depth_maps_are_as_small_as_said,
+    "noise of the point clouds": noise_is_flattened,
     "density of the point clouds": voxels_are_four_pixels,
     "deduplication": coverage_is_the_union,
     "end of a pass": passes_follow_each_other,

@@ -9,6 +9,7 @@ import pytest
 from app.lab.ablation.running import project_folder
 from app.lab.ablation.variants import FULL, VARIANTS
 from app.project.opening.project_access import read_settings
+from engine.training.preparation import picture_store
 from tests.app.lab.ablation.runs import BY_NAME
 
 
@@ -52,6 +53,16 @@ def test_bad_arguments_end_with_2_and_leave_nothing_behind(run, capture_folder, 
     assert "Traceback" not in err
     assert out == ""
     assert not (tmp_path / "a").exists()
+
+
+def test_a_variant_whose_pictures_do_not_fit_is_refused_before_any_is_trained(run, runner, capture_folder, monkeypatch):
+    monkeypatch.setattr(picture_store, "memory_bytes", lambda: 30_000)  # 3 x 24 x 32 x 3 bytes a frame
+    arguments = ["ablate", capture_folder, "--project", runner.folder, "--clip-length", 4, "--variants", "field-joint"]
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert "field-joint: 6 frames of 3 cameras, 32 x 24, are 0.0 GB of pictures; reading them" in err
+    assert "Leave field-joint out. Choose shorter clips or a smaller scale." in err
+    assert not runner.folder.exists()
 
 
 def test_a_capture_and_a_folder_are_asked_for(run, capture_folder):
