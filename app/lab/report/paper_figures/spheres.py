@@ -18,6 +18,8 @@ from engine.camera.projection import is_in_picture, project, projection_matrices
 from engine.camera.rig import CameraRig
 
 _TITLE = "Spheres around inherited anchors"
+_ON_A_SPHERE = 1e-4
+"""Depth in a sphere, as a share of CoveredSpace.range, up to which a point was outside before places were rounded."""
 _COLUMNS = (
     TableColumn("clip_index", "Clip"),
     TableColumn("camera", "Camera"),
@@ -48,14 +50,15 @@ def spheres_section(own: Pictured, opened: TrainedProject, places: Places) -> Se
         project(place, projection_matrices(rig)[camera]) for place in (space.centers, space.points)
     )
     radii = space.radii * rig.Ks[camera, 0, 0] / np.where(depths > 0, depths, np.inf)
-    is_outside, is_shown = space.distances > 0, point_depths > 0
+    is_outside, is_shown = space.distances > -_ON_A_SPHERE * space.range, point_depths > 0
     n_outside, n_inside = int(is_outside.sum()), int((~is_outside).sum())
     which = "all anchors" if config.gate == "off" else "the moving anchors"
     caption = (
         f"Clip {clip.clip_index}, {clip_rule}, over its first frame; camera {rig.names[camera]}, {camera_rule}. Blue: "
         f"{which} of the reference clip, {len(space.centers):,}, each with its sphere, whose radius is the mean "
         f"distance to three neighbours. Orange: {n_outside:,} residual anchors outside of all spheres. Green: "
-        f"{n_inside:,} inside. On the right the part with most of the orange ones."
+        f"{n_inside:,} inside. A dot within a circle may lie in front of that sphere or behind it. On the right the "
+        "part with most of the orange dots."
     )
     if config.anchors_travel:
         caption += " Anchors travel here, so points inside become anchors as well; all are where their motion begins."

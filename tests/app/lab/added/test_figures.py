@@ -39,6 +39,9 @@ class Pictures:
     def changes(self, frame_index, camera):
         raise NotImplementedError
 
+    def covered(self, clip_index):
+        raise NotImplementedError
+
 
 @pytest.fixture
 def opened(tmp_path: Path) -> TrainedProject:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,13 @@ def test_nothing_covered_and_nothing_residual_is_no_failure(project, monkeypatch
     ((_, _, n_spheres, radius, n_outside, n_inside, distance),) = page_of(project).tables["spheres"]
     assert [n_spheres, n_outside, n_inside] == ["0", "0", "0"]
     assert radius == distance == "–"
+
+
+def test_a_point_that_rounding_has_put_into_a_sphere_is_outside_as_it_was(project, monkeypatch):
+    on_it = replace(space(np.zeros((2, 3)), np.ones((4, 3))), distances=np.array([-1e-8, -0.1]))
+    monkeypatch.setattr(FakePictures, "covered", lambda self, clip: on_it)
+    ((*_, n_outside, n_inside, _),) = page_of(project).tables["spheres"]
+    assert [n_outside, n_inside] == ["1", "1"]
 
 
 def test_spheres_are_those_of_the_reference_clip_as_it_was_inherited(tmp_path, capture_folder):
