@@ -33,6 +33,7 @@ from engine.training.published.point import Point
 from engine.training.published.points import POINTS
 from engine.training.step.order import ShuffledOrder
 from engine.training.step.visible_anchors import Sight
+from engine.training.windows import Windows
 
 PAPER = TrainConfig(**preset("paper"))
 DIFFERENCES = [point for point in POINTS if point.is_difference]
@@ -144,6 +145,11 @@ def passes_follow_each_other() -> None:
     assert sorted(drawn[:5]) == sorted(drawn[5:]) == list(range(5))
 
 
+def large_pictures_are_cut_into_windows() -> None:
+    assert [len(Windows(*size)) for size in ((640, 480), (1920, 1080))] == [1, 8]
+    assert PAPER.n_source_steps(10, 8) == 8 * PAPER.n_source_steps(10)
+
+
 def optimizer(n_steps: int) -> tuple[PhaseOptimizer, nn.Parameter]:
     parameter = nn.Parameter(torch.ones(3))
     schedule = schedule_of({"x": (parameter, 0.1)}, PAPER, n_steps=n_steps)
@@ -196,6 +202,7 @@ CHECKS: dict[str, Callable[[], None]] = {
     "noise of the point clouds": noise_is_flattened,
     "density of the point clouds": voxels_are_four_pixels,
     "deduplication": coverage_is_the_union,
+    "what a step compares": large_pictures_are_cut_into_windows,
     "end of a pass": passes_follow_each_other,
     "where rates end": rates_end_with_the_clip,
     "gradients": gradients_are_taken_as_they_are_or_stop_the_training,
