@@ -221,13 +221,16 @@ def main() -> None:
         trained = arguments.out / "sample" if isinstance(what, Printed) and _TRAIN_SAMPLE in what.commands else folder
         places |= {"DIR": str(trained / "project"), "FILE": str(folder / "figures.json")}
         places |= {"CAPTURE": str(folder / "capture"), "LATER": f"{arguments.basketball}_later"}
-        start, common = time.monotonic(), {"commit": commit, "machine": _machine(), "remark": arguments.remark}
+        common = {"commit": commit, "machine": _machine(), "remark": arguments.remark}
+        is_there, start = any((folder / file).exists() for file in ("figures.json", "printed.txt")), time.monotonic()
         if isinstance(what, Clips):
             made: Entry = measured_clips(what, folder, places, common)
         else:
             made = measured_table(what, folder, places, common)
-        if not made.took_s:
-            made = msgspec.structs.replace(made, took_s=round(time.monotonic() - start, 1))
+        took_s = round(time.monotonic() - start, 1)
+        if is_there:  # then only read
+            took_s = made.total("preparation_s") + made.total("training_s") if isinstance(made, ClipsEntry) else None
+        made = msgspec.structs.replace(made, took_s=took_s)
         say(str(write_entry(name, made)))
 
 

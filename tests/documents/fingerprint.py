@@ -18,8 +18,9 @@ SETTINGS = ("static_steps=40", "joint_steps=40", "source_steps=40", "storage=exa
 N_CLIPS = 2
 COUNT_TOLERANCE = 0.01
 """Relative. Stereo decides by comparisons, which rounding may turn: processors differ there by a few points."""
-MEAN_TOLERANCE = 0.02
-"""Relative, of the mean magnitude of an array: forty steps enlarge rounding to some thousandths at most."""
+MEAN_TOLERANCE = 0.01
+"""Relative, of the mean magnitude of an array. The number of threads changes no bit; what moves it by a
+thousandth changes figures by less than a seed does."""
 
 
 def fingerprint(folder: Path) -> dict[str, tuple[int, float]]:
