@@ -15,11 +15,13 @@ from tests.documents.gestures import gesture_tables
 from tests.documents.keys import key_tables
 from tests.documents.ledger import (
     HEADLINE,
+    PAPER_PRESET,
     beside_published_table,
     calm_table,
     headline_table,
     ledger_table,
     names,
+    paper_preset_table,
     quality_table,
 )
 from tests.documents.paper import paper_tables
@@ -43,7 +45,8 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "answers": answers_table,
     "calm": calm_table,
     "beside-published": beside_published_table,
-    **{f"table-{name}": partial(ledger_table, name) for name in names() if name not in HEADLINE},
+    "paper-preset": paper_preset_table,
+    **{f"table-{name}": partial(ledger_table, name) for name in names() if name not in (*HEADLINE, *PAPER_PRESET)},
 }
 """What each block is filled with."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)

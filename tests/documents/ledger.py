@@ -174,9 +174,18 @@ IN_LAB = ("ablation", "paper", "equal")
 """How files begin whose tables are in docs/lab."""
 
 
+PAPER_PRESET = ("paper-sample", "paper-equal-steps", "paper-basketball", "paper-basketball-default")
+"""Files of the published method next to this program's defaults."""
+
+
 def quality_table() -> str:
     """The clips of the headline."""
     return _clips_table(HEADLINE)
+
+
+def paper_preset_table() -> str:
+    """The published method and this program's defaults."""
+    return _clips_table(PAPER_PRESET)
 
 
 def _clips_table(names: Sequence[str]) -> str:
