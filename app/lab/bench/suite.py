@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
 from app.lab.bench.raster import limit_shares, measure_raster
-from app.lab.bench.rows import IterationRow, KernelRow, SpeedError
+from app.lab.bench.rows import IterationRow, KernelRow, SpeedError, Trade
 from app.lab.machine import Machine, describe_machine
 
 SCHEMA = 1
@@ -50,13 +50,15 @@ FULL = Plan(
 
 @dataclass(slots=True)
 class Report:
-    """Everything measured. `fma_per_s` is the machine's limit of sixteen-lane multiply-adds, all threads together."""
+    """Everything measured. `fma_per_s` is the machine's limit of sixteen-lane multiply-adds, all threads together;
+    `trades` are settings of trainings and exports, where a capture was given."""
 
     machine: Machine
     fma_per_s: float
     kernels: list[KernelRow] = field(default_factory=list)
     marks: list[SpeedError] = field(default_factory=list)
     iterations: list[IterationRow] = field(default_factory=list)
+    trades: list[Trade] = field(default_factory=list)
 
 
 Say = Callable[[str, float], None]
@@ -123,6 +125,7 @@ def document(report: Report) -> dict:
         "fma_per_s": report.fma_per_s,
         "kernels": kernels,
         "speed_error": [asdict(mark) for mark in report.marks],
+        "settings": [asdict(trade) for trade in report.trades],
         "iterations": [
             asdict(row) | {"stages": {name: asdict(timing) for name, timing in row.stages}} for row in report.iterations
         ],
