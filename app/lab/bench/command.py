@@ -73,10 +73,10 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             say=say,
         )
         if capture is not None:
-            from app.lab.bench.exports import measure_exports
-            from app.lab.bench.settings import measure_settings
+            from app.lab.bench.settings.exports import measure_exports
+            from app.lab.bench.settings.trainings import measure_trainings
 
-            report.trades, trained = measure_settings(capture, options.out / TRAINED, launch=launch, say=say)
+            report.trades, trained = measure_trainings(capture, options.out / TRAINED, launch=launch, say=say)
             say("exports", 1.0)
             report.trades += measure_exports(trained)
     finally:

@@ -49,7 +49,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
-    from app.lab.bench.exports import measure_exports
+    from app.lab.bench.settings.exports import measure_exports
     from app.lab.report.paper_figures.by_hand import FigureOptions
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 

@@ -22,7 +22,7 @@ from app.lab.pictures import Pictures, RenderedPictures
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
 from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
-from app.lab.report.costs import storage_section, times_section
+from app.lab.report.costs import export_parts, storage_section, times_section, training_parts
 from app.lab.report.length import length_section
 from app.lab.report.measured import clips_section, time_section, worst_pictures, worst_section
 from app.lab.report.measuring import evaluation_of
@@ -33,7 +33,6 @@ from app.lab.report.paper_figures.by_hand import FigureOptions, Places, checked_
 from app.lab.report.paper_figures.sections import STEPS, paper_sections
 from app.lab.report.rendering import rendering_section
 from app.lab.report.seam_parts import seams_section, shown_boundaries
-from app.lab.report.speed_parts import export_parts, training_parts
 from app.project.project_facts import ProjectFacts, find_projects, read_facts, short_names
 from engine.capture.capture_summary import describe
 from engine.errors import CaptureError, ProjectError

@@ -10,12 +10,13 @@ from PIL import Image
 
 from app.cli.cli import main
 from app.evaluation.headless import open_trained
-from app.lab.bench import exports, settings, suite
+from app.lab.bench import suite
 from app.lab.bench.chart import draw_speed_error
 from app.lab.bench.command import CHART_FILE, TRAINED
-from app.lab.bench.exports import KINDS, measure_exports
 from app.lab.bench.rows import DEFAULTS, SpeedError, Trade
-from app.lab.bench.settings import SETTINGS, measure_settings
+from app.lab.bench.settings import exports, trainings
+from app.lab.bench.settings.exports import KINDS, measure_exports
+from app.lab.bench.settings.trainings import SETTINGS, measure_trainings
 from app.lab.bench.suite import Plan
 from app.project.opening.project_access import open_project
 from engine.capture.capture import open_capture
@@ -31,7 +32,7 @@ def trades() -> list[Trade]:
     rows = [("step", "tiles", "tiles=all", 0.02, 30.0), ("step", "tiles", DEFAULTS, 0.01, 30.0)]
     rows += [("clip", "quality", "quality=best", 90.0, 31.5), ("clip", "quality", DEFAULTS, 30.0, 31.0)]
     rows += [("export", name.split()[0], name, 0.1, 60.0) for name in KINDS]
-    return [Trade(*names, seconds, 500_000, psnr_db) for *names, seconds, psnr_db in rows]
+    return [Trade(kind, line, setting, seconds, 500_000, psnr_db) for kind, line, setting, seconds, psnr_db in rows]
 
 
 def test_every_format_is_written_read_and_measured(tmp_path):
@@ -53,7 +54,7 @@ def test_a_disk_that_refuses_is_named(tmp_path, monkeypatch):
 def test_each_setting_is_trained_once_and_set_against_the_defaults(tmp_path, capture_folder, monkeypatch):
     runner = Runner(tmp_path, open_capture(capture_folder), monkeypatch)
     said = []
-    found, trained = measure_settings(
+    found, trained = measure_trainings(
         runner.capture, tmp_path, launch=runner._launch, say=lambda what, done: said.append((what, done))
     )
     assert trained.trained == [0, 1]
@@ -75,7 +76,7 @@ def test_each_setting_is_trained_once_and_set_against_the_defaults(tmp_path, cap
 def test_captures_without_a_later_clip_or_a_held_out_camera_are_refused(tmp_path, n_frames, holdout, expected):
     capture = replace(open_capture(write_capture(tmp_path / "c", n_frames=n_frames)), default_holdout=holdout)
     with pytest.raises(ProjectError, match=expected):
-        measure_settings(capture, tmp_path, launch=lambda *_: pytest.fail("trained all the same"))
+        measure_trainings(capture, tmp_path, launch=lambda *_: pytest.fail("trained all the same"))
 
 
 @pytest.mark.parametrize(
@@ -97,7 +98,7 @@ def test_the_command_shows_settings_and_exports_everywhere(monkeypatch, capture_
     monkeypatch.setattr(suite, "QUICK", Plan())
     monkeypatch.setattr("app.background.kernels.warm_cache", lambda: None)
     monkeypatch.setattr("app.lab.bench.fma_limit._ROUNDS_PER_CALL", 100)
-    monkeypatch.setattr(settings, "measure_settings", lambda *a, **k: (asked.append(a), (rows[:4], "trained"))[1])
+    monkeypatch.setattr(trainings, "measure_trainings", lambda *a, **k: (asked.append(a), (rows[:4], "trained"))[1])
     monkeypatch.setattr(exports, "measure_exports", lambda trained: (asked.append(trained), rows[4:])[1])
     out = tmp_path / "out"
     assert main(["bench", "--capture", str(capture_folder), "--out", str(out), "--json", str(tmp_path / "b.json")]) == 0

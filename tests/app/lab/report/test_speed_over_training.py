@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 
 from app.lab.bench.rows import Trade
-from app.lab.report import speed_parts
+from app.lab.report import costs
 from app.project.project_facts import read_facts
 from tests.app.lab.report.made_up import report
 
 
 def test_the_section_has_trainings_and_exports(project, monkeypatch):
     curves = {}
-    monkeypatch.setattr(speed_parts, "draw_training", lambda found, *_: curves.update(found) or b"png")
+    monkeypatch.setattr(costs, "draw_training", lambda found, *_: curves.update(found) or b"png")
     rows = [
         {"step": 0, "training_s": 0.5, "held_out_psnr": 12.0},
         {"step": 9, "loss": 0.5},

@@ -26,7 +26,7 @@ SETTINGS = {
 CLIP_LENGTH, N_CLIPS = 5, 2
 
 
-def measure_settings(
+def measure_trainings(
     capture: Capture, folder: Path, *, launch: Launch, say: Callable[[str, float], None] = lambda what, done: None
 ) -> tuple[list[Trade], TrainedProject]:
     """Train two short clips with each of SETTINGS and with the defaults.
