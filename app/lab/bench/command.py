@@ -31,7 +31,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help=f"folder for the picture {CHART_FILE} (default: {DEFAULT_OUT})",
     )
     command.add_argument("--json", metavar="FILE", help="file for all figures; - prints them instead of the table")
-    command.add_argument("--full", action="store_true", help="all scenes and sizes; takes some minutes, not one")
+    command.add_argument("--full", action="store_true", help="all scenes, sizes, settings; takes some minutes, not one")
     command.add_argument(
         "--capture",
         type=path_argument,
@@ -57,26 +57,26 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             check_target(path)
     if options.threads is not None and options.threads < 1:
         raise ProjectError(f"--threads is {options.threads}; at least one is needed.")
-    capture = None if options.capture is None else open_capture(options.capture, scale=options.scale)
     from app.lab.bench.suite import FULL, QUICK, document, run_plan
     from app.lab.bench.table import report_text
 
+    trainings = None
+    if options.capture is not None:
+        from app.lab.bench.settings.trainings import ShortTrainings
+
+        trainings = ShortTrainings(open_capture(options.capture, scale=options.scale))
+    plan = FULL if options.full else QUICK
     line = ProgressLine(is_quiet=options.quiet)
 
     def say(what: str, done: float) -> None:
         line.update(f"Measuring: {what}", done)
 
     try:
-        report = run_plan(
-            FULL if options.full else QUICK,
-            n_threads=options.threads,
-            say=say,
-        )
-        if capture is not None:
+        report = run_plan(plan, n_threads=options.threads, say=say)
+        if trainings is not None:
             from app.lab.bench.settings.exports import measure_exports
-            from app.lab.bench.settings.trainings import measure_trainings
 
-            report.trades, trained = measure_trainings(capture, options.out / TRAINED, launch=launch, say=say)
+            report.trades, trained = trainings.measure(options.out / TRAINED, plan.settings, launch=launch, say=say)
             say("exports", 1.0)
             report.trades += measure_exports(trained)
     finally:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
 from app.lab.bench.raster import limit_shares, measure_raster
@@ -14,7 +14,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Names of scenes and sizes, see `raster.RECIPES`, `field.SCENES` and `iteration.SIZES`.
+    """Names of scenes and sizes, see `raster.RECIPES`, `field.SCENES` and `iteration.SIZES`; settings to train with.
 
     Attributes:
         raster, decode: Scenes.
@@ -22,6 +22,8 @@ class Plan:
         with_memory: Scenes whose peak memory is measured as well, in a separate process.
         n_runs: Runs of the kernels that count.
         n_steps: Training steps that count.
+        settings: As NAME=VALUE, by operation: "step" for what changes a training step, "clip" for what changes how many
+            there are or the sizes. Used where a capture is given, see `settings.trainings`.
     """
 
     raster: tuple[str, ...] = ()
@@ -30,6 +32,7 @@ class Plan:
     with_memory: frozenset[str] = frozenset()
     n_runs: int = 10
     n_steps: int = 30
+    settings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 QUICK = Plan(
@@ -37,6 +40,7 @@ QUICK = Plan(
     decode=("2k", "8k"),
     iterations=("2k", "8k"),
     with_memory=frozenset({"medium"}),
+    settings={"step": ("gaussians_per_anchor=2", "tiles=all"), "clip": ("quality=draft", "preset=toy")},
 )
 FULL = Plan(
     raster=("accuracy", "small", "heavy", "medium", "large"),
@@ -45,6 +49,10 @@ FULL = Plan(
     with_memory=frozenset({"small", "heavy", "medium", "large", "8k", "50k"}),
     n_runs=20,
     n_steps=60,
+    settings={
+        "step": ("gaussians_per_anchor=2", "gaussians_per_anchor=10", "tiles=all", "gate=static", "gate=off"),
+        "clip": ("quality=draft", "quality=best", "preset=toy", "preset=medium"),
+    },
 )
 
 

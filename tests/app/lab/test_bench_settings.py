@@ -14,10 +14,10 @@ from app.lab.bench import suite
 from app.lab.bench.chart import draw_speed_error
 from app.lab.bench.command import CHART_FILE, TRAINED
 from app.lab.bench.rows import DEFAULTS, SpeedError, Trade
-from app.lab.bench.settings import exports, trainings
+from app.lab.bench.settings import exports
 from app.lab.bench.settings.exports import KINDS, measure_exports
-from app.lab.bench.settings.trainings import SETTINGS, measure_trainings
-from app.lab.bench.suite import Plan
+from app.lab.bench.settings.trainings import ShortTrainings
+from app.lab.bench.suite import FULL, QUICK, Plan
 from app.project.opening.project_access import open_project
 from engine.capture.capture import open_capture
 from engine.errors import DiskError, ProjectError
@@ -54,20 +54,20 @@ def test_a_disk_that_refuses_is_named(tmp_path, monkeypatch):
 def test_each_setting_is_trained_once_and_set_against_the_defaults(tmp_path, capture_folder, monkeypatch):
     runner = Runner(tmp_path, open_capture(capture_folder), monkeypatch)
     said = []
-    found, trained = measure_trainings(
-        runner.capture, tmp_path, launch=runner._launch, say=lambda what, done: said.append((what, done))
+    found, trained = ShortTrainings(runner.capture).measure(
+        tmp_path, FULL.settings, launch=runner._launch, say=lambda what, done: said.append((what, done))
     )
     assert trained.trained == [0, 1]
     assert said[0] == ("training, full", 0.0)
-    assert len(said) == 1 + sum(map(len, SETTINGS.values()))
-    for operation, row in SETTINGS.items():
+    assert len(said) == 1 + sum(map(len, FULL.settings.values()))
+    for operation, row in FULL.settings.items():
         marks = [trade for trade in found if trade.operation == operation]
         assert [trade.setting for trade in marks if trade.setting != DEFAULTS] == list(row)
         lines = {trade.line for trade in marks}
         assert {trade.line for trade in marks if trade.setting == DEFAULTS} == lines
     assert ("tiles.all-seed0", 0) not in runner.launched, "its reference clip is that of the defaults"
     assert {trade.psnr_db for trade in found if trade.operation == "clip"} == {22.0}  # the runner's, over two clips
-    one, both = (next(t for t in found if (t.operation, t.setting) == (kind, DEFAULTS)) for kind in SETTINGS)
+    one, both = (next(t for t in found if (t.operation, t.setting) == (kind, DEFAULTS)) for kind in FULL.settings)
     assert one.n_bytes < both.n_bytes
     assert one.psnr_db == 20.0
 
@@ -76,7 +76,7 @@ def test_each_setting_is_trained_once_and_set_against_the_defaults(tmp_path, cap
 def test_captures_without_a_later_clip_or_a_held_out_camera_are_refused(tmp_path, n_frames, holdout, expected):
     capture = replace(open_capture(write_capture(tmp_path / "c", n_frames=n_frames)), default_holdout=holdout)
     with pytest.raises(ProjectError, match=expected):
-        measure_trainings(capture, tmp_path, launch=lambda *_: pytest.fail("trained all the same"))
+        ShortTrainings(capture)
 
 
 @pytest.mark.parametrize(
@@ -95,14 +95,14 @@ def test_bad_captures_end_with_2_before_anything_is_measured(
 def test_the_command_shows_settings_and_exports_everywhere(monkeypatch, capture_folder, tmp_path, capsys):
     asked = []
     rows = trades()
-    monkeypatch.setattr(suite, "QUICK", Plan())
+    monkeypatch.setattr(suite, "QUICK", Plan(settings=QUICK.settings))
     monkeypatch.setattr("app.background.kernels.warm_cache", lambda: None)
     monkeypatch.setattr("app.lab.bench.fma_limit._ROUNDS_PER_CALL", 100)
-    monkeypatch.setattr(trainings, "measure_trainings", lambda *a, **k: (asked.append(a), (rows[:4], "trained"))[1])
+    monkeypatch.setattr(ShortTrainings, "measure", lambda *a, **k: (asked.append(a), (rows[:4], "trained"))[1])
     monkeypatch.setattr(exports, "measure_exports", lambda trained: (asked.append(trained), rows[4:])[1])
     out = tmp_path / "out"
     assert main(["bench", "--capture", str(capture_folder), "--out", str(out), "--json", str(tmp_path / "b.json")]) == 0
-    assert [asked[0][0].scale, *asked[0][1:], *asked[1:]] == [0.5, out / TRAINED, "trained"]
+    assert [asked[0][0]._capture.scale, *asked[0][1:], *asked[1:]] == [0.5, out / TRAINED, QUICK.settings, "trained"]
     said = capsys.readouterr().out
     assert "clip, quality=best" in said
     assert "export, ply --fields full" in said

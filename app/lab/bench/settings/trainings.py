@@ -3,7 +3,7 @@ defaults."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,64 +18,77 @@ from engine.capture.capture import Capture
 from engine.errors import ProjectError
 from engine.training.presets import PRESETS
 
-SETTINGS = {
-    "step": ("gaussians_per_anchor=2", "gaussians_per_anchor=10", "tiles=all", "gate=static", "gate=off"),
-    "clip": ("quality=draft", "quality=best", "preset=toy", "preset=medium"),
-}
-"""What is trained for each operation. A step is one of a clip that inherits; times of a clip are those of both."""
 CLIP_LENGTH, N_CLIPS = 5, 2
 
 
-def measure_trainings(
-    capture: Capture, folder: Path, *, launch: Launch, say: Callable[[str, float], None] = lambda what, done: None
-) -> tuple[list[Trade], TrainedProject]:
-    """Train two short clips with each of SETTINGS and with the defaults.
+class ShortTrainings:
+    """Two short clips of a capture, trained again and again.
 
     Args:
-        folder: Gets a project per setting; trainings that are complete in it are not repeated.
-        say: Called before each training, with the share that is done.
-    Returns:
-        The marks of the chart, and the project trained with the defaults.
+        capture: At its working size.
     Raises:
         ProjectError: The capture is too short or has no held-out camera.
-        TrainingError: A clip failed.
     """
-    settings = default_settings(capture, clip_length=min(CLIP_LENGTH, capture.n_frames))
-    if len(settings.clips(capture.n_frames)) < N_CLIPS or not settings.holdout:
-        raise ProjectError(
-            f"The capture has {capture.n_frames} frames and {len(settings.holdout)} held-out cameras; more than "
-            f"{CLIP_LENGTH} frames and a held-out camera are needed to measure settings.",
-            path=Path(capture.path),
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture = capture
+        self._settings = default_settings(capture, clip_length=min(CLIP_LENGTH, capture.n_frames))
+        if capture.n_frames <= CLIP_LENGTH or not self._settings.holdout:
+            raise ProjectError(
+                f"The capture has {capture.n_frames} frames and {len(self._settings.holdout)} held-out cameras; more "
+                f"than {CLIP_LENGTH} frames and a held-out camera are needed to measure settings.",
+                path=Path(capture.path),
+            )
+
+    def measure(
+        self,
+        folder: Path,
+        chosen: Mapping[str, Sequence[str]],
+        *,
+        launch: Launch,
+        say: Callable[[str, float], None] = lambda what, done: None,
+    ) -> tuple[list[Trade], TrainedProject]:
+        """Train with each setting and with the defaults.
+
+        Args:
+            folder: Gets a project per setting; trainings that are complete in it are not repeated.
+            chosen: Settings by operation, see Plan. A step is one of the later clip; times of a clip are those of both.
+            say: Called before each training, with the share that is done.
+        Returns:
+            The marks of the chart, and the project trained with the defaults.
+        Raises:
+            ProjectError: The folder holds other projects.
+            TrainingError: A clip failed.
+        """
+        variants = {setting: _variant(setting) for row in chosen.values() for setting in row}
+        document = run_ablation(
+            folder,
+            self._capture,
+            self._settings,
+            variants=[*chosen_variants([]), *variants.values()],
+            n_clips=N_CLIPS,
+            seeds=[self._settings.seed],
+            metrics="quick",
+            launch=launch,
+            callbacks=Callbacks(
+                on_variant=lambda name, seed, n_done, n: say(f"training, {name}", n_done / n),
+                on_status=_ignore,
+                on_event=_ignore,
+                on_outcome=_ignore,
+                on_row=_ignore,
+            ),
         )
-    variants = {setting: _variant(setting) for row in SETTINGS.values() for setting in row}
-    document = run_ablation(
-        folder,
-        capture,
-        settings,
-        variants=[*chosen_variants([]), *variants.values()],
-        n_clips=N_CLIPS,
-        seeds=[settings.seed],
-        metrics="quick",
-        launch=launch,
-        callbacks=Callbacks(
-            on_variant=lambda name, seed, n_done, n: say(f"training, {name}", n_done / n),
-            on_status=_ignore,
-            on_event=_ignore,
-            on_outcome=_ignore,
-            on_row=_ignore,
-        ),
-    )
-    found = {result["variant"]: result for result in document["results"]}
-    names = {setting: variant.name for setting, variant in variants.items()} | {DEFAULTS: FULL}
-    trades = []
-    for operation, row in SETTINGS.items():
-        lines = {setting: setting.partition("=")[0] for setting in row}
-        marks = [*lines.items(), *((DEFAULTS, line) for line in dict.fromkeys(lines.values()))]
-        for setting, line in marks:
-            place = project_folder(folder, names[setting], settings.seed)
-            trades.append(_trade(operation, line, setting, place, found[names[setting]]))
-    full = open_project(project_folder(folder, FULL, settings.seed), is_writable=False)
-    return trades, open_trained(full, capture)
+        found = {result["variant"]: result for result in document["results"]}
+        names = {setting: variant.name for setting, variant in variants.items()} | {DEFAULTS: FULL}
+        trades = []
+        for operation, row in chosen.items():
+            lines = {setting: setting.partition("=")[0] for setting in row}
+            marks = [*lines.items(), *((DEFAULTS, line) for line in dict.fromkeys(lines.values()))]
+            for setting, line in marks:
+                place = project_folder(folder, names[setting], self._settings.seed)
+                trades.append(_trade(operation, line, setting, place, found[names[setting]]))
+        full = open_project(project_folder(folder, FULL, self._settings.seed), is_writable=False)
+        return trades, open_trained(full, self._capture)
 
 
 def _variant(setting: str) -> Variant:
