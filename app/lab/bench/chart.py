@@ -111,8 +111,9 @@ def _draw_trades(axes: Any, trades: Sequence[Trade], costs: Sequence[float], cos
     axes.set_xlabel(f"{error_label}; the error grows to the right")
     axes.set_ylabel(cost_label)
     add_grid(axes)
-    points = dict.fromkeys((trade.setting, trade.psnr_db, cost) for trade, cost in marks)  # defaults lie on every line
-    place_labels(axes.figure, axes, [name for name, *_ in points], [(x, y) for _, x, y in points])
+    named = {(cost, trade.psnr_db, trade.setting) for trade, cost in marks}  # the defaults lie on every line
+    named = sorted(named, reverse=True)  # of neighbours the upper one is labelled above
+    place_labels(axes.figure, axes, [name for *_, name in named], [(psnr, cost) for cost, psnr, _ in named])
 
 
 def _legend(axes: Any, marks: Sequence[SpeedError]) -> list[Any]:
