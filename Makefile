@@ -52,7 +52,7 @@ fmt: setup ## format and apply the safe fixes
 
 bench: setup ## measure the figures of the README, print them as tables, draw out/speed_error.png
 	@$(BIN)/python -m tests.benchmarks.bench_quality $(SAMPLE)
-	@$(BIN)/clipgstream bench --full --out out
+	@$(BIN)/clipgstream bench --full --capture $(SAMPLE) --out out
 	@$(BIN)/python -m tests.benchmarks.bench_window $(SAMPLE)
 	@$(BIN)/python -m tests.benchmarks.bench_mending out/mending
 	@$(BIN)/python -m tests.benchmarks.bench_selecting $(SAMPLE)

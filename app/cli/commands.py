@@ -120,7 +120,7 @@ COMMANDS = {
     "doctor": Command(
         "check this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.captures.doctor_command"
     ),
-    "bench": Command("measure speed and error of the kernels on this machine", "app.lab.bench.command"),
+    "bench": Command("measure speed against error, of kernels and settings, on this machine", "app.lab.bench.command"),
     "report": Command(
         "write a report page about a project, alone or next to others",
         "app.lab.report.command",

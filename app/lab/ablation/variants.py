@@ -248,7 +248,7 @@ def own_row(text: str) -> Variant:
     return Variant(name, settings, overrides, shares_reference=is_of_source, is_on_request=True)
 
 
-_OF_SOURCE_CLIPS = {"decoder", "residual", "inherit", "field", "schedule", "source_steps"}
+_OF_SOURCE_CLIPS = {"decoder", "residual", "inherit", "field", "schedule", "source_steps", "tiles"}
 """Settings that leave the reference clip as it is."""
 
 

@@ -1,4 +1,4 @@
-"""clipgstream bench: the table of the kernels, their figures as JSON, and the picture of speed against error."""
+"""clipgstream bench: the table of kernels and settings, the figures as JSON, and a picture of speed against error."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.results import named_failure, write_text
 from app.export.staging import check_target
 from app.training.service import Launch
+from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 from engine.storage.files import atomic_path
 from engine.storage.json_files import json_text
 
-CHART_FILE = "speed_error.png"
+CHART_FILE, TRAINED = "speed_error.png", "trained"
 DEFAULT_OUT = Path("bench_output")
 """The picture's file unless --out names one, in the current folder."""
+DEFAULT_SCALE = 0.5
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -29,13 +31,25 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help=f"folder for the picture {CHART_FILE} (default: {DEFAULT_OUT})",
     )
     command.add_argument("--json", metavar="FILE", help="file for all figures; - prints them instead of the table")
-    command.add_argument("--full", action="store_true", help="all scenes and sizes; takes some minutes, not one")
+    command.add_argument("--full", action="store_true", help="all scenes, sizes, settings; takes some minutes, not one")
+    command.add_argument(
+        "--capture",
+        type=path_argument,
+        help="also train two clips of five frames of this capture with each setting that trades time for error, and "
+        f"export them in every format; the projects lie in DIR/{TRAINED}",
+    )
+    command.add_argument(
+        "--scale",
+        type=float,
+        default=DEFAULT_SCALE,
+        help=f"working size of the capture, share of the original in (0, 1] (default: {DEFAULT_SCALE:g})",
+    )
     command.add_argument("--threads", type=int, metavar="N", help="threads to compute with (default: every core)")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """clipgstream bench: measure the kernels; prints the table. Returns the exit code."""
+    """clipgstream bench: measure kernels, with a capture also settings; prints tables. Returns the exit code."""
     chart = options.out / CHART_FILE
     table_file = None if options.json in (None, "-") else Path(options.json)
     for path in (chart, table_file):  # before a minute is spent
@@ -46,13 +60,25 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     from app.lab.bench.suite import FULL, QUICK, document, run_plan
     from app.lab.bench.table import report_text
 
+    trainings = None
+    if options.capture is not None:
+        from app.lab.bench.settings.trainings import ShortTrainings
+
+        trainings = ShortTrainings(open_capture(options.capture, scale=options.scale))
+    plan = FULL if options.full else QUICK
     line = ProgressLine(is_quiet=options.quiet)
+
+    def say(what: str, done: float) -> None:
+        line.update(f"Measuring: {what}", done)
+
     try:
-        report = run_plan(
-            FULL if options.full else QUICK,
-            n_threads=options.threads,
-            say=lambda what, done: line.update(f"Measuring: {what}", done),
-        )
+        report = run_plan(plan, n_threads=options.threads, say=say)
+        if trainings is not None:
+            from app.lab.bench.settings.exports import measure_exports
+
+            report.trades, trained = trainings.measure(options.out / TRAINED, plan.settings, launch=launch, say=say)
+            say("exports", 1.0)
+            report.trades += measure_exports(trained)
     finally:
         line.finish()
     text = json_text(document(report), indent=1)
@@ -62,6 +88,6 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     from app.lab.bench.chart import draw_speed_error
 
     with named_failure(chart), atomic_path(chart) as partial:
-        draw_speed_error(report.marks, partial, footer=str(report.machine))
+        draw_speed_error(report.marks, partial, footer=str(report.machine), trades=report.trades)
     line.say(f"Speed against error: {chart}")
     return EXIT_OK

@@ -31,6 +31,33 @@ class SpeedError:
 
 
 @dataclass(frozen=True, slots=True)
+class Trade:
+    """One mark of the chart's lower rows: a setting that a user can change, with its time, size and error.
+
+    Attributes:
+        operation: "step", "clip" or "export".
+        line: Marks of one line differ in one setting.
+        setting: As it is written, or DEFAULTS.
+        seconds: Of a training step, of the training of all clips without its preparation, or of writing a file.
+        n_bytes: Of the clip files, or of the exported one.
+        psnr_db: Of held-out pictures against the capture; of an exported file in the worst camera against the live
+            picture.
+        psnr_moving_db: Of moving pixels; None where there are none.
+    """
+
+    operation: str
+    line: str
+    setting: str
+    seconds: float
+    n_bytes: int
+    psnr_db: float
+    psnr_moving_db: float | None = None
+
+
+DEFAULTS = "defaults"
+
+
+@dataclass(frozen=True, slots=True)
 class KernelRow:
     """Speed of our back end at full size, and its error and its lead over plain torch where both can be known.
 

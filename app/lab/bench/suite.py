@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 
 from app.lab.bench.raster import limit_shares, measure_raster
-from app.lab.bench.rows import IterationRow, KernelRow, SpeedError
+from app.lab.bench.rows import IterationRow, KernelRow, SpeedError, Trade
 from app.lab.machine import Machine, describe_machine
 
 SCHEMA = 1
@@ -14,7 +14,7 @@ SCHEMA = 1
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Names of scenes and sizes, see `raster.RECIPES`, `field.SCENES` and `iteration.SIZES`.
+    """Names of scenes and sizes, see `raster.RECIPES`, `field.SCENES` and `iteration.SIZES`; settings to train with.
 
     Attributes:
         raster, decode: Scenes.
@@ -22,6 +22,8 @@ class Plan:
         with_memory: Scenes whose peak memory is measured as well, in a separate process.
         n_runs: Runs of the kernels that count.
         n_steps: Training steps that count.
+        settings: As NAME=VALUE, by operation: "step" for what changes a training step, "clip" for what changes how many
+            there are or the sizes. Used where a capture is given, see `settings.trainings`.
     """
 
     raster: tuple[str, ...] = ()
@@ -30,6 +32,7 @@ class Plan:
     with_memory: frozenset[str] = frozenset()
     n_runs: int = 10
     n_steps: int = 30
+    settings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 QUICK = Plan(
@@ -37,6 +40,7 @@ QUICK = Plan(
     decode=("2k", "8k"),
     iterations=("2k", "8k"),
     with_memory=frozenset({"medium"}),
+    settings={"step": ("gaussians_per_anchor=2", "tiles=all"), "clip": ("quality=draft", "preset=toy")},
 )
 FULL = Plan(
     raster=("accuracy", "small", "heavy", "medium", "large"),
@@ -45,18 +49,24 @@ FULL = Plan(
     with_memory=frozenset({"small", "heavy", "medium", "large", "8k", "50k"}),
     n_runs=20,
     n_steps=60,
+    settings={
+        "step": ("gaussians_per_anchor=2", "gaussians_per_anchor=10", "tiles=all", "gate=static", "gate=off"),
+        "clip": ("quality=draft", "quality=best", "preset=toy", "preset=medium"),
+    },
 )
 
 
 @dataclass(slots=True)
 class Report:
-    """Everything measured. `fma_per_s` is the machine's limit of sixteen-lane multiply-adds, all threads together."""
+    """Everything measured. `fma_per_s` is the machine's limit of sixteen-lane multiply-adds, all threads together;
+    `trades` are settings of trainings and exports, where a capture was given."""
 
     machine: Machine
     fma_per_s: float
     kernels: list[KernelRow] = field(default_factory=list)
     marks: list[SpeedError] = field(default_factory=list)
     iterations: list[IterationRow] = field(default_factory=list)
+    trades: list[Trade] = field(default_factory=list)
 
 
 Say = Callable[[str, float], None]
@@ -123,6 +133,7 @@ def document(report: Report) -> dict:
         "fma_per_s": report.fma_per_s,
         "kernels": kernels,
         "speed_error": [asdict(mark) for mark in report.marks],
+        "settings": [asdict(trade) for trade in report.trades],
         "iterations": [
             asdict(row) | {"stages": {name: asdict(timing) for name, timing in row.stages}} for row in report.iterations
         ],

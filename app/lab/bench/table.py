@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from app.lab.bench.raster import limit_shares
-from app.lab.bench.rows import IterationRow, KernelRow
+from app.lab.bench.rows import IterationRow, KernelRow, Trade
 from app.lab.bench.suite import Report
 from app.lab.bench.timing import Timing
 
@@ -22,6 +22,7 @@ _KERNEL_HEAD = (
     "vs torch",
     "peak MB",
 )
+_TRADE_HEAD = ("setting", "s", "MB", "PSNR dB", "moving dB")
 _STEP_ERROR_HEAD = ("checked at", "pixel err", "loss err", "gradient err", "update err", "vs torch")
 
 
@@ -39,6 +40,8 @@ def report_text(report: Report) -> str:
         names = [name for name, _ in report.iterations[0].stages]
         head = ("training step, ms", *names, "sum", "whole step", "Gaussians", *_STEP_ERROR_HEAD)
         parts.append(_aligned([head, *(_iteration_cells(row) for row in report.iterations)]))
+    if report.trades:
+        parts.append(_aligned([_TRADE_HEAD, *dict.fromkeys(map(_trade_cells, report.trades))]))
     return "\n\n".join(parts)
 
 
@@ -79,6 +82,12 @@ def _iteration_cells(row: IterationRow) -> tuple[str, ...]:
         f"{errors.update_error:.1e}",
         f"{row.reference_ratio:.3g}x",
     )
+
+
+def _trade_cells(trade: Trade) -> tuple[str, ...]:
+    moving = "-" if trade.psnr_moving_db is None else f"{trade.psnr_moving_db:.2f}"
+    size = f"{trade.n_bytes / 1e6:.2f}"
+    return f"{trade.operation}, {trade.setting}", f"{trade.seconds:.4g}", size, f"{trade.psnr_db:.2f}", moving
 
 
 def _timing(timing: Timing) -> str:

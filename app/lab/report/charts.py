@@ -10,15 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from app.lab.figures import FAINT_COLOR, PALETTE, add_grid, new_figure, plain_texts, png_of
+from app.lab.figures import FAINT_COLOR, PALETTE, add_grid, new_figure, place_labels, plain_texts, png_of, use_log
 from app.lab.report.pareto import pareto_front
 
 WIDTH_INCHES = 10.5
 MAP_COLORS = "cividis"
 LOG_FROM_RATIO = 5.0
 """A time axis is logarithmic when the longest time is that many times the shortest."""
-_LABEL_OFFSETS = ((7, 5), (7, -12), (-7, 5), (-7, -12), (7, 17), (7, -24), (-7, 17), (-7, -24), (0, 29), (0, -36))
-"""Places of a label next to its mark, points of the typeface; the first that is free is taken."""
 _LABEL_LENGTH = 28
 MAX_NAMED_MARKS = 6
 """Above so many results the marks are numbered, and the names stand next to the panels."""
@@ -95,6 +93,21 @@ def draw_over_time(
             axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
         rows[-1].set_xlabel(unit)
         rows[-1].xaxis.get_major_locator().set_params(integer=True)
+        return png_of(figure)
+
+
+def draw_training(curves: Mapping[str, Sequence[tuple[float, float]]], time_label: str, label: str) -> bytes:
+    """A line per training: points of time and figure."""
+    with plain_texts():
+        figure = new_figure(WIDTH_INCHES, 3.6)
+        axes = figure.subplots()
+        for i, (name, points) in enumerate(curves.items()):
+            color, style = PALETTE[i % len(PALETTE)], _STYLES[i // len(PALETTE) % len(_STYLES)]
+            axes.plot(*zip(*points, strict=True), color=color, linestyle=style, marker=".", label=name)
+        axes.set_xlabel(time_label)
+        axes.set_ylabel(label)
+        add_grid(axes)
+        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
         return png_of(figure)
 
 
@@ -261,7 +274,7 @@ def _draw_speed_panel(
         return
     times = [x for x, _ in points]
     if min(times) > 0 and max(times) / min(times) >= LOG_FROM_RATIO:
-        _use_log_time(axes)
+        use_log(axes, "x")
     front = [points[i] for i in pareto_front(points, is_higher_better=panel.is_higher_better)]
     if len(points) > 1:
         xs, ys = zip(*front, strict=True)
@@ -272,45 +285,9 @@ def _draw_speed_panel(
         color = PALETTE[0] if is_front else FAINT_COLOR
         face = color if is_front else "white"
         axes.plot([x], [y], "D" if index == own else "o", color=color, markerfacecolor=face, markersize=8, zorder=3)
-    _place_labels(figure, axes, [labels[i] for i in chosen], points)
-
-
-def _use_log_time(axes: Any) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _position: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    place_labels(figure, axes, [labels[i] for i in chosen], points)
 
 
 def shortened(name: str) -> str:
     """A name for a label: a long one without its middle."""
     return name if len(name) <= _LABEL_LENGTH else f"{name[: _LABEL_LENGTH // 2 - 1]}…{name[-_LABEL_LENGTH // 2 :]}"
-
-
-def _place_labels(figure: Any, axes: Any, labels: Sequence[str], points: Sequence[tuple[float, float]]) -> None:
-    """Each label next to its mark where it covers no other label or mark, as far as such a place is found."""
-    figure.draw_without_rendering()  # the layout has to be known
-    marks = axes.transData.transform(points)
-    taken: list[Any] = []
-    for i, (label, point) in enumerate(zip(labels, points, strict=True)):
-        paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
-        text = axes.annotate(
-            label, point, xytext=(0, 0), textcoords="offset points", fontsize=7.5, bbox=paper, zorder=2.5
-        )
-        costs = []
-        for offset in _LABEL_OFFSETS:
-            _move(text, offset)
-            box = text.get_window_extent()
-            n_covered = sum(box.overlaps(other) for other in taken)
-            n_covered += sum(bool(box.contains(x, y)) for j, (x, y) in enumerate(marks) if j != i)
-            outside = max(axes.bbox.x0 - box.x0, box.x1 - axes.bbox.x1, axes.bbox.y0 - box.y0, box.y1 - axes.bbox.y1)
-            costs.append((n_covered, max(outside, 0.0)))
-        _move(text, _LABEL_OFFSETS[costs.index(min(costs))])
-        taken.append(text.get_window_extent())
-
-
-def _move(text: Any, offset: tuple[int, int]) -> None:
-    text.set_position(offset)
-    text.set_horizontalalignment("left" if offset[0] > 0 else "right" if offset[0] < 0 else "center")

@@ -49,6 +49,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
+    from app.lab.bench.settings.exports import measure_exports
     from app.lab.report.paper_figures.by_hand import FigureOptions
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 
@@ -66,6 +67,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             on_stage=stage_progress(line),
             say=line.say,
             rates_of=wanted_rates(options),
+            exports_of=measure_exports,
         )
     finally:
         line.finish()

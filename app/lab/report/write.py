@@ -16,18 +16,19 @@ from app.evaluation.evaluation import Measuring
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed.frame_rates import RatesOf
 from app.lab.added.figures import with_added_figures
+from app.lab.bench.rows import Trade
 from app.lab.flicker import flicker_figures
 from app.lab.pictures import Pictures, RenderedPictures
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
 from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
-from app.lab.report.costs import storage_section, times_section
+from app.lab.report.costs import export_parts, storage_section, times_section, training_parts
 from app.lab.report.length import length_section
 from app.lab.report.measured import clips_section, time_section, worst_pictures, worst_section
 from app.lab.report.measuring import evaluation_of
 from app.lab.report.over_clips import exposures_of, over_clips_section
 from app.lab.report.page.page import page_html
-from app.lab.report.page.parts import Section
+from app.lab.report.page.parts import Part, Section
 from app.lab.report.paper_figures.by_hand import FigureOptions, Places, checked_places
 from app.lab.report.paper_figures.sections import STEPS, paper_sections
 from app.lab.report.rendering import rendering_section
@@ -68,6 +69,7 @@ def write_report(
     measuring: Measuring | None = None,
     make_pictures: Callable[[TrainedProject], Pictures] = RenderedPictures,
     rates_of: RatesOf = lambda opened: None,
+    exports_of: Callable[[TrainedProject], Sequence[Trade]] = lambda opened: (),
 ) -> Path:
     """Write the report of a project.
 
@@ -87,6 +89,7 @@ def write_report(
         say: Receives sentences for the user, see app.evaluation.evaluation.evaluate_project.
         measuring, make_pictures: Tests bring quick ones.
         rates_of: Measures how fast a project is rendered; left out by default.
+        exports_of: Measures the formats of exports of the page's own project; likewise.
     Returns:
         The page.
     Raises:
@@ -126,7 +129,8 @@ def write_report(
             left_out.append(f"{name} is left out: {error.message}")
             continue
         compared.append(Compared(replace(one, name=name), document, rates))
-    sections = _sections(compared, opened, make_pictures, places, left_out, on_stage)
+    parts = [*training_parts(facts), *export_parts(exports_of(opened))]
+    sections = _sections(compared, opened, make_pictures, places, left_out, on_stage, parts)
     return _write(out, compared, [*beginning, *sections])
 
 
@@ -156,6 +160,7 @@ def _sections(
     places: Places,
     left_out: Sequence[str],
     on_stage: OnStage,
+    speed_parts: Sequence[Part],
 ) -> list[Section]:
     facts, evaluation = compared[0].facts, compared[0].evaluation
     n_pictures = len(worst_pictures(evaluation)) + len(shown_boundaries(evaluation["seams"])) + STEPS
@@ -170,6 +175,7 @@ def _sections(
 
     capture, pictures = describe(opened.capture), make_pictures(opened)
     speed, rendering = speed_section(compared), rendering_section(compared)
+    speed = replace(speed, parts=[*speed.parts, *speed_parts])
     published = published_section(compared, capture)
     has_others = len(compared) > 1 or bool(left_out)
     return [

@@ -175,7 +175,8 @@ class Keeper:
         if not math.isfinite(value):
             return None
         self._send(HeldOutMeasured(training.steps_done, value))
-        self.note({"step": training.steps_done, "held_out_psnr": value})
+        row = {"step": training.steps_done, "training_s": self._watch.training_s, "held_out_psnr": value}
+        self.note(row)
         return value
 
     def note(self, row: dict[str, Any]) -> None:

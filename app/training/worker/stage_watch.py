@@ -39,14 +39,19 @@ class StageWatch:
             self._stage = stage
         self.enter(stage)
 
+    @property
+    def training_s(self) -> float:
+        """Of the steps so far, with measuring and writing between them."""
+        self.enter(self._stage)
+        return sum(self.seconds.get(stage, 0.0) for stage in (TRAINING, KEEPING))
+
     def document(self) -> dict[str, Any]:
         """JSON-able: stages_s by name in the order they were entered; preparation_s and training_s, together all of it.
 
         Training is the steps, with measuring and writing between them; everything else is preparation, also where a
         step begins a new phase.
         """
-        self.enter(self._stage)
-        training_s = sum(self.seconds.get(stage, 0.0) for stage in (TRAINING, KEEPING))
+        training_s = self.training_s
         return {
             "stages_s": {stage: round(seconds, 3) for stage, seconds in self.seconds.items()},
             "preparation_s": round(sum(self.seconds.values()) - training_s, 3),

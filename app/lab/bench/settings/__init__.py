@@ -1,0 +1,1 @@
+"""Settings that trade time or size for error: in trainings and in exports."""
