@@ -173,6 +173,12 @@ TABLES: dict[str, Clips | Printed] = {
     "ablation-basketball-paper": _ablation(
         "basketball, the paper's scheme", f"{_BASKETBALL} {_PAPER_SCHEME}", seeds=(0, 1), variants=PAPER_ROWS
     ),
+    "settings": Printed(
+        "speed against error of settings",
+        ("clipgstream bench --full --capture SAMPLE --out OUT --quiet",),
+        which=-1,
+        seeds=(0,),
+    ),
     "doctor": Printed("the capture doctor", ("python -m tests.benchmarks.bench_doctor SAMPLE BASKETBALL",)),
     "synchronisation": Printed(
         "offsets in time", ("python -m tests.benchmarks.bench_synchronisation SAMPLE BASKETBALL",), seeds=(0, 1)
