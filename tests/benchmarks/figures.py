@@ -349,7 +349,10 @@ def _rows(folder: Path, document: dict[str, Any]) -> list[ClipRow]:
     return found
 
 
-def _calm(seams: dict[str, Any]) -> Calm:
+def _calm(seams: dict[str, Any]) -> Calm | None:
+    """None for a single clip, which has no boundary."""
+    if not seams["boundaries"]:
+        return None
     means = seams["means"]["held_out"]
     inside, at = means["interior"], means["boundary"]
 
