@@ -29,7 +29,7 @@ import numpy as np
 from app.lab.machine import describe_machine
 from app.project.opening.project_access import open_project
 from engine.clip_files.clip_state import read_clip_header
-from tests.documents.fingerprint import fingerprint
+from tests.documents.fingerprint import default_settings, fingerprint
 from tests.documents.ledger import HEADLINE, LEDGER, Calm, ClipRow, ClipsEntry, Entry, TableEntry, entry, write_entry
 from tests.documents.printed import printed_tables
 
@@ -275,6 +275,7 @@ def measured_clips(what: Clips, folder: Path, places: dict[str, str], common: di
         for command in what.commands:
             _run(command, places)
     document = json.loads(figures.read_text("utf-8"))
+    is_headline = what in map(TABLES.get, HEADLINE)
     return ClipsEntry(
         title=what.title,
         commands=list(what.commands),
@@ -282,7 +283,7 @@ def measured_clips(what: Clips, folder: Path, places: dict[str, str], common: di
         seeds=[0],
         rows=_rows(project, document),
         calm=_calm(document["seams"]),
-        fingerprint=fingerprint(brief) if what in map(TABLES.get, HEADLINE) else {},
+        **({"fingerprint": fingerprint(brief), "settings": default_settings()} if is_headline else {}),
         **common,
     )
 

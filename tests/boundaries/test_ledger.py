@@ -15,7 +15,7 @@ from app.cli.commands import COMMANDS
 from tests.benchmarks.figures import TABLES, forecast
 from tests.documents import ledger
 from tests.documents.blocks import ROOT
-from tests.documents.fingerprint import differences, fingerprint
+from tests.documents.fingerprint import changed_settings, default_settings, differences, fingerprint
 from tests.documents.ledger import (
     HEADLINE,
     LEDGER,
@@ -107,21 +107,28 @@ def test_commands_of_the_ledger_are_commands(name: str):
 def test_headline_figures_are_of_this_engine(tmp_path):
     now = fingerprint(tmp_path / "sample")
     for name in HEADLINE:
-        found = differences(clips_entry(name).fingerprint, now)
+        then = clips_entry(name)
+        assert then.fingerprint
+        found = changed_settings(then.settings) + differences(then.fingerprint, now)
         assert found == [], (
-            f"The engine trains the sample otherwise than when {name}.json was measured ({clips_entry(name).day}): "
+            f"The engine trains the sample otherwise than when {name}.json was measured ({then.day}): "
             f"measure it again with `python -m tests.benchmarks.figures OUT {name}`, see `make figures`"
         )
 
 
 def test_a_fingerprint_bears_rounding_and_sees_changes():
     then = {"0.a": (1000, 0.5), "0.b": (10, 2.0)}
-    assert differences(then, {"0.a": (1004, 0.501), "0.b": (10, 2.0)}) == []
-    assert differences(then, {"0.a": (1020, 0.5), "0.b": (10, 2.1)}) == [
-        "0.a has 1020 values, not 1000",
-        "0.b is 2.1 in the mean, not 2",
+    assert differences(then, {"0.a": (1024, 0.52), "0.b": (10, 2.0)}) == []
+    assert differences(then, {"0.a": (1060, 0.5), "0.b": (10, 2.2)}) == [
+        "0.a has 1060 values, not 1000",
+        "0.b is 2.2 in the mean, not 2",
     ]
     assert differences(then, {"0.a": (1000, 0.5)}) == ["0.b is in one only"]
+
+
+def test_another_default_is_seen():
+    then = default_settings()
+    assert changed_settings(then | {"passes": 7.0, "gone_since": 1}) == [f"passes is {then['passes']}, not 7.0"]
 
 
 def test_a_damaged_file_or_one_of_another_schema_is_refused(tmp_path, monkeypatch):

@@ -1,26 +1,32 @@
 """The fingerprint of the sample: what a very short training of it with the default settings gives, as a few numbers.
 
-An entry of the ledger keeps that of the code it was measured with. A test takes it again: where it differs, the engine
-trains otherwise than it did, and the headline figures are those of another program.
+An entry of the ledger keeps that of the code it was measured with, and the default settings. A test compares both:
+where they differ, the engine trains otherwise than it did, and the headline figures are those of another program.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from app.cli.cli import main as clipgstream
 from engine.clip_files.clip_state import read_clip_state
+from engine.training.config import TrainConfig
 
 SAMPLE = Path(__file__).resolve().parents[2] / "assets" / "sample"
 SETTINGS = ("static_steps=40", "joint_steps=40", "source_steps=40", "storage=exact")
 N_CLIPS = 2
-COUNT_TOLERANCE = 0.01
-"""Relative. Stereo decides by comparisons, which rounding may turn: processors differ there by a few points."""
-MEAN_TOLERANCE = 0.01
-"""Relative, of the mean magnitude of an array. The number of threads changes no bit; what moves it by a
-thousandth changes figures by less than a seed does."""
+MIN_SIZE = 900
+"""Values of an array that counts: means of fewer hang on single steps of the optimizer."""
+LEFT_OUT = ("field.tables", "field.hidden", "inherited.static.light")
+"""How names of other arrays begin: sizes of the field are powers of two, which one anchor may double, and light is next
+to nothing in the sample."""
+COUNT_TOLERANCE, MEAN_TOLERANCE = 0.05, 0.08
+"""Relative. Stereo decides by comparisons, which rounding turns: compiled for a processor with other instructions, the
+same code gave 2.4 % fewer moving anchors, and means that differed by up to 5.3 %. Threads change no bit."""
 
 
 def fingerprint(folder: Path) -> dict[str, tuple[int, float]]:
@@ -35,9 +41,20 @@ def fingerprint(folder: Path) -> dict[str, tuple[int, float]]:
     found = {}
     for clip_index in range(N_CLIPS):
         for name, array in sorted(read_clip_state(folder / "clips" / f"{clip_index:04d}.safetensors").arrays.items()):
-            if array.size:
+            if array.size >= MIN_SIZE and not name.startswith(LEFT_OUT):
                 found[f"{clip_index}.{name}"] = array.size, float(f"{np.abs(array, dtype=np.float64).mean():.6g}")
     return found
+
+
+def default_settings() -> dict[str, Any]:
+    """Every setting of a training with its default."""
+    return msgspec.to_builtins(TrainConfig())
+
+
+def changed_settings(then: dict[str, Any]) -> list[str]:
+    """Settings that have another default than then, in words. Settings that came or went since then do not count."""
+    now = default_settings()
+    return [f"{name} is {now[name]}, not {then[name]}" for name in sorted(then.keys() & now) if then[name] != now[name]]
 
 
 def differences(then: dict[str, tuple[int, float]], now: dict[str, tuple[int, float]]) -> list[str]:

@@ -82,12 +82,13 @@ class ClipsEntry(_Measured, frozen=True, forbid_unknown_fields=True, tag="clips"
     """Clips of one capture with the default settings.
 
     Attributes:
-        fingerprint: Of the sample with the same code, see `tests.documents.fingerprint`.
+        fingerprint, settings: Of the same code, see `tests.documents.fingerprint`.
     """
 
     rows: list[ClipRow]
     calm: Calm | None = None
     fingerprint: dict[str, tuple[int, float]] = {}
+    settings: dict[str, Any] = {}
 
     @property
     def later(self) -> list[ClipRow]:
