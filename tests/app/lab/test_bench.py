@@ -299,7 +299,7 @@ def test_the_command_prints_a_table_and_writes_document_and_picture(tiny_plan, t
 def empty_plan(tiny_plan, tmp_path, monkeypatch):
     """Nothing is measured, and the picture is a word; in an empty current folder."""
     monkeypatch.setattr(suite, "QUICK", Plan())
-    monkeypatch.setattr(chart, "draw_speed_error", lambda marks, path, footer: path.write_text("picture"))
+    monkeypatch.setattr(chart, "draw_speed_error", lambda marks, path, **_options: path.write_text("picture"))
     monkeypatch.chdir(tmp_path)
 
 
