@@ -108,7 +108,7 @@ def _draw_trades(axes: Any, trades: Sequence[Trade], costs: Sequence[float], cos
     axes.margins(0.22)
     use_log(axes, "y")
     axes.invert_xaxis()
-    axes.set_xlabel(f"{error_label}; the error grows to the right")
+    axes.set_xlabel(f"{error_label}, falling")
     axes.set_ylabel(cost_label)
     add_grid(axes)
     named = {(cost, trade.psnr_db, trade.setting) for trade, cost in marks}  # the defaults lie on every line
