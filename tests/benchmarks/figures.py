@@ -175,7 +175,7 @@ TABLES: dict[str, Clips | Printed] = {
     ),
     "settings": Printed(
         "speed against error of settings",
-        ("clipgstream bench --full --capture SAMPLE --out OUT --quiet",),
+        ("clipgstream bench --capture SAMPLE --out OUT --quiet",),
         which=-1,
         seeds=(0,),
     ),
