@@ -241,7 +241,9 @@ def _open(place: Path, settings: ProjectSettings) -> Project:
     if project.settings != settings:
         project.close()
         raise ProjectError(
-            "The folder holds this variant with other settings.", hint="Choose another folder by --project, or by --out of bench.", path=place
+            "The folder holds this variant with other settings.",
+            hint="Choose another folder by --project, or by --out of bench.",
+            path=place,
         )
     return project
 
