@@ -45,6 +45,7 @@ from engine.metrics.clips.summary import mean_of
 from engine.metrics.pictures.colors import to_levels
 from engine.storage.json_files import json_text
 from tests.benchmarks.options import ending_on_bad_input, names
+from tests.documents.table import table
 from tests.long_captures.changes import CHANGES, make_change
 from tests.long_captures.scene import make_long_scene
 from tests.long_captures.writing import write_long_captures
@@ -54,13 +55,13 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "psnr_spread": ("±", 2),
     "psnr_first": ("first clip", 2),
     "psnr_last": ("last clip", 2),
-    "psnr_less": ("- none", 2),
-    "psnr_since": ("since first", 2),
-    "psnr_since_less": ("- none", 2),
+    "psnr_less": ("less that of nothing", 2),
+    "psnr_since": ("later clips against the first, fit", 2),
+    "psnr_since_less": ("less that of nothing", 2),
     "psnr_fit": ("fit", 2),
-    "psnr_fit_less": ("- none", 2),
-    "psnr_still": ("still", 2),
-    "psnr_still_less": ("- none", 2),
+    "psnr_fit_less": ("less that of nothing", 2),
+    "psnr_still": ("still pixels", 2),
+    "psnr_still_less": ("less that of nothing", 2),
     "flicker_inside": ("flicker", 3),
     "flicker_borders": ("borders", 3),
     "noise": ("noise", 3),
@@ -74,6 +75,15 @@ COLUMNS: dict[str, tuple[str, int]] = {
 """Figure to its heading and decimals. PSNR in dB, ± its standard deviation over seeds, flicker and noise in 1/255.
 Seconds: median of the first ten source clips and of the last ten. Memory: most of the training process of the second
 clip, and of the last."""
+WORDS = {
+    "none": "nothing",
+    "drift": "exposure drifts by up to 10 %",
+    "step": "exposure steps by 8 % in a third of the cameras",
+    "shadow": "a shadow crosses the floor",
+    "lamp": "a lamp dims by 20 %",
+    "daylight": "daylight turns warmer by 8 %",
+}
+"""What changes in a capture, for a table."""
 SETTINGS = ("gaussians_per_anchor=8", "passes=6")
 """On top of the preset: about 28 dB, and a source clip takes 10 s on one quiet core."""
 BY_PROGRAM = ("psnr", "psnr_fit")
@@ -126,7 +136,7 @@ def measure(project: Path, scene: SyntheticScene, clip_indices: Sequence[int]) -
         on_progress=lambda n_done, n_rows, row: None,
     )
     clips = [document["means"]["clips"][str(i)]["held_out"] for i in clip_indices]
-    levels = [clip["psnr"] for clip in clips]
+    levels, fitted = ([clip[name] for clip in clips] for name in BY_PROGRAM)
     pairs = document["seams"]["rows"]
     noise = mean_of([pair["truth_change_static"] for pair in pairs])
     flicker = flicker_figures(pairs)
@@ -134,7 +144,7 @@ def measure(project: Path, scene: SyntheticScene, clip_indices: Sequence[int]) -
         **{name: document["means"]["held_out"][name] for name in BY_PROGRAM},
         "psnr_still": still_psnr(opened, scene, clip_indices),
         "psnr_first": levels[0],
-        "psnr_since": statistics.mean(levels[1:]) - levels[0] if levels[1:] else None,
+        "psnr_since": statistics.mean(fitted[1:]) - fitted[0] if fitted[1:] else None,
         "psnr_last": levels[-1],
         "flicker_inside": flicker["flicker_inside"],
         "flicker_borders": flicker["flicker_borders"],
@@ -204,13 +214,12 @@ def compared(rows: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 
 def table_text(rows: dict[str, dict[str, Any]]) -> str:
-    """One line per capture."""
-    lines = [["", *(heading for heading, _ in COLUMNS.values())]]
+    """One line per capture, as Markdown."""
+    lines = []
     for name, row in rows.items():
         cells = ["-" if row[key] is None else f"{row[key]:.{digits}f}" for key, (_, digits) in COLUMNS.items()]
-        lines.append([name, *cells])
-    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
-    return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in lines)
+        lines.append([WORDS[name], *cells])
+    return table(["what changes", *(heading for heading, _ in COLUMNS.values())], lines)
 
 
 def main() -> None:

@@ -16,6 +16,7 @@ import json
 import shlex
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -220,6 +221,7 @@ def main() -> None:
         chosen = {name: what for name, what in chosen.items() if name not in left_out}
     commit = arguments.commit or _commit()
     say(forecast(list(chosen)))
+    failed: list[str] = []
     for name, what in chosen.items():
         folder = arguments.out / folder_name(name)
         folder.mkdir(parents=True, exist_ok=True)
@@ -229,15 +231,21 @@ def main() -> None:
         places |= {"CAPTURE": str(folder / "capture"), "LATER": f"{arguments.basketball}_later"}
         common = {"commit": commit, "machine": _machine(), "remark": arguments.remark}
         is_there, start = any((folder / file).exists() for file in ("figures.json", "printed.txt")), time.monotonic()
-        if isinstance(what, Clips):
-            made: Entry = measured_clips(what, folder, places, common)
-        else:
-            made = measured_table(what, folder, places, common)
+        try:
+            if isinstance(what, Clips):
+                made: Entry = measured_clips(what, places, common)
+            else:
+                made = measured_table(what, folder, places, common)
+        except subprocess.CalledProcessError as error:
+            failed.append(f"{name} was not measured: its command ended with code {error.returncode}")
+            continue
         took_s = round(time.monotonic() - start, 1)
         if is_there:  # then only read
             took_s = made.total("preparation_s") + made.total("training_s") if isinstance(made, ClipsEntry) else None
         made = msgspec.structs.replace(made, took_s=took_s)
         say(str(write_entry(name, made)))
+    if failed:
+        sys.exit("\n".join(failed))
 
 
 def is_of_basketball(what: Clips | Printed) -> bool:
@@ -268,14 +276,17 @@ def say(text: str) -> None:
     sys.stdout.flush()
 
 
-def measured_clips(what: Clips, folder: Path, places: dict[str, str], common: dict[str, Any]) -> ClipsEntry:
+def measured_clips(what: Clips, places: dict[str, str], common: dict[str, Any]) -> ClipsEntry:
     """Train clips and measure them; measurements that are there are taken as they are."""
-    project, figures, brief = Path(places["DIR"]), Path(places["FILE"]), folder / "fingerprint"
+    project, figures = Path(places["DIR"]), Path(places["FILE"])
     if not figures.exists():
         for command in what.commands:
             _run(command, places)
     document = json.loads(figures.read_text("utf-8"))
-    is_headline = what in map(TABLES.get, HEADLINE)
+    engine: dict[str, Any] = {}
+    if what in map(TABLES.get, HEADLINE):
+        with tempfile.TemporaryDirectory() as name:
+            engine = {"fingerprint": fingerprint(Path(name) / "brief"), "settings": default_settings()}
     return ClipsEntry(
         title=what.title,
         commands=list(what.commands),
@@ -283,7 +294,7 @@ def measured_clips(what: Clips, folder: Path, places: dict[str, str], common: di
         seeds=[0],
         rows=_rows(project, document),
         calm=_calm(document["seams"]),
-        **({"fingerprint": fingerprint(brief), "settings": default_settings()} if is_headline else {}),
+        **engine,
         **common,
     )
 
@@ -316,14 +327,12 @@ def _table_in(printed: str, which: int | None) -> list[list[str]]:
 
 
 def _run(command: str, places: dict[str, str]) -> str:
-    """What a command prints on standard output; its code ends this program where it is not 0."""
+    """What a command prints on standard output. Raises CalledProcessError where its code is not 0."""
     program, *words = [places.get(word, word) for word in shlex.split(command)]
     start = {"clipgstream": [sys.executable, "-P", "-c", _CLIPGSTREAM], "python": [sys.executable]}
     say(command)
-    done = subprocess.run([*start.get(program, [program]), *words], cwd=ROOT, stdout=subprocess.PIPE, text=True)
-    if done.returncode:
-        sys.exit(done.returncode)
-    return done.stdout
+    called = [*start.get(program, [program]), *words]
+    return subprocess.run(called, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
 def _rows(folder: Path, document: dict[str, Any]) -> list[ClipRow]:
