@@ -63,7 +63,7 @@ def test_the_page_needs_nothing_but_itself(page):
     ids = [str(attributes["id"]) for _, attributes in page.tags if "id" in attributes]
     assert len(ids) == len(set(ids))
     links = [str(attributes["href"]) for attributes in page.attributes("a")]
-    assert len(links) == len(page.attributes("section")) == 18
+    assert len(links) == len(page.attributes("section")) == 19
     assert all(link[0] == "#" and link[1:] in ids for link in links)
     assert not any(key.startswith("on") or key == "style" for _, attributes in page.tags for key in attributes)
     for image in page.attributes("img"):
