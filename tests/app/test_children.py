@@ -85,7 +85,8 @@ def test_a_child_killed_before_its_first_word_has_a_reason() -> None:
     for child in started(NO_JOB):
         child.kill()
         wait_for(lambda child=child: child.is_over, f"end of {child.kind.place}")
-        with pytest.raises(ChildFailed, match="was ended by signal 9"):
+        # where the machine is busy the signal comes after the child has read its job, which is not one
+        with pytest.raises(ChildFailed, match=r"was ended by signal 9|ended with code 1 \(msgspec"):
             child.result()
 
 
