@@ -84,8 +84,6 @@ class Printed:
 
 
 _TRAIN_SAMPLE = "clipgstream train SAMPLE --project DIR --clips 0:2"
-
-
 _OF_THE_PAPER = (
     "decoder-new,residual-none,residual-full,inherit-trainable,inherit-trainable-residual-full,field-continue,"
     "independent,schedule-inherited"
@@ -189,7 +187,7 @@ TABLES: dict[str, Clips | Printed] = {
     "window": Printed("the window", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_window DIR --no-training")),
     "opening": Printed("opening", ("python -m tests.benchmarks.bench_opening OUT",), which=None),
     "large": Printed("a project of 1,000 clips", ("python -m tests.benchmarks.bench_project",), which=None),
-    "faults": Printed("faults", ("make --silent faults",), which=None),
+    "faults": Printed("faults", ("make faults",), which=None),
 }
 _FIGURES = ("psnr", "psnr_fit", "psnr_moving", "psnr_rest", "psnr_fit_rest", "ssim", "flip")
 

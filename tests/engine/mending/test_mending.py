@@ -112,13 +112,7 @@ def test_a_shifted_camera_is_outweighed_by_the_clip_beside(tiny: Tiny) -> None:
     finish(training)
     case = Case(tiny, {0: tiny.reference, 1: training.finish().state})
     mended = case.mending().run()
-    if (
-        not mended.clips
-    ):  # trainings of a second end differently on other processors: then nothing changes, with a reason
-        assert mended.after.excess == mended.before.excess
-        assert mended.advice
-        return
-    assert_mended(mended, left=0.75)  # half and less where clips are trained well
+    assert_mended(mended, left=0.75)  # of trainings of a second; half and less where clips are trained well
     assert set(mended.clips) == {1}, "the reference stays as it is"
 
 
