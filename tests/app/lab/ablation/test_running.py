@@ -168,7 +168,7 @@ def test_other_settings_in_the_same_folder_are_refused(runner):
     runner.run([FULL])
     with pytest.raises(ProjectError, match="other settings") as caught:
         runner.run([FULL], settings=replace(runner.settings, overrides=BASE | {"joint_steps": 7}))
-    assert "another folder" in caught.value.hint
+    assert "--project" in caught.value.hint
     open_project(project_folder(runner.folder, FULL, 0)).close()
 
 
