@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from engine.objects.moving_parts import MovingParts
 
@@ -31,7 +31,7 @@ def bonds(parts: MovingParts) -> csr_matrix:
         if len(there) < 2:
             continue
         k = min(N_NEIGHBOURS + 1, len(there))
-        distances, near = cKDTree(means[there]).query(means[there], k=k)
+        distances, near = KDTree(means[there]).query(means[there], k=k)
         reach[there] += distances[:, -1]
         n_there[there] += 1
         first = np.repeat(there, k - 1)
