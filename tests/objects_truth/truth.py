@@ -1,12 +1,12 @@
 """Masks of the objects of a capture, camera by camera and frame by frame, and the folder that holds them.
 
-In the folder: `objects.json` with the names, and CAMERA.npz with `labels` [F, H, W] uint8, 0 where there is no object.
+In the folder: `objects.json` with the names, and CAMERA.npz with `labels` and `behind`, see ObjectsTruth.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,52 +19,70 @@ from tests.objects_truth.scene import EVALUATED, labels_of, object_names
 
 @dataclass(frozen=True, slots=True)
 class ObjectsTruth:
-    """Where objects are seen.
+    """Where objects are seen. A label is 1 + the number of an object, and 0 where there is none.
 
     Attributes:
         objects: Their names.
-        labels: By name of the camera: 1 + number of the object that a pixel's centre shows, else 0. [F, H, W] uint8
+        labels: By name of the camera, what the centre of each pixel shows. [F, H, W] uint8
+        behind: The same with one object taken away at a time. [O, F, H, W] uint8
     """
 
     objects: tuple[str, ...]
     labels: dict[str, np.ndarray]
+    behind: dict[str, np.ndarray]
 
-    def mask(self, camera: str, frame_index: int, name: str) -> np.ndarray:
-        """Pixels that show an object. [H, W] bool. Raises ValueError for an unknown name."""
-        return self.labels[camera][frame_index] == self.objects.index(name) + 1
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the masks, px."""
+        height, width = next(iter(self.labels.values())).shape[1:]
+        return width, height
+
+    def label(self, name: str) -> int:
+        """Of an object. Raises ValueError for an unknown name."""
+        return self.objects.index(name) + 1
 
 
 def make_objects_truth(scene: SyntheticScene, camera_indices: tuple[int, ...] = EVALUATED) -> ObjectsTruth:
     """The truth of a generated scene in some of its cameras."""
     objects = object_names(scene)
-    label_of = labels_of([part.name for part in scene.parts], objects)
-    labels = {}
+    labels, behind = {}, {}
     for camera_index in camera_indices:
-        frames = [make_truth(scene, camera_index, frame).part_indices for frame in range(scene.n_frames)]
-        labels[scene.rig.names[camera_index]] = label_of[np.stack(frames)]
-    return ObjectsTruth(objects, labels)
+        camera = scene.rig.names[camera_index]
+        labels[camera] = _labels(scene, camera_index, objects)
+        without = [
+            _labels(replace(scene, parts=tuple(part for part in scene.parts if part.name.split(".")[0] != name)),
+                    camera_index, objects)
+            for name in objects
+        ]  # fmt: skip
+        behind[camera] = np.stack(without)
+    return ObjectsTruth(objects, labels, behind)
+
+
+def _labels(scene: SyntheticScene, camera_index: int, objects: tuple[str, ...]) -> np.ndarray:
+    label_of = labels_of([part.name for part in scene.parts], objects)
+    return label_of[np.stack([make_truth(scene, camera_index, frame).part_indices for frame in range(scene.n_frames)])]
 
 
 def write_truth(truth: ObjectsTruth, folder: Path) -> None:
-    """Write it, replacing what was there under the same names."""
+    """Write it, replacing files of the same names."""
     folder.mkdir(parents=True, exist_ok=True)
     for camera, labels in truth.labels.items():
-        np.savez_compressed(folder / f"{camera}.npz", labels=labels)
+        np.savez_compressed(folder / f"{camera}.npz", labels=labels, behind=truth.behind[camera])
     write_json(folder / "objects.json", {"objects": list(truth.objects)})
 
 
 def read_truth(folder: Path) -> ObjectsTruth:
-    """Read what `write_truth` has written."""
+    """Read the files of `write_truth`."""
     objects = json.loads((folder / "objects.json").read_text(encoding="utf-8"))["objects"]
-    labels = {}
+    labels, behind = {}, {}
     for path in sorted(folder.glob("*.npz")):
         with np.load(path, allow_pickle=False) as arrays:
-            labels[path.stem] = arrays["labels"]
-    return ObjectsTruth(tuple(objects), labels)
+            labels[path.stem], behind[path.stem] = arrays["labels"], arrays["behind"]
+    return ObjectsTruth(tuple(objects), labels, behind)
 
 
 def write_object_capture(capture: Path, truth_folder: Path, scene: SyntheticScene) -> ObjectsTruth:
-    """Write a scene as a capture in the layout of the sample, and its truth beside it."""
+    """Write a scene as a capture in the layout of the sample, and its truth next to it."""
     truth = make_objects_truth(scene)
     write_truth(truth, truth_folder)
     write_scene(capture, scene)
