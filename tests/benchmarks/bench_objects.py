@@ -3,8 +3,9 @@
     python -m tests.benchmarks.bench_objects --write out/objects           # captures and masks of all scenes
     python -m tests.benchmarks.bench_objects PROJECT MASKS                  # what the best possible picks reach
     python -m tests.benchmarks.bench_objects PROJECT MASKS --edit 3 --object person_a
+    python -m tests.benchmarks.bench_objects PROJECT tests/objects_truth/basketball_boxes.json
 
-Masks are those that `--write` leaves next to each capture. Without `--edit` picks come from the masks themselves (the
+Masks are those that `--write` leaves next to each capture, or made from volumes in the held-out cameras. Without `--edit` picks come from the masks themselves (the
 oracle): no picks of one label per Gaussian and clip do much better. "Left" is the share of the object that still shows
 something moving after deletion, "others lost" the share of the other objects that goes with it; "roles" is what the
 object's pixels are made of.
@@ -33,6 +34,7 @@ from tests.objects_truth.measuring import ClipFigures, clip_figures, views_of
 from tests.objects_truth.oracle import find_oracle, picked_rows
 from tests.objects_truth.scene import SCENARIOS, make_object_scene
 from tests.objects_truth.truth import ObjectsTruth, read_truth, write_object_capture
+from tests.objects_truth.volumes import read_volumes, truth_in_volumes
 
 PicksOf = Callable[[EditedClip, dict[str, SeenFrom]], tuple[Picked, dict[str, float]]]
 """The picks of a clip, and the roles that its pixels are made of where that is known."""
@@ -54,6 +56,18 @@ def oracle_of(truth: ObjectsTruth, name: str) -> PicksOf:
         return Picked(picked_rows(edited, oracle.is_object)), oracle.weights
 
     return picks
+
+
+def truth_of(path: Path, opened: TrainedProject) -> ObjectsTruth:
+    """Masks from their folder, or for a project from a file of volumes."""
+    if path.suffix != ".json":
+        return read_truth(path)
+    views, clips = {}, list(edited_clips(opened))
+    for camera in opened.project.settings.holdout:
+        i = opened.rig.names.index(camera)
+        width, height = (int(side) for side in opened.rig.image_sizes[i])
+        views[camera] = SeenFrom(opened.rig.world_to_camera[i], opened.rig.Ks[i], width, height, clips[0][1])
+    return truth_in_volumes((clip for clip, _ in clips), views, read_volumes(path))
 
 
 def measured(
@@ -107,9 +121,9 @@ def main(argv: list[str] | None = None) -> None:
         return
     if options.project is None or options.masks is None:
         parser.error("name a project and its masks, or --write FOLDER")
-    truth = read_truth(options.masks)
     with ending_on_bad_input():
         opened = open_trained(open_project(options.project, is_writable=False))
+        truth = truth_of(options.masks, opened)
         document: dict[str, Any] = {}
         for name in (options.object,) if options.object else truth.objects:
             picks_of = oracle_of(truth, name)
