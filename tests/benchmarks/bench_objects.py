@@ -5,10 +5,10 @@
     python -m tests.benchmarks.bench_objects PROJECT MASKS --edit 3 --object person_a
     python -m tests.benchmarks.bench_objects PROJECT tests/objects_truth/basketball_boxes.json
 
-Masks are those that `--write` leaves next to each capture, or made from volumes in the held-out cameras. Without `--edit` picks come from the masks themselves (the
-oracle): no picks of one label per Gaussian and clip do much better. "Left" is the share of the object that still shows
-something moving after deletion, "others lost" the share of the other objects that goes with it; "roles" is what the
-object's pixels are made of.
+Masks are those that `--write` leaves next to each capture, or made from volumes in the held-out cameras. Without
+`--edit` picks come from the masks themselves (the oracle): no picks of one label per Gaussian and clip do much better.
+"Left" is the share of the object that still shows something moving after deletion, "others lost" the share of the other
+objects that goes with it; "roles" is what the object's pixels are made of.
 """
 
 from __future__ import annotations
