@@ -160,6 +160,7 @@ def test_scenes_keep_their_promises() -> None:
     for limb in ("trunk", "arm_left", "arm_right", "leg_left", "leg_right"):
         still = poses["pausing"][f"person_a.{limb}"]
         clip = [still(frame) for frame in range(2 * CLIP_LENGTH, 3 * CLIP_LENGTH)]
+        assert clip[0] is not None
         assert all(pose is not None and np.array_equal(pose, clip[0]) for pose in clip)
     closest = min(
         float(np.linalg.norm(a[:2, 3] - b[:2, 3]))
