@@ -25,9 +25,11 @@ from engine.objects.moving_parts import ROLES, MovingParts, moving_parts
 from engine.objects.neighbours import bonds
 from engine.objects.returning import Looks, looks_of, returned
 
-SAID, UNSAID, BEFORE = 2.0, 0.1, 0.3
+SAID, UNSAID, BEFORE = 1.0, 0.4, 0.3
 """Weight of parts that somebody has selected, of those that were not selected along with them, and of what was known
 of a clip before it was corrected. Parts at the border of a clip weigh 1 at most."""
+OPAQUE = 0.4
+"""What is fainter is easily overlooked when somebody selects."""
 LEAST_SHARE = 0.12
 """An object with less of its former mass than this is gone."""
 LEAST_MOVING = 0.03
@@ -111,7 +113,7 @@ class _Search:
         place = next(place for place, ground in enumerate(self._grounds) if _holds(ground.clip, seed))
         ground = self._grounds[place]
         added, removed = (_among(ground, sets) for sets in (seed.added, seed.removed))
-        said, weight = added.astype(np.float64), np.full(len(added), UNSAID)
+        said, weight = added.astype(np.float64), UNSAID * _shown(ground.parts, seed.frame_index)
         if self._seeded:  # a correction: what it leaves out stays as it was
             said, weight = ground.values.copy(), np.full(len(added), BEFORE)
             said[added] = 1.0
@@ -181,6 +183,12 @@ def _holds(clip: Clip, seed: ObjectSeed) -> bool:
 def _among(ground: _Ground, sets: tuple[PickedRows, ...]) -> np.ndarray:
     """Which parts of a clip were picked. [N] bool"""
     return ground.rows.is_picked(Picked(sets))[ground.parts.index]
+
+
+def _shown(parts: MovingParts, frame_index: int) -> np.ndarray:
+    """How far each part could be selected in a frame: not where it does not exist then, less where it is faint. [N]"""
+    nearest = int(np.abs(np.asarray(parts.frames) - frame_index).argmin())
+    return np.minimum(parts.opacities[nearest] / OPAQUE, 1.0).astype(np.float64)
 
 
 def _standing_still(
