@@ -23,6 +23,7 @@ from tests.engine.editing.edited_clips import names_of
 from tests.objects_truth.measuring import ClipFigures, clip_figures, shown
 from tests.objects_truth.oracle import find_oracle, picked_rows
 from tests.objects_truth.scene import CLIP_LENGTH, SCENARIOS, make_object_scene, object_names
+from tests.objects_truth.selecting import lasso_seed
 from tests.objects_truth.truth import ObjectsTruth, make_objects_truth, read_truth, write_truth
 from tests.objects_truth.volumes import Volumes, read_volumes, truth_in_volumes
 
@@ -118,6 +119,14 @@ def test_the_oracle_finds_what_the_masks_show(balls: EditedClip, truth: ObjectsT
     whole = balls.decode(0.0)
     index = balls.rows.indices_of(whole.rows)
     assert shown(whole, VIEW, oracle.is_object[index]).max() <= 1.0 + 1e-6
+
+
+def test_a_lasso_selects_the_near_side_of_its_object(balls: EditedClip, truth: ObjectsTruth) -> None:
+    seed = lasso_seed(balls, {"cam": VIEW}, truth, "right", 10)
+    is_chosen = balls.rows.is_picked(Picked(seed.added))
+    assert not is_chosen[of_role(balls, "moving")].any()
+    ball = of_role(balls, "residual")
+    assert 0.2 < is_chosen[ball].mean() < 0.9
 
 
 def test_volumes_of_the_real_capture_are_complete() -> None:
