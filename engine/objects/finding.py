@@ -19,15 +19,18 @@ from engine.editing.edit import Picked, PickedRows
 from engine.editing.edited_clip import EditedClip
 from engine.editing.picks import pack_rows
 from engine.editing.scene_object import Doubt, ObjectInClip, ObjectSeed, SceneObject
+from engine.objects.appearance import Appearance, appearance_of, looks_like
 from engine.objects.belonging import belonging
 from engine.objects.carrying import carried
 from engine.objects.moving_parts import ROLES, MovingParts, moving_parts
 from engine.objects.neighbours import bonds
-from engine.objects.returning import Looks, looks_of, returned
+from engine.objects.returning import returned
 
 SAID, UNSAID, BEFORE = 1.0, 0.4, 0.3
 """Weight of parts that somebody has selected, of those that were not selected along with them, and of what was known
 of a clip before it was corrected. Parts at the border of a clip weigh 1 at most."""
+COLOR = 0.3
+"""Weight of a colour that only the object has, where everything else leaves it open whether a part belongs to it."""
 OPAQUE = 0.4
 """What is fainter is easily overlooked when somebody selects."""
 LEAST_SHARE = 0.12
@@ -106,7 +109,7 @@ class _Search:
     def __init__(self, grounds: list[_Ground]) -> None:
         self._grounds = grounds
         self._seeded: list[int] = []
-        self._looks: Looks | None = None
+        self._known_as: tuple[Appearance, Appearance] | None = None  # the object, and what else moves
 
     def take(self, seed: ObjectSeed) -> None:
         """Take in what somebody has said, and carry it on."""
@@ -120,9 +123,10 @@ class _Search:
         said[removed] = 0.0
         weight[added | removed] = SAID
         ground.values = belonging(ground.bonds, said, weight, ground.values)
-        ground.values[added], ground.values[removed] = 1.0, 0.0
+        values = ground.values
+        self._known_as = appearance_of(ground.parts, values), appearance_of(ground.parts, 1.0 - values)
+        ground.values = self._by_color(ground, values, said, weight)
         ground.surety, ground.doubt = 1.0, ""
-        self._looks = looks_of(ground.parts, ground.values)
         for step in (1, -1):
             self._carry(place, step)
         self._seeded.append(place)
@@ -137,7 +141,7 @@ class _Search:
             ground, before = self._grounds[place], self._grounds[place - step]
             said, surety = carried(before.parts, before.values, ground.parts)
             known = ground.values
-            values = belonging(ground.bonds, said, surety, said)
+            values = self._by_color(ground, belonging(ground.bonds, said, surety, said), said, surety)
             if stop is not None:  # the other seed has been here before
                 near = abs(place - stop) / abs(stop - origin)
                 values = near * values + (1.0 - near) * known
@@ -148,10 +152,18 @@ class _Search:
             if ground.doubt != "gone":
                 last_there = place
 
+    def _by_color(self, ground: _Ground, values: np.ndarray, said: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """The same, with colours deciding where bonds leave it open: a ball in a hand is near the hand, but not like it."""
+        assert self._known_as is not None
+        like = looks_like(ground.parts, *self._known_as)
+        by_color = COLOR * np.abs(2.0 * like - 1.0) * 4.0 * values * (1.0 - values)
+        total = np.maximum(weight + by_color, 1e-12)
+        return belonging(ground.bonds, (weight * said + by_color * like) / total, total, values)
+
     def _lose_or_regain(self, ground: _Ground, surety: np.ndarray) -> None:
         """Of a clip in which little of the object was found: it has left, or something like it has come."""
-        assert self._looks is not None
-        found = returned(ground.parts, ground.bonds, surety, self._looks)
+        assert self._known_as is not None
+        found = returned(ground.parts, ground.bonds, surety, self._known_as[0])
         if found is None:
             ground.doubt = "gone"
         else:

@@ -9,13 +9,13 @@ from scipy.spatial import KDTree
 from engine.objects.moving_parts import MovingParts
 
 N_NEIGHBOURS = 6
-COLOR_SPREAD = 0.25
+COLOR_SPREAD = 0.2
 """Difference of colours at which a bond is at 0.6 of its strength, display-encoded."""
 REACH = 1.5
 """The same of distance, in distances to the farthest of these neighbours."""
 N_BEFORE = 4
 """Parts of the frame before that something new in a frame is bound to."""
-SUCCESSION = 0.5
+SUCCESSION = 1.0
 """Strength of such a bond against one between parts that are there at the same time."""
 
 
