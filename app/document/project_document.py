@@ -14,6 +14,7 @@ from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.actions import Vector
 from engine.editing.edit import Edit
 from engine.gate.regions import GateRegion
+from engine.timing.segment import Segment
 
 MAX_TEXT_CHARACTERS = 200
 _Count = Annotated[int, Meta(ge=0, lt=2**31)]
@@ -78,6 +79,7 @@ class ProjectDocument:
         labels: The user's own names.
         exclusions: Cameras, pictures and painted parts that training never sees.
         world: Up and scale.
+        timing: Segments of the take in the order in which they play; none for the take as captured.
     """
 
     settings: ProjectSettings
@@ -88,3 +90,4 @@ class ProjectDocument:
     labels: tuple[Label, ...] = ()
     exclusions: Exclusions = NOTHING_EXCLUDED
     world: World = AS_CAPTURED
+    timing: tuple[Segment, ...] = ()

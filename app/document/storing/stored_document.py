@@ -18,14 +18,17 @@ from engine.editing.picks import unpack_rows
 from engine.errors import ProjectError
 from engine.gate.regions import parse_region
 from engine.storage.typed_json import EntryError, to_type
+from engine.timing.segment import Segment
+from engine.timing.timing import check_length
 from engine.training.retired_settings import without_retired
 
 _sound: set[bytes] = set()
 """Digests of packed numbers that could be unpacked, of this process."""
 
 
-class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
-    """The declared entries; regions are parsed by their own reader."""
+class _Stored(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The declared entries; regions are parsed by their own reader. Earlier versions wrote none of those that have a
+    default."""
 
     settings: ProjectSettings
     regions: tuple[dict[str, Any], ...]
@@ -34,6 +37,7 @@ class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
     markers: tuple[Marker, ...]
     labels: tuple[Label, ...]
     exclusions: Exclusions
+    timing: tuple[Segment, ...] = ()
     world: World
 
 
@@ -49,6 +53,7 @@ def plain_document(document: ProjectDocument) -> dict[str, Any]:
     """
     check_paths(document.camera_paths)
     check_numbers(document.edits)
+    check_timing(document.timing)
     return {name: plain_entry(name, getattr(document, name)) for name in ENTRIES}
 
 
@@ -123,6 +128,7 @@ CODECS = {
     "labels": _struct(Label, lambda label: (label.kind, label.name)),
     "exclusions": _struct(Exclusions, is_list=False),
     "world": _struct(World, is_list=False),
+    "timing": _struct(Segment),
 }
 
 
@@ -140,6 +146,7 @@ def document_of(content: Any) -> ProjectDocument:
     paths = tuple(to_path(path) for path in stored.camera_paths)
     check_paths(paths)
     check_numbers(stored.edits)
+    check_timing(stored.timing)
     for edit in stored.edits:
         check_picks(edit)
     return ProjectDocument(
@@ -151,6 +158,7 @@ def document_of(content: Any) -> ProjectDocument:
         stored.labels,
         stored.exclusions,
         stored.world,
+        stored.timing,
     )
 
 
@@ -162,6 +170,18 @@ def check_numbers(edits: Sequence[Edit]) -> None:
     """
     if len({edit.edit_id for edit in edits}) != len(edits):
         raise ProjectError("Two edits have the same number.")
+
+
+def check_timing(segments: Sequence[Segment]) -> None:
+    """Check that a take can be as long as its segments are.
+
+    Raises:
+        ProjectError: It cannot.
+    """
+    try:
+        check_length(segments)
+    except ValueError as error:
+        raise ProjectError(f"The timing is not valid: {error}.") from error
 
 
 def check_picks(edit: Edit) -> None:
