@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -15,6 +15,7 @@ from engine.capture.files.frame_runs import runs_of
 from engine.editing.edit import Edit
 from engine.editing.effects import EditStack, Effects
 from engine.errors import ProjectError
+from engine.timing.timing import SourceMoment
 
 if TYPE_CHECKING:
     from engine.editing.clip_rows import NamedSet
@@ -170,6 +171,20 @@ class SceneFrames:
             ProjectError: As `trained`; an edit is damaged.
         """
         return self._part(frame, part).decode(self.clip_time(frame), self.effects(frame)).gaussians
+
+    def at_moments(self, moments: Sequence[SourceMoment], part: Part = "all") -> Gaussians:
+        """The scene at moments that fade into each other: still parts of the one that most is seen of, and what moves
+        at all of them, as faint as their weights say. `part` as of `gaussians`; raises as that does."""
+        from engine.raster.gaussians import Gaussians
+
+        main = max(moments, key=lambda moment: moment.weight)
+        if len(moments) == 1 or part == "static":
+            return self.gaussians(main.frame, part)
+        found = [self.gaussians(main.frame, "static")] if part == "all" else []
+        for moment in moments:
+            moving = self.gaussians(moment.frame, "moving")
+            found.append(replace(moving, opacities=moving.opacities * moment.weight))
+        return Gaussians.concatenate([replace(one, is_frozen=None) for one in found])
 
     def shares(self, frame: float) -> Iterator[Share]:
         """The parts of a moment's picture, to be drawn one by one and mixed by weight.

@@ -10,6 +10,7 @@ from engine.camera.camera_path import CameraKey, CameraPath
 from engine.editing.edit import Edit
 from engine.editing.lost_picks import LostPicks
 from engine.editing.reach import UNKNOWN, ClipAnchors, Reach
+from engine.timing.segment import Segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,7 @@ class EditsStatus:
         edits: The stack, bottom first.
         labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
         world: Up and scale.
+        timing: Segments of the take; none for the take as captured.
         lost: Those that have lost their picks because a clip was trained anew.
         clips: Which anchors each clip has; none while that is not known.
         reaches: Where each edit acts, by its number.
@@ -46,6 +48,7 @@ class EditsStatus:
     edits: tuple[Edit, ...] = ()
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     world: World = AS_CAPTURED
+    timing: tuple[Segment, ...] = ()
     lost: tuple[LostPicks, ...] = ()
     clips: tuple[ClipAnchors, ...] = ()
     reaches: Mapping[int, Reach] = field(default_factory=dict)

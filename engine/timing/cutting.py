@@ -57,10 +57,11 @@ def kept(segments: Segments, span: Span) -> Segments:
 
 def turned(segments: Segments, span: Span) -> Segments:
     """Frames of a span played the other way round, each as fast as before."""
-    return _with_runs(segments, span, lambda run: [_turned(one) for one in reversed(run)])
+    return _with_runs(segments, span, lambda run: [turned_segment(one) for one in reversed(run)])
 
 
-def _turned(one: Segment) -> Segment:
+def turned_segment(one: Segment) -> Segment:
+    """One segment the other way round; its frames are as fast as before."""
     return structs.replace(
         one,
         start_speed=one.end_speed,

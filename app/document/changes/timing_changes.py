@@ -4,16 +4,17 @@ and `clipgstream edit` make it of its entries, and `timing_changed` applies it t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from msgspec import to_builtins
+from msgspec import NODEFAULT, to_builtins
 
 from app.document.project_document import ProjectDocument
 from engine.errors import ProjectError
-from engine.setting import Declared, Flag, Writing, setting
+from engine.setting import Declared, Flag, Writing, setting, settings_of
 from engine.storage.typed_json import EntryError, to_type
+from engine.text import shown
 from engine.timing.cutting import Segments, Span, at_speed, cut_at, frozen, kept, looped, turned
 from engine.timing.segment import MAX_FROZEN, MAX_REPEATS, MAX_SPEED, MIN_SPEED, Segment
 from engine.timing.timing import check_length
@@ -243,6 +244,26 @@ TIME_EDITS: dict[str, type[TimeEdit]] = {
 """By verb."""
 
 
+def time_edit_called(verb: str, entries: Mapping[str, Any]) -> TimeEdit:
+    """The change of a verb and its entries.
+
+    Raises:
+        ProjectError: There is no such verb or entry, or one is missing or out of range.
+    """
+    if verb not in TIME_EDITS:
+        raise ProjectError(f"There is no change of time {shown(verb)}.", hint=f"Write {', '.join(TIME_EDITS)}.")
+    kind, declared = TIME_EDITS[verb], settings_of(TIME_EDITS[verb])
+    unknown = [name for name in entries if name not in declared]
+    if unknown:
+        known = f"It takes {', '.join(declared)}." if declared else "It takes none."
+        raise ProjectError(f"{verb} has no entry {shown(unknown[0])}.", hint=known)
+    missing = [one for one in declared.values() if one.default is NODEFAULT and one.name not in entries]
+    if missing:
+        raise ProjectError(f"{verb} needs {missing[0].flags[0].name}: {missing[0].meaning}.")
+    values = {name: tuple(value) if isinstance(value, list) else value for name, value in entries.items()}
+    return kind(**values)
+
+
 def timing_changed(document: ProjectDocument, edit: TimeEdit, n_frames: int) -> ProjectDocument:
     """The document after a change of time.
 
@@ -264,6 +285,23 @@ def timing_changed(document: ProjectDocument, edit: TimeEdit, n_frames: int) -> 
 def segments_of(document: ProjectDocument, n_frames: int) -> Segments:
     """The segments of a document; one where the take is as captured. n_frames: Of the capture."""
     return document.timing or (Segment(0, n_frames),)
+
+
+def segment_words(one: Segment) -> str:
+    """A segment in words."""
+    if one.n_frozen:
+        return f"frame {one.first} frozen for {one.n_frozen} frames"
+    words = [f"frames {one.first} to {one.stop - 1}"]
+    if one.is_reversed:
+        words.append("reversed")
+    if one.start_speed != one.end_speed:
+        words.append(f"speed {one.speed_at(0.0):.4g} to {one.speed_at(1.0):.4g}, {one.ease}")
+    elif one.start_speed != 1.0:
+        words.append(f"speed {one.start_speed:.4g}")
+    if one.repeats > 1:
+        fade = f", cross-fade of {one.crossfade_frames} frames" if one.crossfade_frames else ""
+        words.append(f"{one.repeats} times{fade}")
+    return ", ".join(words)
 
 
 def time_edit_between(before: Segments, after: Segments, n_frames: int) -> TimeEdit | None:

@@ -111,7 +111,7 @@ class Edits:
 def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
     """The edits of a document as a window shows them. why_not: Why nothing can be changed now; empty when it can."""
     labels = {(label.kind, label.name): label.text for label in document.labels}
-    return EditsStatus(document.edits, labels, document.world, can_edit=not why_not, why_not=why_not)
+    return EditsStatus(document.edits, labels, document.world, document.timing, can_edit=not why_not, why_not=why_not)
 
 
 def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
