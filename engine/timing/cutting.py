@@ -37,8 +37,10 @@ def _split(one: Segment, frame: int) -> list[Segment]:
         )
     share = one.time_at(one.stop - frame if one.is_reversed else frame - one.first) / one.pass_frames
     if one.ease == "linear" or one.start_speed == one.end_speed:
-        speed = one.speed_at(share)
-        before, after = structs.replace(one, end_speed=speed), structs.replace(one, start_speed=speed)
+        start, middle, end = (one.speed_at(part) for part in (0.0, share, 1.0))
+        one = structs.replace(one, ramp_from=0.0, ramp_to=1.0)
+        before = structs.replace(one, start_speed=start, end_speed=middle)
+        after = structs.replace(one, start_speed=middle, end_speed=end)
     else:
         middle = one.ramp_from + (one.ramp_to - one.ramp_from) * share
         before, after = structs.replace(one, ramp_to=middle), structs.replace(one, ramp_from=middle)
