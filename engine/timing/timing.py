@@ -81,11 +81,12 @@ class Timing:
         found = zip(frames[:, 0].tolist(), weights[:, 0].tolist(), strict=True)
         return tuple(SourceMoment(frame, weight) for frame, weight in found if weight > 0)
 
-    def moments(self, outputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def moments(self, outputs: np.ndarray, *, is_sound: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """The same for many moments at once.
 
         Args:
             outputs: In output frames. [N]
+            is_sound: For sound, which goes on during the last frame of a segment; pictures stand still there.
         Returns:
             Frames of the capture and weights of the two moments seen at each of them; the second weight is 0 where
             nothing fades. [2, N] float64 each
@@ -95,10 +96,12 @@ class Timing:
         frames, weights = np.zeros((2, len(outputs))), np.zeros((2, len(outputs)))
         for place in np.unique(places).tolist():
             here = places == place
-            frames[:, here], weights[:, here] = self._of_segment(place, outputs[here] - float(self.starts[place]))
+            frames[:, here], weights[:, here] = self._of_segment(
+                place, outputs[here] - float(self.starts[place]), is_sound=is_sound
+            )
         return frames, weights
 
-    def _of_segment(self, place: int, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _of_segment(self, place: int, time: np.ndarray, *, is_sound: bool) -> tuple[np.ndarray, np.ndarray]:
         """Moments and weights as of `moments`. time: Since the segment began. [N]"""
         one = self.played[place]
         time = np.maximum(time, 0.0)
@@ -107,8 +110,8 @@ class Timing:
         is_fading = (repeat > 0) & (time < one.crossfade_frames - _SNAP)
         new = np.where(is_fading, (time + 1.0) / (one.crossfade_frames + 1.0), 1.0)
         goes_on = place + 1 < len(self.played) and one.leads_to(self.played[place + 1])
-        now = self._frames(one, time, (repeat == one.repeats - 1) & goes_on)
-        before = self._frames(one, time + one.stride, np.zeros_like(is_fading))
+        now = self._frames(one, time, ((repeat == one.repeats - 1) & goes_on) | is_sound)
+        before = self._frames(one, time + one.stride, np.full_like(is_fading, is_sound))
         return np.stack([now, np.where(is_fading, before, now)]), np.stack([new, 1.0 - new])
 
     def _frames(self, one: Segment, time: np.ndarray, goes_on: np.ndarray) -> np.ndarray:
@@ -116,7 +119,7 @@ class Timing:
         played = np.minimum(one.advance(time), np.where(goes_on, one.n_source, one.n_source - 1))
         frames = one.stop - 1 - played if one.is_reversed else one.first + played
         nearest = np.round(frames)
-        return np.clip(np.where(np.abs(frames - nearest) < _SNAP, nearest, frames), 0, self.n_frames - 1)
+        return np.clip(np.where(np.abs(frames - nearest) < _SNAP, nearest, frames), 0, self.n_frames - 1 + goes_on)
 
     def outputs_of(self, frame: float) -> list[float]:
         """When a moment of the capture is seen: moments of the take, rising; none where it was cut out."""

@@ -327,6 +327,7 @@ def time_edit_between(before: Segments, after: Segments, n_frames: int) -> TimeE
         found.append(lambda one=one, span=span: ChangeSpeed(span, one.start_speed, _end_speed(one), one.ease))
         if one.n_frozen:
             found.append(lambda one=one: Freeze(one.first, one.n_frozen))
+        found.append(lambda span=span: Reverse(span))
         found.append(lambda one=one, span=span: Loop(span, one.repeats, one.crossfade_frames))
     if new:
         span = (min(one.first for one in new), max(one.stop for one in new))

@@ -51,7 +51,7 @@ class TimedSound:
         samples = np.arange(self._n_read, self._n_read + n_samples + 1)
         self._n_read += n_samples
         outputs = self._first + samples * (self._fps / self._rate)
-        frames, weights = self._timing.moments(outputs)
+        frames, weights = self._timing.moments(outputs, is_sound=True)
         found = np.zeros((n_samples, 2), np.float32)
         for row in range(2):
             is_heard = (frames[row, 1:] != frames[row, :-1]) & (weights[row, :-1] > 0)
