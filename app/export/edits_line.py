@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from app.document.changes.edit_words import edit_title
 from engine.editing.edit import Edit
 from engine.text import one_line
-from engine.timing.timing import Timing
+from engine.timing.timing import TakeTiming
 
 if TYPE_CHECKING:
     from app.evaluation.headless import TrainedProject
@@ -37,7 +37,7 @@ def included_lines(opened: TrainedProject, job: ExportJob) -> list[str]:
     """Which edits an export includes, and the timing that it follows; none where neither."""
     document, capture = opened.project.document, opened.capture
     lines = [edits_line(document.edits, has_edits=job.applies_edits)]
-    timing = Timing(document.timing, capture.n_frames)
+    timing = TakeTiming(document.timing, capture.n_frames)
     if job.follows_timing and not timing.is_as_captured:
         count = "1 segment" if len(timing.played) == 1 else f"{len(timing.played)} segments"
         length = f"{timing.n_output:,} frames, {timing.duration_s(capture.fps):.2f} s"

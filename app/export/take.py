@@ -10,7 +10,7 @@ import numpy as np
 from app.export.picked_frames import PickedFrames
 from app.export.scene_frames import SceneFrames
 from engine.errors import ProjectError
-from engine.timing.timing import SourceMoment, Timing
+from engine.timing.timing import SourceMoment, TakeTiming
 
 _DIGITS = 6
 """Moments nearer to each other than this are the same, so that repeats share what is made of them."""
@@ -34,13 +34,13 @@ class TakeFrame:
         return max(self.moments, key=lambda moment: moment.weight).frame
 
 
-def timing_of(scene: SceneFrames, *, has_timing: bool) -> Timing | None:
+def timing_of(scene: SceneFrames, *, has_timing: bool) -> TakeTiming | None:
     """The timing that an export follows; None where it is as captured.
 
     Args:
         has_timing: Whether the export applies the timing of the project.
     """
-    timing = Timing(scene.opened.project.document.timing, scene.opened.capture.n_frames)
+    timing = TakeTiming(scene.opened.project.document.timing, scene.opened.capture.n_frames)
     return timing if has_timing and not timing.is_as_captured else None
 
 
@@ -65,7 +65,7 @@ def take_frames(scene: SceneFrames, frames: PickedFrames | None, *, has_timing: 
     return found
 
 
-def taken_outputs(scene: SceneFrames, timing: Timing, frames: PickedFrames | None) -> list[int]:
+def taken_outputs(scene: SceneFrames, timing: TakeTiming, frames: PickedFrames | None) -> list[int]:
     """Output frames of a take that show nothing but chosen frames of the capture.
 
     Args:

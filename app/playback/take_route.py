@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.timing.timing import Timing, nearest_frames
+from engine.timing.timing import TakeTiming, nearest_frames
 
 
 class TakeRoute:
@@ -16,7 +16,7 @@ class TakeRoute:
         frame_index: The playhead.
     """
 
-    def __init__(self, timing: Timing, first: int, last: int, frame_index: int) -> None:
+    def __init__(self, timing: TakeTiming, first: int, last: int, frame_index: int) -> None:
         frames = nearest_frames(timing)
         self.outputs = np.flatnonzero((frames >= first) & (frames <= last))
         self._frames = frames[self.outputs]

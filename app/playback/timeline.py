@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from app.playback.markers import Markers
 from app.playback.take_route import TakeRoute
 from engine.capture.clip import Clip, ClipSpans
-from engine.timing.timing import Timing
+from engine.timing.timing import TakeTiming
 
 SPEEDS = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Speeds at which a capture can be played, as multiples of its own speed."""
@@ -55,7 +55,7 @@ class Timeline:
         self.out_frame: int | None = None
         self.around: tuple[int, int] | None = None
         self.is_following = False
-        self.timing: Timing | None = None
+        self.timing: TakeTiming | None = None
         self.is_take = False
         self._route: TakeRoute | None = None
         self._route_key: object = None

@@ -119,7 +119,7 @@ class Segment(Struct, frozen=True, forbid_unknown_fields=True):
         return self.first - 1 if self.is_reversed else self.stop
 
     def leads_to(self, other: Segment) -> bool:
-        """Whether another segment goes on where this one ends, so that nothing jumps between them."""
+        """Whether another segment continues where this one ends, so that nothing jumps between them."""
         return self.exit == other.entry and (self.is_reversed == other.is_reversed or bool(other.n_frozen))
 
     def advance(self, time: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Timing: which moments of the capture a take shows, output frame by output frame."""
+"""TakeTiming: which moments of the capture a take shows, output frame by output frame."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class SourceMoment:
 
 
 @dataclass(frozen=True)
-class Timing:
+class TakeTiming:
     """The timing of a take.
 
     Attributes:
@@ -132,7 +132,7 @@ class Timing:
         return found
 
 
-def nearest_frames(timing: Timing) -> np.ndarray:
+def nearest_frames(timing: TakeTiming) -> np.ndarray:
     """The frame of the capture nearest to every output frame, of a cross-fade the heavier one. [n_output] int64"""
     frames, weights = timing.moments(np.arange(timing.n_output))
     shown = np.where(weights[1] > weights[0], frames[1], frames[0])

@@ -14,7 +14,7 @@ from app.document.changes.timing_changes import TIME_EDITS, segment_words
 from app.scripting.scripted_project import ScriptedProject
 from engine.errors import ProjectError
 from engine.setting import Setting, settings_of
-from engine.timing.timing import Timing
+from engine.timing.timing import TakeTiming
 
 _SHARED = ("frames", "at")
 """Options that edits have, too."""
@@ -77,6 +77,6 @@ def take_lines(project: ScriptedProject) -> list[str]:
     segments = project.document.timing
     if not segments:
         return []
-    timing, fps = Timing(segments, project.n_frames), project.capture.fps
+    timing, fps = TakeTiming(segments, project.n_frames), project.capture.fps
     lines = [f"The take has {timing.n_output} frames, {timing.duration_s(fps):.2f} s:"]
     return lines + [f"{place:>5}  {segment_words(one)}" for place, one in enumerate(segments)]

@@ -290,8 +290,8 @@ def segments_of(document: ProjectDocument, n_frames: int) -> Segments:
 def segment_words(one: Segment) -> str:
     """A segment in words."""
     if one.n_frozen:
-        return f"frame {one.first} frozen for {one.n_frozen} frames"
-    words = [f"frames {one.first} to {one.stop - 1}"]
+        return f"frame {one.first} frozen for {one.n_frozen} frame{'' if one.n_frozen == 1 else 's'}"
+    words = [_words((one.first, one.stop))]
     if one.is_reversed:
         words.append("reversed")
     if one.start_speed != one.end_speed:
@@ -299,8 +299,8 @@ def segment_words(one: Segment) -> str:
     elif one.start_speed != 1.0:
         words.append(f"speed {one.start_speed:.4g}")
     if one.repeats > 1:
-        fade = f", cross-fade of {one.crossfade_frames} frames" if one.crossfade_frames else ""
-        words.append(f"{one.repeats} times{fade}")
+        frames = "1 frame" if one.crossfade_frames == 1 else f"{one.crossfade_frames} frames"
+        words.append(f"{one.repeats} times" + (f", cross-fade of {frames}" if one.crossfade_frames else ""))
     return ", ".join(words)
 
 

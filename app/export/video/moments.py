@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.timing.timing import SourceMoment, Timing
+from engine.timing.timing import SourceMoment, TakeTiming
 
 SNAP = 1e-6
 """Moments as near as this to a frame are that frame: what adding up steps leaves of rounding."""
@@ -54,7 +54,7 @@ def _snapped(moment: float) -> float:
     return float(round(moment)) if abs(moment - round(moment)) < SNAP else moment
 
 
-def timed_moments(timing: Timing, runs: Sequence[range], step: float) -> list[Moment]:
+def timed_moments(timing: TakeTiming, runs: Sequence[range], step: float) -> list[Moment]:
     """The same for a take: runs are of its frames, and the camera moves with the frames of the capture.
 
     Args:

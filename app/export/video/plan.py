@@ -24,7 +24,7 @@ from engine.capture.files.frame_runs import runs_of
 from engine.capture.files.sound import SoundReader, sound_source
 from engine.errors import ProjectError
 from engine.text import shown
-from engine.timing.timing import Timing
+from engine.timing.timing import TakeTiming
 
 _DEPTH_REACH = 4.0
 """The reach of 16 bits of depth, in usual distances from a camera to what all of them look at."""
@@ -54,7 +54,7 @@ class VideoPlan:
     sound: SoundReader | TimedSound | None = None
     depth_unit: float | None = None
     notes: tuple[str, ...] = ()
-    timing: Timing | None = None
+    timing: TakeTiming | None = None
 
     @property
     def is_frame_by_frame(self) -> bool:
@@ -189,7 +189,7 @@ def _camera(capture: Capture, name: str) -> int:
 
 
 def _sound(
-    job: VideoJob, capture: Capture, runs: list[range], timing: Timing | None
+    job: VideoJob, capture: Capture, runs: list[range], timing: TakeTiming | None
 ) -> tuple[SoundReader | TimedSound | None, tuple[str, ...]]:
     """The sound, and a note where it is left out."""
     if job.sound is None:

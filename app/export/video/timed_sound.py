@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 
 from engine.capture.files.sound import SoundReader
-from engine.timing.timing import Timing
+from engine.timing.timing import TakeTiming
 
 BLOCK_S, MAX_BLOCKS = 4.0, 6
 """Sound is decoded in blocks, of which so many are kept."""
@@ -28,7 +28,7 @@ class TimedSound:
         rate: Samples per second that are wanted.
     """
 
-    def __init__(self, path: Path, start_s: float, timing: Timing, fps: float, first: float, *, rate: int) -> None:
+    def __init__(self, path: Path, start_s: float, timing: TakeTiming, fps: float, first: float, *, rate: int) -> None:
         self._path, self._start_s, self._timing = path, start_s, timing
         self._fps, self._first, self._rate = fps, first, rate
         self._n_read = 0

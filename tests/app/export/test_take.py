@@ -30,7 +30,7 @@ from app.project.opening.project_access import open_project
 from engine.errors import ProjectError
 from engine.metrics.pictures.colors import to_levels
 from engine.timing.segment import Segment
-from engine.timing.timing import SourceMoment, Timing
+from engine.timing.timing import SourceMoment, TakeTiming
 from tests.app.export.video.conftest import images_in
 from tests.app.stored_project import copy_stored
 
@@ -99,7 +99,7 @@ def test_moments_between_frames_are_rendered(edited: Edited, tmp_path: Path) -> 
 
 def test_chosen_frames_are_those_of_the_capture(edited: Edited) -> None:
     opened = edited(*TAKE)
-    scene, timing = SceneFrames(opened), Timing(TAKE, 30)
+    scene, timing = SceneFrames(opened), TakeTiming(TAKE, 30)
     assert taken_outputs(scene, timing, PickedFrames.of(range(0, 2))) == [2, 3, 4, 5, 6, 9]
     assert taken_outputs(scene, timing, PickedFrames.of(range(0, 6, 5))) == [0, 5, 10]
     found = take_frames(scene, None, has_timing=True)
@@ -206,7 +206,7 @@ def test_sound_plays_as_the_take_does(monkeypatch: pytest.MonkeyPatch) -> None:
         Segment(0, 8, is_reversed=True),
         Segment(4, 8, repeats=2, crossfade_frames=2),
     )
-    timing = Timing(take, n_frames)
+    timing = TakeTiming(take, n_frames)
     n_samples = round(timing.n_output * rate / fps)
     with TimedSound(Path("s.mp4"), 0.5, timing, fps, 0, rate=rate) as sound:
         found = np.concatenate([sound.read(n_samples // 14) for _ in range(15)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from app.playback.timeline import Timeline
 from engine.capture.clip import split_clips
 from engine.timing.segment import Segment
-from engine.timing.timing import Timing
+from engine.timing.timing import TakeTiming
 
 TAKE = (Segment(6, 9, is_reversed=True), Segment(2, 3, n_frozen=3), Segment(0, 3))
 SHOWN = [8, 7, 6, 2, 2, 2, 0, 1, 2]
@@ -13,7 +13,7 @@ SHOWN = [8, 7, 6, 2, 2, 2, 0, 1, 2]
 
 def playing(*, is_looping: bool = True) -> Timeline:
     timeline = Timeline(split_clips(10, 5), fps=10.0)
-    timeline.timing, timeline.is_take, timeline.is_looping = Timing(TAKE, 10), True, is_looping
+    timeline.timing, timeline.is_take, timeline.is_looping = TakeTiming(TAKE, 10), True, is_looping
     timeline.seek(8)
     return timeline
 

@@ -11,7 +11,7 @@ from msgspec import structs
 from engine.errors import ProjectError
 from engine.timing.cutting import at_speed, cut_at, frozen, kept, looped, turned
 from engine.timing.segment import MAX_SPEED, MIN_SPEED, Segment
-from engine.timing.timing import SourceMoment, Timing, check_length, nearest_frames
+from engine.timing.timing import SourceMoment, TakeTiming, check_length, nearest_frames
 
 N_FRAMES = 40
 STEPS_PER_FRAME = 500
@@ -76,7 +76,7 @@ def test_a_pass_goes_as_far_as_its_speeds_add_up(one: Segment) -> None:
 @settings(max_examples=80, deadline=None)
 @given(takes)
 def test_what_is_seen_lies_in_the_segment_and_its_weights_add_up_to_1(take: tuple[Segment, ...]) -> None:
-    timing = Timing(take, N_FRAMES)
+    timing = TakeTiming(take, N_FRAMES)
     outputs = np.arange(timing.n_output)
     frames, weights = timing.moments(outputs)
     np.testing.assert_allclose(weights.sum(axis=0), 1.0)
@@ -103,7 +103,7 @@ def test_what_is_seen_lies_in_the_segment_and_its_weights_add_up_to_1(take: tupl
 @settings(max_examples=60, deadline=None)
 @given(segments())
 def test_time_goes_one_way_within_a_pass(one: Segment) -> None:
-    timing = Timing((structs.replace(one, repeats=1, crossfade_frames=0),), N_FRAMES)
+    timing = TakeTiming((structs.replace(one, repeats=1, crossfade_frames=0),), N_FRAMES)
     steps = np.diff(timing.moments(np.arange(0, timing.n_output, 0.25))[0][0])
     assert (steps <= 1e-9).all() if one.is_reversed or one.n_frozen else (steps >= -1e-9).all()
 
@@ -111,7 +111,7 @@ def test_time_goes_one_way_within_a_pass(one: Segment) -> None:
 @settings(max_examples=60, deadline=None)
 @given(takes, st.integers(0, N_FRAMES - 1))
 def test_a_frame_is_found_where_the_take_shows_it(take: tuple[Segment, ...], frame: int) -> None:
-    timing = Timing(take, N_FRAMES)
+    timing = TakeTiming(take, N_FRAMES)
     for output in timing.outputs_of(frame):
         if output <= timing.n_output - 1:
             assert min(abs(one.frame - frame) for one in timing.source_at(output + 1e-7)) < 1e-3
@@ -125,7 +125,7 @@ def test_a_split_changes_nothing_of_what_plays(take: tuple[Segment, ...], frame:
     except ProjectError:
         assert any(one.repeats > 1 and one.first < frame < one.stop for one in take)
         return
-    one, other = Timing(take, N_FRAMES), Timing(after, N_FRAMES)
+    one, other = TakeTiming(take, N_FRAMES), TakeTiming(after, N_FRAMES)
     assert other.n_output == one.n_output
     outputs = np.arange(one.n_output - 1) + 0.013  # not where one ends and the next begins
     np.testing.assert_allclose(other.moments(outputs)[0], one.moments(outputs)[0], atol=1e-6)
@@ -140,7 +140,7 @@ def test_reversed_twice_plays_as_before(take: tuple[Segment, ...], first: int, l
     except ProjectError:
         return
     whole = turned(once, span)
-    assert Timing(once, N_FRAMES).n_output == Timing(take, N_FRAMES).n_output
+    assert TakeTiming(once, N_FRAMES).n_output == TakeTiming(take, N_FRAMES).n_output
     cut = cut_at(cut_at(take, span[0]), span[1])
     assert len(whole) == len(cut)
     for one, other in zip(whole, cut, strict=True):
@@ -150,7 +150,7 @@ def test_reversed_twice_plays_as_before(take: tuple[Segment, ...], first: int, l
 
 def frames_of(take: tuple[Segment, ...]) -> list[float]:
     """What is seen first of each output frame."""
-    timing = Timing(take, N_FRAMES)
+    timing = TakeTiming(take, N_FRAMES)
     return [timing.source_at(output)[0].frame for output in range(timing.n_output)]
 
 
@@ -158,12 +158,12 @@ WHOLE = (Segment(0, N_FRAMES),)
 
 
 def test_no_segments_are_the_capture() -> None:
-    timing = Timing((), 5)
+    timing = TakeTiming((), 5)
     assert timing.is_as_captured
     assert [timing.source_at(output) for output in range(timing.n_output)] == [(SourceMoment(k),) for k in range(5)]
-    assert Timing(cut_at((Segment(0, 5),), 2), 5).is_as_captured
-    assert not Timing((Segment(2, 5), Segment(0, 2)), 5).is_as_captured
-    assert not Timing((Segment(0, 4),), 5).is_as_captured
+    assert TakeTiming(cut_at((Segment(0, 5),), 2), 5).is_as_captured
+    assert not TakeTiming((Segment(2, 5), Segment(0, 2)), 5).is_as_captured
+    assert not TakeTiming((Segment(0, 4),), 5).is_as_captured
     assert timing.duration_s(25.0) == 0.2
 
 
@@ -179,30 +179,30 @@ def test_takes_play_what_they_say() -> None:
 
 
 def test_a_loop_fades_its_end_into_its_beginning() -> None:
-    timing = Timing(looped((Segment(0, 4),), (0, 4), 2, 1), 40)
+    timing = TakeTiming(looped((Segment(0, 4),), (0, 4), 2, 1), 40)
     assert timing.n_output == 7
     assert timing.source_at(3) == (SourceMoment(0.0, 0.5), SourceMoment(3.0, 0.5))
     assert [timing.source_at(output)[0].frame for output in range(7)] == [0, 1, 2, 0, 1, 2, 3]
-    backward = Timing(looped(turned((Segment(0, 4),), (0, 4)), (0, 4), 2, 2), 40)
+    backward = TakeTiming(looped(turned((Segment(0, 4),), (0, 4)), (0, 4), 2, 2), 40)
     assert [one.frame for one in backward.source_at(2)] == [3, 1]
     assert sum(one.weight for one in backward.source_at(2)) == pytest.approx(1.0)
 
 
 def test_very_short_and_very_fast_segments() -> None:
-    one = Timing((Segment(7, 8, 10.0, 10.0),), 40)
+    one = TakeTiming((Segment(7, 8, 10.0, 10.0),), 40)
     assert (one.n_output, one.source_at(0)) == (1, (SourceMoment(7.0),))
-    slow = Timing((Segment(7, 8, 0.1, 0.1),), 40)
+    slow = TakeTiming((Segment(7, 8, 0.1, 0.1),), 40)
     assert slow.n_output == 10
     assert {moment.frame for output in range(10) for moment in slow.source_at(output)} == {7.0}
-    fast = Timing((Segment(0, 40, 10.0, 10.0),), 40)
+    fast = TakeTiming((Segment(0, 40, 10.0, 10.0),), 40)
     assert [fast.source_at(output)[0].frame for output in range(fast.n_output)] == [0, 10, 20, 30]
 
 
 def test_the_capture_may_be_shorter_than_the_take() -> None:
-    timing = Timing((Segment(0, 30, repeats=2, crossfade_frames=14), Segment(30, 40)), 10)
+    timing = TakeTiming((Segment(0, 30, repeats=2, crossfade_frames=14), Segment(30, 40)), 10)
     assert [one.stop for one in timing.played] == [10]
     assert timing.n_output == 15
-    assert Timing((Segment(30, 40),), 10).is_as_captured
+    assert TakeTiming((Segment(30, 40),), 10).is_as_captured
 
 
 @pytest.mark.parametrize(

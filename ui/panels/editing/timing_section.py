@@ -11,7 +11,7 @@ from app.document.changes.timing_changes import ChangeSegment, Order, ResetTime,
 from app.session.session_view import SessionView
 from engine.timing.cutting import turned_segment
 from engine.timing.segment import MAX_FROZEN, MAX_REPEATS, MAX_SPEED, MIN_SPEED, Segment
-from engine.timing.timing import Timing
+from engine.timing.timing import TakeTiming
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
 from ui.panels.pieces.widgets import elided, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
@@ -38,7 +38,7 @@ def draw_timing(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     view = ui.timeline
     if view.segment is not None and view.segment >= len(segments):
         view.segment = None
-    timing = Timing(segments, timeline.n_frames)
+    timing = TakeTiming(segments, timeline.n_frames)
     imgui.text(f"{timing.n_output} frames, {timing.duration_s(timeline.fps):.2f} s")
     imgui.same_line()
     imgui.text_disabled(f"of {timeline.n_frames} captured")

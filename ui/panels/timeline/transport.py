@@ -92,7 +92,7 @@ def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
     if _icon_button(ui, "loop", Icon.LOOP, "Loop (Ctrl+/)", is_on=timeline.is_looping):
         timeline.is_looping = not timeline.is_looping
     if timeline.timing is not None:
-        take_note = "Play the take as it is edited in time (Shift+P)"
+        take_note = "Play the take as it is edited in time (Alt+P)"
         if _icon_button(ui, "take", Icon.FILM, take_note, is_on=timeline.is_take):
             timeline.is_take = not timeline.is_take
     follow_note = "Follow training: stay in the clip with the newest state (End twice)"

@@ -124,7 +124,7 @@ ACTIONS = (
         "Play the edited take, or the capture",
         TAKE,
         _toggle_take,
-        keys=("Shift+P",),
+        keys=("Alt+P",),
         is_on=lambda session: session.timeline.is_take,
         lacks=_no_timing,
     ),
