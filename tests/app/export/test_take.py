@@ -7,9 +7,11 @@ import runpy
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from app.evaluation.headless import TrainedProject, open_trained
 from app.export.edits_line import included_lines
@@ -28,6 +30,7 @@ from app.export.video.render import render_video
 from app.export.video.timed_sound import TimedSound
 from app.project.opening.project_access import open_project
 from engine.errors import ProjectError
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.metrics.pictures.colors import to_levels
 from engine.timing.segment import Segment
 from engine.timing.timing import SourceMoment, TakeTiming
@@ -59,7 +62,7 @@ def edited(tmp_path: Path) -> Edited:
     return edit
 
 
-def job(opened: TrainedProject, out: Path, **entries: object) -> VideoJob:
+def job(opened: TrainedProject, out: Path, **entries: Any) -> VideoJob:
     return VideoJob(out, "png", camera=opened.capture.rig.names[2], **entries)
 
 
@@ -128,7 +131,8 @@ def test_changes_and_comparisons_follow_it(edited: Edited, tmp_path: Path) -> No
 @pytest.mark.parametrize("part", ["all", "split"])
 def test_files_of_gaussians_are_those_of_the_take(edited: Edited, tmp_path: Path, part: str) -> None:
     opened = edited(*TAKE)
-    gaussians_job.run(opened, GaussiansJob(tmp_path / "g", "ply", part=part), ignore)  # pyright: ignore
+    wanted: dict[str, Any] = {"out": tmp_path / "g", "part": part}
+    gaussians_job.run(opened, GaussiansJob(**wanted), ignore)
     stem = "p_moving" if part == "split" else "p"
     files = sorted(path.name for path in (tmp_path / "g").glob(f"{stem}_[0-9]*.ply"))
     assert files == [f"{stem}_{k:04d}.ply" for k in range(len(SHOWN))]
@@ -220,3 +224,29 @@ def test_sound_plays_as_the_take_does(monkeypatch: pytest.MonkeyPatch) -> None:
     mixed = 0.5 + sum(one.weight * one.frame for one in fading) / fps  # the last frame of the loop begins
     assert len(fading) == 2
     assert found[round(25.0 * rate / fps), 0] == pytest.approx(mixed, abs=1e-5)
+
+
+def test_between_clips_things_travel_to_the_moment_from_both_sides(
+    edited: Edited, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At one unit a frame, half way between two clips, things are half a unit from where their frames have them."""
+    load = TrainedProject.load
+
+    def moving(opened: TrainedProject, clip_index: int) -> TrainedClip:
+        trained = load(opened, clip_index)
+        for role in trained.model.roles():
+            anchors = trained.model.anchor_set(role)
+            if anchors.is_dynamic and not anchors.travels:
+                anchors.travels = True
+                anchors.register_buffer("birth_frames", torch.zeros(len(anchors)))
+                anchors.velocities = torch.nn.Parameter(torch.tensor([[1.0, 0.0, 0.0]]).repeat(len(anchors), 1))
+                anchors.accelerations = torch.nn.Parameter(torch.zeros(len(anchors), 3))
+        return trained
+
+    monkeypatch.setattr(TrainedProject, "load", moving)
+    scene = SceneFrames(edited())
+    for share, frame, ahead in zip(scene.shares(2.5), (2, 3), (0.5, -0.5), strict=True):
+        (still,) = scene.shares(frame)
+        away = (share.gaussians.means - still.gaussians.means)[:, 0]
+        assert share.weight == 0.5
+        assert float(away[away.abs() > 1e-3].median()) == pytest.approx(ahead, abs=0.01)
