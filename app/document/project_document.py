@@ -13,6 +13,8 @@ from engine.camera.camera_path import CameraPath
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.actions import Vector
 from engine.editing.edit import Edit
+from engine.editing.effects import EditStack
+from engine.editing.scene_object import NO_OBJECTS, Objects
 from engine.gate.regions import GateRegion
 from engine.timing.segment import Segment
 
@@ -80,6 +82,7 @@ class ProjectDocument:
         exclusions: Cameras, pictures and painted parts that training never sees.
         world: Up and scale.
         timing: Segments of the take in the order in which they play; none for the take as captured.
+        objects: People and things that were given a name, in the user's order.
     """
 
     settings: ProjectSettings
@@ -91,3 +94,8 @@ class ProjectDocument:
     exclusions: Exclusions = NOTHING_EXCLUDED
     world: World = AS_CAPTURED
     timing: tuple[Segment, ...] = ()
+    objects: Objects = NO_OBJECTS
+
+    def stack(self) -> EditStack:
+        """Its edits, to be asked moment by moment."""
+        return EditStack(self.edits, self.objects)

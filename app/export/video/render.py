@@ -21,6 +21,7 @@ from app.export.video.plan import VideoPlan, plan_video
 from app.export.video.writers.film import FilmWriter
 from app.export.video.writers.sequence import write_depth_png, write_exr_picture, write_png
 from app.training.rate import SmoothedRate
+from engine.editing.effects import EditStack
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
 from engine.text import duration_text
@@ -73,7 +74,7 @@ def render_video(
         DiskError: The disk refused; nothing is left behind.
         JobCancelled: `is_cancelled` said so; nothing is left behind.
     """
-    edits = None if job.has_edits else ()
+    edits = None if job.has_edits else EditStack()
     scene = SceneFrames(opened, n_threads=n_threads, features=job.features, edits=edits)
     plan = plan_video(job, scene)
     painter = Painter(scene, job, plan.moments, plan.view_of, plan.step, is_take=plan.timing is not None)

@@ -31,7 +31,7 @@ SPEED_SHARE = 2e-3
 
 def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     """Fields of the chosen edit."""
-    _draw_name(dispatch, ui, edit)
+    _draw_name(session, dispatch, ui, edit)
     _draw_scope(session, dispatch, ui, edit)
     is_clicked, is_inverted = imgui.checkbox("Acts on everything else", edit.is_inverted)
     ui.mark("edits.inverted")
@@ -45,7 +45,7 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
             if segment(words, ui.editing.is_shape_meant == is_shape):
                 ui.editing.is_shape_meant = is_shape
             ui.mark(f"edits.handles {'shape' if is_shape else 'movement'}")
-    target = _draw_target(ui, edit.target)
+    target = _draw_target(session, ui, edit.target)
     if target is not None:
         dispatch(ChangeEdit(structs.replace(edit, target=target), ui.editing.gesture, "change"))
     action = _draw_action(session, ui, edit.action)
@@ -53,11 +53,13 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
         dispatch(ChangeEdit(structs.replace(edit, action=action), ui.editing.gesture, "change"))
 
 
-def _draw_name(dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
+def _draw_name(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     label_before("Name")
     shown = one_line(edit.name) if ui.editing.renamed is None else ui.editing.renamed
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
-    is_entered, typed = imgui.input_text_with_hint("##edit name", one_line(edit_title(edit)), shown, flags)
+    is_entered, typed = imgui.input_text_with_hint(
+        "##edit name", one_line(edit_title(edit, session.edits.objects)), shown, flags
+    )
     ui.mark("edits.name")
     ui.editing.renamed = typed if imgui.is_item_active() or is_entered else ui.editing.renamed
     if is_entered or imgui.is_item_deactivated_after_edit():
@@ -98,7 +100,7 @@ def _draw_scope(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edi
 # Every field is drawn, whichever was changed: with fewer the panel would be lower for a moment, and scroll.
 
 
-def _draw_target(ui: UiState, target: Target) -> Target | None:
+def _draw_target(session: SessionView, ui: UiState, target: Target) -> Target | None:
     """Numbers of what an edit acts on; what they were changed to."""
     changed = target
     match target:
@@ -123,7 +125,7 @@ def _draw_target(ui: UiState, target: Target) -> Target | None:
             if found is not None:
                 changed = structs.replace(changed, radius=found[0])
         case _:
-            text_wrapped_dim(f"Acts on {target_text(target)}.")
+            text_wrapped_dim(f"Acts on {target_text(target, session.edits.objects)}.")
     return None if changed is target else changed
 
 
