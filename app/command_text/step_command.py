@@ -11,8 +11,8 @@ from msgspec import structs, to_builtins
 
 from app.command_text.command_text import CommandText
 from app.command_text.quoting import can_be_argument, number, option
+from app.command_text.time_edit_between import time_edit_between
 from app.document.changes import edit_changes
-from app.document.changes.timing_changes import time_edit_between
 from app.document.project_document import ProjectDocument
 from app.document.storing.stored_document import plain_document
 from engine.editing.actions import Action

@@ -4,7 +4,7 @@ and `clipgstream edit` make it of its entries, and `timing_changed` applies it t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -302,50 +302,6 @@ def segment_words(one: Segment) -> str:
         frames = "1 frame" if one.crossfade_frames == 1 else f"{one.crossfade_frames} frames"
         words.append(f"{one.repeats} times" + (f", cross-fade of {frames}" if one.crossfade_frames else ""))
     return ", ".join(words)
-
-
-def time_edit_between(before: Segments, after: Segments, n_frames: int) -> TimeEdit | None:
-    """The change that makes some segments of others; None where it takes more than one, or only the window can.
-
-    Args:
-        before, after: As in documents: none for the take as captured.
-    """
-    whole = (Segment(0, n_frames),)
-    before, after = before or whole, after or whole
-    if after == whole:
-        return ResetTime()
-    places = {one: place for place, one in enumerate(before)}
-    found: list[Callable[[], TimeEdit]] = []
-    if all(one in places for one in after):
-        found.append(lambda: Order(tuple(places[one] for one in after)))
-    bounds = sorted({bound for one in after for bound in (one.first, one.stop)})
-    found.append(lambda: Trim((bounds[0], bounds[-1])))
-    found += [lambda at=bound: Split(at) for bound in bounds]
-    new = [one for one in after if one not in places]
-    for one in new:
-        span = (one.first, one.stop)
-        found.append(lambda one=one, span=span: ChangeSpeed(span, one.start_speed, _end_speed(one), one.ease))
-        if one.n_frozen:
-            found.append(lambda one=one: Freeze(one.first, one.n_frozen))
-        found.append(lambda span=span: Reverse(span))
-        found.append(lambda one=one, span=span: Loop(span, one.repeats, one.crossfade_frames))
-    if new:
-        span = (min(one.first for one in new), max(one.stop for one in new))
-        found.append(lambda: Reverse(span))
-        found.append(lambda: ChangeSpeed(span, new[0].start_speed, _end_speed(new[0]), new[0].ease))
-    return next((edit for make in found if (edit := _tried(make, before, after, n_frames)) is not None), None)
-
-
-def _tried(make: Callable[[], TimeEdit], before: Segments, after: Segments, n_frames: int) -> TimeEdit | None:
-    try:
-        edit = make()
-        return edit if edit.applied(before, n_frames) == after else None
-    except (ProjectError, ValueError):
-        return None
-
-
-def _end_speed(one: Segment) -> float | None:
-    return None if one.end_speed == one.start_speed else one.end_speed
 
 
 def _span(frames: Sequence[int] | None, n_frames: int) -> Span:

@@ -10,7 +10,6 @@ import pytest
 from msgspec import structs
 
 from app.document.changes.timing_changes import (
-    TIME_EDITS,
     ChangeSegment,
     ChangeSpeed,
     Freeze,
@@ -22,7 +21,6 @@ from app.document.changes.timing_changes import (
     TimeEdit,
     Trim,
     segment_words,
-    time_edit_between,
     time_edit_called,
     timing_changed,
 )
@@ -145,18 +143,6 @@ def test_a_take_is_never_too_long() -> None:
 def test_what_cannot_be_is_refused_with_its_cause(verb: str, entries: dict[str, Any], word: str) -> None:
     with pytest.raises(ProjectError, match=word):
         timing_changed(EMPTY, time_edit_called(verb, entries), N_FRAMES)
-
-
-def test_steps_are_found_again_from_what_they_did() -> None:
-    document = EMPTY
-    for step in (*STEPS, ResetTime()):
-        after = timing_changed(document, step, N_FRAMES)
-        found = time_edit_between(document.timing, after.timing, N_FRAMES)
-        assert (found is None) == isinstance(step, ChangeSegment)
-        if found is not None:
-            assert timing_changed(document, found, N_FRAMES) == after
-        document = after
-    assert set(TIME_EDITS) == {"trim", "split", "speed", "reverse", "freeze", "loop", "order", "reset-time"}
 
 
 def test_a_segment_in_words() -> None:
