@@ -78,7 +78,7 @@ def _succession(parts: MovingParts, local: np.ndarray) -> csr_matrix:
         step = parts.means[place, both] - parts.means[place - 1, both]
         was = parts.means[place - 1, old]
         k = min(3, len(both))
-        near = KDTree(parts.means[place - 1, both]).query(was, k=k)[1].reshape(len(old), k)
+        near = np.asarray(KDTree(parts.means[place - 1, both]).query(was, k=k)[1]).reshape(len(old), k)
         expected = was + step[near].mean(1)
         k = min(N_BEFORE, len(old))
         away, near = KDTree(expected).query(parts.means[place, new], k=k)
