@@ -55,7 +55,7 @@ def _neighbours(parts: MovingParts) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         distances, near = KDTree(means[there]).query(means[there], k=k)
         reach[there] += distances[:, -1]
         n_there[there] += 1
-        one, other = np.repeat(there, k - 1), there[near[:, 1:].reshape(-1)]
+        one, other = np.repeat(there, k - 1), there[np.asarray(near)[:, 1:].reshape(-1)]
         pairs.append(np.minimum(one, other) * n + np.maximum(one, other))
     if not pairs:
         return np.zeros(0, np.int64), np.zeros(0, np.int64), reach
