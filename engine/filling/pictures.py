@@ -1,0 +1,126 @@
+"""The pictures that holes are found in: what a camera sees of the scene before and after something is taken away."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+
+from engine.backends.backend import Backend
+from engine.editing.selection.seen_from import SeenFrom
+from engine.model.host_array import host_array
+from engine.raster.gaussians import Gaussians
+from engine.raster.rasterize import rasterize
+
+MIN_SHARE = 0.3
+"""A pixel shows what is taken away where so much of it is made of it."""
+COVERED = 0.8
+"""A pixel with less coverage shows a hole."""
+DEPTH_TOLERANCE = 0.03
+"""Surfaces whose depths differ by less than this share are the same."""
+MIN_HOLE_PX = 4
+"""Smaller holes are noise of the training, as they are everywhere."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """A picture of Gaussians.
+
+    Attributes:
+        image: [H, W, 3] float32
+        alpha: Coverage. [H, W] float32
+        depth: 0 where there is nothing. [H, W] float32
+    """
+
+    image: np.ndarray
+    alpha: np.ndarray
+    depth: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Taken:
+    """A camera's view of a moment.
+
+    Attributes:
+        view: Of the camera.
+        before, after: With and without what is taken away.
+        is_open: Pixels that showed it. [H, W] bool
+    """
+
+    view: SeenFrom
+    before: Drawn
+    after: Drawn
+    is_open: np.ndarray
+
+
+def draw(gaussians: Gaussians, view: SeenFrom, backend: Backend) -> Drawn:
+    """Draw Gaussians over black."""
+    found = rasterize(
+        gaussians,
+        gaussians.means.new_tensor(view.world_to_camera)[None],
+        gaussians.means.new_tensor(view.K)[None],
+        view.width,
+        view.height,
+        backend=backend,
+        near_plane=view.near,
+        want_depth=True,
+    )
+    depth = found.expected_depth
+    assert depth is not None
+    return Drawn(host_array(found.image[0]), host_array(found.alpha[0, ..., 0]), host_array(depth[0, ..., 0]))
+
+
+def taken_away(before: Gaussians, is_gone: np.ndarray, view: SeenFrom, backend: Backend) -> Taken:
+    """What a camera sees when some of the Gaussians are taken away. is_gone: [N] bool"""
+    gone = torch.from_numpy(is_gone).to(before.means.device)
+    marks = replace(before, colors=gone[:, None].to(before.colors).expand(-1, 3).contiguous())
+    share = draw(marks, view, backend).image[..., 0]
+    return Taken(view, draw(before, view, backend), draw(before[~gone], view, backend), share > MIN_SHARE)
+
+
+def points_at(view: SeenFrom, depth: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The points that pixels of a mask show, in the order of rows. depth: [H, W]; mask: [H, W] bool; [n, 3] float64"""
+    ys, xs = mask.nonzero()
+    pixels = np.stack([xs + 0.5, ys + 0.5, np.ones(len(xs))], axis=1)
+    in_camera = pixels @ np.linalg.inv(view.K).T * depth[mask][:, None]
+    rotation, shift = view.world_to_camera[:3, :3], view.world_to_camera[:3, 3]
+    return (in_camera - shift) @ rotation
+
+
+def pixels_of(view: SeenFrom, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where points [n, 3] appear.
+
+    Returns:
+        Rows and columns of their pixels [n] int64 each, inside the picture; and their depth [n], NaN for points outside
+        of the picture.
+    """
+    in_camera = points @ view.world_to_camera[:3, :3].T + view.world_to_camera[:3, 3]
+    depth = in_camera[:, 2]
+    is_ahead = depth > view.near
+    flat = in_camera @ view.K.T
+    x, y = (np.where(is_ahead, flat[:, i] / np.where(is_ahead, depth, 1.0), -1.0) for i in (0, 1))
+    is_inside = is_ahead & (x >= 0) & (y >= 0) & (x < view.width) & (y < view.height)
+    rows, columns = (np.where(is_inside, value, 0.0).astype(np.int64) for value in (y, x))
+    return rows, columns, np.where(is_inside, depth, np.nan)
+
+
+def seen_by_any(points: np.ndarray, pictures: Iterable[Taken]) -> np.ndarray:
+    """Which points [n, 3] some camera sees while nothing is taken away: nothing stands before them. [n] bool"""
+    found = np.zeros(len(points), bool)
+    for one in pictures:
+        rows, columns, depth = pixels_of(one.view, points)
+        drawn = one.before
+        front = np.where(drawn.alpha < 0.5, np.inf, drawn.depth)[rows, columns]
+        found |= depth * (1.0 - DEPTH_TOLERANCE) <= front  # NaN compares as False
+    return found
+
+
+def holes_of(one: Taken, pictures: Iterable[Taken]) -> np.ndarray:
+    """Pixels that showed what is taken away, and now show nothing, or a surface that no camera ever saw. [H, W] bool"""
+    is_bare = one.is_open & (one.after.alpha < COVERED)
+    is_asked = one.is_open & ~is_bare
+    points = points_at(one.view, one.after.depth.astype(np.float64), is_asked)
+    is_bare[is_asked] = ~seen_by_any(points, pictures)
+    return is_bare
