@@ -19,8 +19,8 @@ from engine.editing.fill import fill_key, packed_fill
 from engine.editing.picks import pack_rows
 from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import ProjectError
-from engine.filling.pictures import Taken, draw, holes_of, taken_away
-from engine.filling.surface import surface_behind, without_specks
+from engine.filling.pictures import HALF, Taken, draw, holes_of, taken_away
+from engine.filling.surface import surface_behind
 from engine.filling.traces import CELL_SPACINGS, Swept
 from engine.model.host_array import host_array
 from engine.raster.gaussians import Gaussians
@@ -29,8 +29,6 @@ CELL_SHARE = 0.1
 """Smallest distance of new Gaussians, in spacings of the static anchors; a picture has larger pixels as a rule."""
 MAX_MOMENTS = 8
 """Frames that are looked at for holes, spread over those in which the edit holds."""
-HALF = 0.5
-"""Coverage from which on something is seen rather than what is behind it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,14 +110,14 @@ def find_fill(
         for key, rows in found.items():  # clips share their still part, in other light
             traces[key] = np.union1d(traces.get(key, rows), rows)
         for frame in frames:
-            before, is_gone = search.taken(loaded, frame, _packed(found))
+            before, is_gone, n_still = search.taken(loaded, frame, _packed(found))
             is_anything |= bool(is_gone.any())
             for view in views:
                 report(len(held) + len(pictures), n_steps)
-                pictures.append(taken_away(before, is_gone, view, backend))
+                pictures.append(taken_away(before, is_gone, n_still, view, backend))
     if not is_anything:
         raise ProjectError(f"Edit {edit.edit_id} takes nothing away in any trained frame.")
-    holes = [without_specks(holes_of(picture, pictures)) for picture in pictures]
+    holes = holes_of(pictures)
     surface = surface_behind(pictures, holes, float(np.median([one.spacing for one, _ in held])) * CELL_SHARE)
     fill = Fill(fill_key(edit), _packed(traces), packed_fill(surface))
     columns = (surface.means, surface.quats, surface.scales, surface.opacities, surface.colors)
@@ -169,12 +167,13 @@ class _Search:
 
     def taken(
         self, loaded: EditedClip, frame: int, traces: tuple[PickedRows, ...]
-    ) -> tuple[Gaussians, np.ndarray]:
-        """The Gaussians of a moment below the edit, and which of them it and its traces take away. [N] bool"""
+    ) -> tuple[Gaussians, np.ndarray, int]:
+        """The Gaussians of a moment below the edit, which of them it and its traces take away [N] bool, and how many
+        stand still."""
         filling = Fill(fill_key(self.edit), traces)
-        stack = EditStack((*self._below.edits, replace(self.edit, fill=filling)), self._objects)
-        gaussians, is_gone, _ = self._gone(loaded, frame, stack)
-        return gaussians, is_gone
+        return self._gone(
+            loaded, frame, EditStack((*self._below.edits, replace(self.edit, fill=filling)), self._objects)
+        )
 
     def _gone(
         self, loaded: EditedClip, frame: int, stack: EditStack | None = None

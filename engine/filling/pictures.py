@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
+from scipy import ndimage
 
 from engine.backends.backend import Backend
 from engine.editing.selection.seen_from import SeenFrom
@@ -16,12 +17,18 @@ from engine.raster.rasterize import rasterize
 
 MIN_SHARE = 0.3
 """A pixel shows what is taken away where so much of it is made of it."""
-COVERED = 0.8
+HALF = 0.5
 """A pixel with less coverage shows a hole."""
+COVERED = 0.8
+"""A pixel with more coverage shows a surface, whose depth and colour can be relied on."""
 DEPTH_TOLERANCE = 0.03
 """Surfaces whose depths differ by less than this share are the same."""
 MIN_HOLE_PX = 4
 """Smaller holes are noise of the training, as they are everywhere."""
+RING_PX = 3
+"""Width of what counts as the surroundings of a hole."""
+SURROUNDED = 0.7
+"""Share of its surroundings that show a surface: else it is a part of something that is dark, or was hardly trained."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,14 +52,17 @@ class Taken:
 
     Attributes:
         view: Of the camera.
-        before, after: With and without what is taken away.
-        is_open: Pixels that showed it. [H, W] bool
+        before: Everything.
+        after: What stands still, without what is taken away.
+        is_open: Pixels that showed what is taken away. [H, W] bool
+        is_still: Those of them that showed the part of it that stands still. [H, W] bool
     """
 
     view: SeenFrom
     before: Drawn
     after: Drawn
     is_open: np.ndarray
+    is_still: np.ndarray
 
 
 def draw(gaussians: Gaussians, view: SeenFrom, backend: Backend) -> Drawn:
@@ -72,12 +82,22 @@ def draw(gaussians: Gaussians, view: SeenFrom, backend: Backend) -> Drawn:
     return Drawn(host_array(found.image[0]), host_array(found.alpha[0, ..., 0]), host_array(depth[0, ..., 0]))
 
 
-def taken_away(before: Gaussians, is_gone: np.ndarray, view: SeenFrom, backend: Backend) -> Taken:
-    """What a camera sees when some of the Gaussians are taken away. is_gone: [N] bool"""
+def taken_away(before: Gaussians, is_gone: np.ndarray, n_still: int, view: SeenFrom, backend: Backend) -> Taken:
+    """What a camera sees when some of the Gaussians are taken away.
+
+    Args:
+        before: All of a moment, those that stand still first.
+        is_gone: [N] bool
+        n_still: So many stand still.
+        view: Of the camera.
+        backend: Draws.
+    """
     gone = torch.from_numpy(is_gone).to(before.means.device)
-    marks = replace(before, colors=gone[:, None].to(before.colors).expand(-1, 3).contiguous())
-    share = draw(marks, view, backend).image[..., 0]
-    return Taken(view, draw(before, view, backend), draw(before[~gone], view, backend), share > MIN_SHARE)
+    is_still = torch.arange(len(gone), device=gone.device) < n_still
+    marks = torch.stack([gone, gone & is_still, gone], dim=1).to(before.colors)
+    shares = draw(replace(before, colors=marks), view, backend).image
+    after = draw(before[is_still & ~gone], view, backend)
+    return Taken(view, draw(before, view, backend), after, shares[..., 0] > MIN_SHARE, shares[..., 1] > MIN_SHARE)
 
 
 def points_at(view: SeenFrom, depth: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -106,21 +126,46 @@ def pixels_of(view: SeenFrom, points: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return rows, columns, np.where(is_inside, depth, np.nan)
 
 
-def seen_by_any(points: np.ndarray, pictures: Iterable[Taken]) -> np.ndarray:
+def seen_by_any(points: np.ndarray, pictures: Sequence[Taken]) -> np.ndarray:
     """Which points [n, 3] some camera sees while nothing is taken away: nothing stands before them. [n] bool"""
     found = np.zeros(len(points), bool)
     for one in pictures:
         rows, columns, depth = pixels_of(one.view, points)
         drawn = one.before
-        front = np.where(drawn.alpha < 0.5, np.inf, drawn.depth)[rows, columns]
+        front = ndimage.maximum_filter(np.where(drawn.alpha < HALF, np.inf, drawn.depth), 3)[rows, columns]
         found |= depth * (1.0 - DEPTH_TOLERANCE) <= front  # NaN compares as False
     return found
 
 
-def holes_of(one: Taken, pictures: Iterable[Taken]) -> np.ndarray:
-    """Pixels that showed what is taken away, and now show nothing, or a surface that no camera ever saw. [H, W] bool"""
-    is_bare = one.is_open & (one.after.alpha < COVERED)
-    is_asked = one.is_open & ~is_bare
+def holes_of(pictures: Sequence[Taken]) -> list[np.ndarray]:
+    """Pixels of each picture in which something that always stood still is taken away, and that now show nothing, or a
+    surface that no camera ever saw. [H, W] bool
+
+    What is behind something that moves was seen at other moments and trained; what shows nothing there is dark, as is
+    what is around it.
+    """
+    always: dict[int, np.ndarray] = {}
+    for one in pictures:
+        always[id(one.view)] = always.get(id(one.view), True) & one.is_still
+    return [_surrounded(_holes_of(one, always[id(one.view)], pictures), one.after.alpha) for one in pictures]
+
+
+def _holes_of(one: Taken, is_always: np.ndarray, pictures: Sequence[Taken]) -> np.ndarray:
+    is_hole = is_always & (one.after.alpha < HALF)
+    is_asked = is_always & ~is_hole
     points = points_at(one.view, one.after.depth.astype(np.float64), is_asked)
-    is_bare[is_asked] = ~seen_by_any(points, pictures)
-    return is_bare
+    is_hole[is_asked] = ~seen_by_any(points, pictures)
+    return is_hole
+
+
+def _surrounded(is_hole: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    """Holes large enough, most of whose surroundings show a surface. [H, W] bool"""
+    parts, n = ndimage.label(is_hole, np.ones((3, 3)))
+    kept = np.zeros(n + 1, bool)
+    for number, place in enumerate(ndimage.find_objects(parts), start=1):
+        rows, columns = (slice(max(side.start - RING_PX, 0), side.stop + RING_PX) for side in place)
+        is_part = parts[rows, columns] == number
+        is_ring = ndimage.binary_dilation(is_part, iterations=RING_PX) & ~is_hole[rows, columns]
+        is_large = is_part.sum() >= MIN_HOLE_PX and is_ring.any()
+        kept[number] = is_large and (alpha[rows, columns][is_ring] >= COVERED).mean() >= SURROUNDED
+    return kept[parts]

@@ -12,7 +12,7 @@ from engine.camera.rotations import quats_of
 from engine.cloud.voxel import voxel_keys, voxel_means
 from engine.editing.fill import MAX_FILLED, FillGaussians
 from engine.filling.continuing import continued_colors, continued_depth
-from engine.filling.pictures import COVERED, DEPTH_TOLERANCE, MIN_HOLE_PX, Taken, pixels_of, points_at
+from engine.filling.pictures import COVERED, DEPTH_TOLERANCE, Taken, pixels_of, points_at
 
 BEFORE_SURFACES = 0.06
 """A new point that lies by this share before a surface that a camera sees would hide it: it floats in the air."""
@@ -27,14 +27,6 @@ WIDTH = 0.7
 """Standard deviation of a disc in its plane, in edges of a cell: neighbours overlap."""
 THICKNESS = 0.1
 """Of a disc, in edges of a cell."""
-
-
-def without_specks(is_hole: np.ndarray) -> np.ndarray:
-    """Holes of at least MIN_HOLE_PX pixels. [H, W] bool"""
-    parts, n = ndimage.label(is_hole, np.ones((3, 3)))
-    sizes = np.bincount(parts.reshape(-1), minlength=n + 1)
-    sizes[0] = 0
-    return (sizes >= MIN_HOLE_PX)[parts]
 
 
 def surface_behind(pictures: Sequence[Taken], holes: Sequence[np.ndarray], cell: float) -> FillGaussians:
@@ -128,12 +120,14 @@ def _normals(one: Taken, depth: np.ndarray) -> np.ndarray:
 
 
 def _n_hiding(points: np.ndarray, pictures: Sequence[Taken], holes: Sequence[np.ndarray]) -> np.ndarray:
-    """In how many pictures each point would hide a surface that is seen there. [P]"""
+    """In how many pictures each point would hide a surface that is seen there, or the darkness where nothing is. [P]"""
     n = np.zeros(len(points), np.int64)
     for one, is_hole in zip(pictures, holes, strict=True):
         rows, columns, depth = pixels_of(one.view, points)
-        is_surface = (one.after.alpha >= COVERED) & ~ndimage.binary_dilation(is_hole, iterations=2)
-        surface = np.where(is_surface, one.after.depth, 0.0)[rows, columns]
+        is_surface = (one.after.alpha >= COVERED) & ~ndimage.binary_dilation(is_hole, iterations=RIM_PX)
+        surface = np.where(is_surface, one.after.depth, 0.0)
+        is_dark = (one.before.alpha < COVERED) & ~ndimage.binary_dilation(one.is_open, iterations=RIM_PX)
+        surface = np.where(is_dark, np.inf, surface)[rows, columns]
         n += depth < surface * (1.0 - BEFORE_SURFACES)
     return n
 
