@@ -36,9 +36,7 @@ class Filled:
         sets = (*rows.sets, RowSet("", clip_index, FILLED), RowSet("", clip_index, GUESSED))
         set_index = (len(rows.sets) + self.is_guess).astype(np.uint8)
         number = np.arange(len(self.is_guess), dtype=np.int32)
-        return GaussianRows(
-            sets, np.concatenate([rows.set_index, set_index]), np.concatenate([rows.number, number])
-        )
+        return GaussianRows(sets, np.concatenate([rows.set_index, set_index]), np.concatenate([rows.number, number]))
 
 
 def filled_by(effects: Effects, like: Tensor) -> Filled | None:

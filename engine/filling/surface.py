@@ -90,7 +90,8 @@ class _Points:
         """Points [P, 3], normals [P, 3], colours [P, 3], widths of their pixels [P]."""
         widths = ((3,), (3,), (3,), ())
         return tuple(
-            np.concatenate([np.zeros((0, *width)), *column]) for width, column in zip(widths, self._columns, strict=True)
+            np.concatenate([np.zeros((0, *width)), *column])
+            for width, column in zip(widths, self._columns, strict=True)
         )
 
 

@@ -56,9 +56,7 @@ _NORMAL_LEGEND = (
     ((0.5, 1.0, 0.5), "green: faces down (y)"),
     ((0.5, 0.5, 1.0), "blue: faces the camera (-z)"),
 )
-_BIRTH_LEGEND = tuple(
-    zip(BIRTH_HUES, _BIRTHS, strict=True)
-)
+_BIRTH_LEGEND = tuple(zip(BIRTH_HUES, _BIRTHS, strict=True))
 
 MODES = MappingProxyType(
     {
