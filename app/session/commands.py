@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from app.session.captures.capture_commands import CalibrationCommand, DoctorCommand, SynchronisationCommand
 from app.session.clips.clip_commands import ClipCommand
-from app.session.editing.edit_commands import EditCommand, HistoryCommand
+from app.session.editing.edit_commands import EditCommand, FillBehind, HistoryCommand
 from app.session.editing.mark_commands import MarkCommand
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
@@ -55,6 +55,7 @@ Command = (
     | LookCommand
     | SelectionCommand
     | EditCommand
+    | FillBehind
     | MarkCommand
     | PathCommand
     | HistoryCommand

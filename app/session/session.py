@@ -31,9 +31,10 @@ from app.session.command_titles import TITLES
 from app.session.commands import CancelJob, CloseQuestion, Command, DismissNotice
 from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
-from app.session.editing.edit_commands import EditCommand, HistoryCommand
+from app.session.editing.edit_commands import EditCommand, FillBehind, HistoryCommand
 from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Edits
+from app.session.editing.filling import Filling
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.mark_commands import MarkCommand
@@ -167,6 +168,7 @@ class Session(SessionFace):
         self.marking = Marking(self.document)
         lost, reaches = LostEdits(lambda: live.service), EditReaches(lambda: live.service)
         self.editing = Edits(self.document, self.selecting, lost, reaches)
+        self.filling = parts.add(Filling(self.document, jobs, self.notices))
         self.command_texts = CommandTexts(lambda: self.project, live.is_finished)
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
@@ -214,6 +216,8 @@ class Session(SessionFace):
                 self.showing.obey(command)
             case _ if isinstance(command, EditCommand):
                 self.editing.apply(command)
+            case FillBehind():
+                self.filling.apply(command)
             case _ if isinstance(command, HistoryCommand):
                 with self.camera_paths.showing_change():
                     self.editing.go(command.n_steps)

@@ -19,7 +19,7 @@ from engine.editing.edit import Edit
 MAX_FILLED = 20_000
 """Gaussians of one fill: it is part of the document, where each takes some 25 bytes."""
 FILLED, GUESSED = "filled", "guessed"
-"""Roles of the Gaussians of fills, next to those of anchors: seen by some camera, and continued from what is round it."""
+"""Roles of the Gaussians of fills, next to those of anchors: seen by some camera, and continued from around."""
 _DAMAGED = "the Gaussians of its fill are damaged"
 _COUNT = np.dtype("<u4")
 

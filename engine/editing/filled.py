@@ -1,4 +1,4 @@
-"""The Gaussians of fills, as the edits above them leave them: still, the same at all times at which these edits hold."""
+"""The Gaussians of fills, as the edits above them leave them: the same at all times at which these edits hold."""
 
 from __future__ import annotations
 

@@ -6,10 +6,15 @@ floor goes on as a plane, exactly. Across a corner it goes smoothly from one pla
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
-from scipy import ndimage, sparse
+from scipy import sparse
 from scipy.sparse.linalg import spsolve
+
+from engine.filling.masks import labelled
+from engine.images.image_filters import dilate
 
 INPAINT_PX = 4.0
 """Colours come from this far away."""
@@ -29,9 +34,9 @@ def continued_depth(depth: np.ndarray, is_hole: np.ndarray) -> np.ndarray:
     is_known = (depth > 0) & np.isfinite(depth) & ~is_hole
     inverse = np.where(is_known, 1.0 / np.where(is_known, depth, 1.0), 0.0)
     number = np.full(depth.shape, -1, np.int64)
-    parts, n_parts = ndimage.label(is_hole)
+    parts, n_parts = labelled(is_hole)
     has_border = np.zeros(n_parts + 1, bool)
-    has_border[np.unique(parts[ndimage.binary_dilation(is_known) & is_hole])] = True
+    has_border[np.unique(parts[dilate(is_known, 1) & is_hole])] = True
     is_solved = is_hole & has_border[parts]
     n = int(is_solved.sum())
     out = np.full(depth.shape, np.nan)
@@ -51,7 +56,8 @@ def continued_depth(depth: np.ndarray, is_hole: np.ndarray) -> np.ndarray:
         columns.append(number[y, x][is_next])
     rows, columns = np.concatenate(rows), np.concatenate(columns)
     matrix = sparse.coo_matrix((-np.ones(len(rows)), (rows, columns)), (n, n)) + sparse.diags(diagonal)
-    found = np.atleast_1d(spsolve(matrix.tocsc(), right))
+    solved: Any = spsolve(matrix.tocsc(), right)
+    found = np.atleast_1d(solved)
     out[ys, xs] = np.where(found > 0, 1.0 / np.where(found > 0, found, 1.0), np.nan)
     return out
 

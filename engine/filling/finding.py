@@ -189,7 +189,8 @@ class _Search:
         return before.gaussians, is_gone, before.n_still
 
 
-def _looks(gaussians: Gaussians):
+def _looks(gaussians: Gaussians) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Centres, opacities and colours."""
     return gaussians.means, gaussians.opacities, gaussians.colors
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
+import cv2
 import numpy as np
 import torch
-from scipy import ndimage
 
 from engine.backends.backend import Backend
 from engine.editing.selection.seen_from import SeenFrom
+from engine.filling.masks import labelled
+from engine.images.image_filters import dilate
 from engine.model.host_array import host_array
 from engine.raster.gaussians import Gaussians
 from engine.raster.rasterize import rasterize
@@ -29,6 +32,9 @@ RING_PX = 3
 """Width of what counts as the surroundings of a hole."""
 SURROUNDED = 0.7
 """Share of its surroundings that show a surface: else it is a part of something that is dark, or was hardly trained."""
+
+_AROUND: Any = np.ones((3, 3), np.uint8)
+"""Depths are uncertain by a pixel where one thing ends before another."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,7 +138,7 @@ def seen_by_any(points: np.ndarray, pictures: Sequence[Taken]) -> np.ndarray:
     for one in pictures:
         rows, columns, depth = pixels_of(one.view, points)
         drawn = one.before
-        front = ndimage.maximum_filter(np.where(drawn.alpha < HALF, np.inf, drawn.depth), 3)[rows, columns]
+        front = cv2.dilate(np.where(drawn.alpha < HALF, np.float32(np.inf), drawn.depth), _AROUND)[rows, columns]
         found |= depth * (1.0 - DEPTH_TOLERANCE) <= front  # NaN compares as False
     return found
 
@@ -160,12 +166,13 @@ def _holes_of(one: Taken, is_always: np.ndarray, pictures: Sequence[Taken]) -> n
 
 def _surrounded(is_hole: np.ndarray, alpha: np.ndarray) -> np.ndarray:
     """Holes large enough, most of whose surroundings show a surface. [H, W] bool"""
-    parts, n = ndimage.label(is_hole, np.ones((3, 3)))
+    parts, n = labelled(is_hole)
     kept = np.zeros(n + 1, bool)
-    for number, place in enumerate(ndimage.find_objects(parts), start=1):
-        rows, columns = (slice(max(side.start - RING_PX, 0), side.stop + RING_PX) for side in place)
+    for number in range(1, n + 1):
+        ys, xs = (parts == number).nonzero()
+        rows, columns = (slice(max(int(v.min()) - RING_PX, 0), int(v.max()) + 1 + RING_PX) for v in (ys, xs))
         is_part = parts[rows, columns] == number
-        is_ring = ndimage.binary_dilation(is_part, iterations=RING_PX) & ~is_hole[rows, columns]
+        is_ring = dilate(is_part, RING_PX) & ~is_hole[rows, columns]
         is_large = is_part.sum() >= MIN_HOLE_PX and is_ring.any()
         kept[number] = is_large and (alpha[rows, columns][is_ring] >= COVERED).mean() >= SURROUNDED
     return kept[parts]

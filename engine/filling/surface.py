@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial import KDTree
 
 from engine.camera.rotations import quats_of
@@ -13,6 +12,7 @@ from engine.cloud.voxel import voxel_keys, voxel_means
 from engine.editing.fill import MAX_FILLED, FillGaussians
 from engine.filling.continuing import continued_colors, continued_depth
 from engine.filling.pictures import COVERED, DEPTH_TOLERANCE, Taken, pixels_of, points_at
+from engine.images.image_filters import dilate
 
 BEFORE_SURFACES = 0.06
 """A new point that lies by this share before a surface that a camera sees would hide it: it floats in the air."""
@@ -97,7 +97,7 @@ class _Points:
 
 def _continue(one: Taken, is_hole: np.ndarray, kept: _Points) -> None:
     after = one.after
-    is_hole = ndimage.binary_dilation(is_hole, iterations=RIM_PX)
+    is_hole = dilate(is_hole, RIM_PX)
     depth = continued_depth(np.where(after.alpha >= COVERED, after.depth, 0.0), is_hole)
     colors = continued_colors(after.image, is_hole)
     is_found = is_hole & np.isfinite(depth)
@@ -125,9 +125,9 @@ def _n_hiding(points: np.ndarray, pictures: Sequence[Taken], holes: Sequence[np.
     n = np.zeros(len(points), np.int64)
     for one, is_hole in zip(pictures, holes, strict=True):
         rows, columns, depth = pixels_of(one.view, points)
-        is_surface = (one.after.alpha >= COVERED) & ~ndimage.binary_dilation(is_hole, iterations=RIM_PX)
+        is_surface = (one.after.alpha >= COVERED) & ~dilate(is_hole, RIM_PX)
         surface = np.where(is_surface, one.after.depth, 0.0)
-        is_dark = (one.before.alpha < COVERED) & ~ndimage.binary_dilation(one.is_open, iterations=RIM_PX)
+        is_dark = (one.before.alpha < COVERED) & ~dilate(one.is_open, RIM_PX)
         surface = np.where(is_dark, np.inf, surface)[rows, columns]
         n += depth < surface * (1.0 - BEFORE_SURFACES)
     return n
@@ -139,7 +139,7 @@ def _seen_colors(points: np.ndarray, pictures: Sequence[Taken]) -> np.ndarray:
     for found, one in zip(colors, pictures, strict=True):
         rows, columns, depth = pixels_of(one.view, points)
         is_there = np.abs(one.before.depth[rows, columns] - depth) <= DEPTH_TOLERANCE * depth
-        is_other = (one.before.alpha >= COVERED) & ~ndimage.binary_dilation(one.is_open, iterations=RIM_PX)
+        is_other = (one.before.alpha >= COVERED) & ~dilate(one.is_open, RIM_PX)
         is_there &= is_other[rows, columns]
         found[is_there] = one.before.image[rows, columns][is_there]
     is_seen = np.isfinite(colors[..., 0]).any(0)
@@ -149,7 +149,9 @@ def _seen_colors(points: np.ndarray, pictures: Sequence[Taken]) -> np.ndarray:
     return out
 
 
-def _discs(means: np.ndarray, normals: np.ndarray, colors: np.ndarray, is_guess: np.ndarray, cell: float):
+def _discs(
+    means: np.ndarray, normals: np.ndarray, colors: np.ndarray, is_guess: np.ndarray, cell: float
+) -> FillGaussians:
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     third = np.where(lengths > 0, normals / np.where(lengths > 0, lengths, 1.0), (0.0, 0.0, 1.0))
     helper = np.where(np.abs(third[:, :1]) < 0.9, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))

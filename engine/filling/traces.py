@@ -61,9 +61,8 @@ class Swept:
         if not self._counts:
             return found
         ground = self._low + GROUND_SHARE * (self._high - self._low)
-        near = np.isfinite(means).all(1)
-        near[near] = (means[near] @ self.up > ground) & (means[near] @ self.up <= self._high)
-        rows = np.flatnonzero(near)
+        heights = np.where(np.isfinite(means).all(1), means @ self.up, -np.inf)
+        rows = np.flatnonzero((heights > ground) & (heights <= self._high))
         for row, cell in zip(rows, map(tuple, self._cells(means[rows]).tolist()), strict=True):
             count = self._counts.get(cell, 0)
             if count >= MIN_NOTED:

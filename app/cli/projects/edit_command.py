@@ -130,7 +130,7 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
     elif options.replace is not None:
         project.replace_edit(_replaced(options, project), on_note=_say)
     elif options.fill is not None:
-        fill_verb.run(options, project)
+        fill_verb.run(options, project, _say)
     elif options.put is not None:
         _put(options.put, project)
     elif options.apply_permanently:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import sys
+from collections.abc import Callable
 
 from app.scripting.scripted_project import ScriptedProject
 
@@ -15,8 +15,8 @@ def add_arguments(group: argparse._MutuallyExclusiveGroup) -> None:
     )
 
 
-def run(options: argparse.Namespace, project: ScriptedProject) -> None:
-    """Fill behind the edit, with progress and figures on standard error."""
+def run(options: argparse.Namespace, project: ScriptedProject, say: Callable[[str], None]) -> None:
+    """Fill behind the edit. say: Receives progress and figures, as lines."""
     shown = -1
 
     def tell(done: int, total: int) -> None:
@@ -24,13 +24,12 @@ def run(options: argparse.Namespace, project: ScriptedProject) -> None:
         percent = 100 * done // max(total, 1)
         if percent // 10 > shown:
             shown = percent // 10
-            print(f"Fill: {percent} %", file=sys.stderr)
+            say(f"{percent} %")
 
     found = project.fill(options.fill, tell)
     share = 100 * found.n_open / max(found.n_pixels, 1)
-    print(
-        f"Fill: {found.n_gaussians} Gaussians, {found.n_guessed} of them guessed; {found.n_traces} traces are taken "
+    say(
+        f"{found.n_gaussians} Gaussians, {found.n_guessed} of them guessed; {found.n_traces} traces are taken "
         f"away, too. {share:.1f} % of the pixels that showed it had nothing behind, {found.n_left} of {found.n_open} "
-        "still have nothing.",
-        file=sys.stderr,
+        "still have nothing."
     )

@@ -27,7 +27,8 @@ def test_what_stands_where_it_walks_is_a_trace():
 
 
 def test_what_stands_beside_its_way_is_none():
-    assert not is_trace((0.52, 0.35, 0.9)) and not is_trace((1.6, 0.05, 0.9))
+    assert not is_trace((0.52, 0.35, 0.9))
+    assert not is_trace((1.6, 0.05, 0.9))
 
 
 def test_the_ground_is_none():
