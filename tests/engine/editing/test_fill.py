@@ -91,7 +91,7 @@ def test_damaged_ones_are_refused_or_the_same(rng: np.random.Generator):
 
 def test_an_edit_with_a_damaged_fill_says_so():
     edit = structs.replace(filled_edit(), fill=Fill(fill_key(filled_edit()), (), b"nonsense"))
-    with pytest.raises(ProjectError, match="Gaussians of its fill are damaged. Remove its fill"):
+    with pytest.raises(ProjectError, match=r"Gaussians of its fill are damaged\. Remove its fill"):
         shown(edit)
 
 
