@@ -34,7 +34,6 @@ from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand, FillBehind, HistoryCommand
 from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Edits
-from app.session.editing.filling import Filling
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.mark_commands import MarkCommand
@@ -47,6 +46,7 @@ from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.export_commands import AskExport, ExportCommand
 from app.session.exporting import Exporting
 from app.session.files.file_commands import FileCommand
+from app.session.filling import Filling
 from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import ProjectMending

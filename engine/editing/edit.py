@@ -138,7 +138,7 @@ Target = TargetOfMoment | ObjectTarget
 
 
 class Fill(Struct, frozen=True, forbid_unknown_fields=True):
-    """What shows in the place of something that an edit takes away, see engine.editing.fill.
+    """What shows in the place of something that an edit takes away, see engine.editing.fills.fill.
 
     Attributes:
         made_for: `fill_key` of the edit when it was made; with another target or effect it does not fit any more.

@@ -22,7 +22,7 @@ from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, 
 from engine.editing.changed_gaussians import faded, recolored, transformed
 from engine.editing.clip_rows import ClipRows, NamedSet
 from engine.editing.effects import NO_EFFECTS, Effect, Effects
-from engine.editing.filled import filled_by
+from engine.editing.fills.filled import filled_by
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.over_time import Chosen, IndexedGaussians, held, smoothed
 from engine.editing.selecting import TargetFinder

@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from engine.editing.actions import Action
 from engine.editing.edit import Edit, ObjectTarget, Picked, TargetOfMoment, edits_at
-from engine.editing.fill import fits
+from engine.editing.fills.fill import fits
 from engine.editing.scene_object import Objects, at_moment, object_of
 
 
@@ -23,7 +23,7 @@ class Effect(Struct, frozen=True):
     """The effect of one edit where it holds. See Edit and Scope; its target is one of the moment, see `at_moment`.
 
     Attributes:
-        filled: Gaussians that appear after it, packed; see engine.editing.filled.
+        filled: Gaussians that appear after it, packed; see engine.editing.fills.filled.
     """
 
     target: TargetOfMoment

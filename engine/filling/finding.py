@@ -15,7 +15,7 @@ from engine.editing.actions import Delete, Hide
 from engine.editing.edit import Edit, Fill, PickedRows
 from engine.editing.edited_clip import EditedClip
 from engine.editing.effects import EditStack
-from engine.editing.fill import fill_key, packed_fill
+from engine.editing.fills.fill import fill_key, packed_fill
 from engine.editing.picks import pack_rows
 from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import ProjectError

@@ -38,7 +38,7 @@ _AROUND: Any = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drawn:
+class DepthPicture:
     """A picture of Gaussians.
 
     Attributes:
@@ -65,13 +65,13 @@ class Taken:
     """
 
     view: SeenFrom
-    before: Drawn
-    after: Drawn
+    before: DepthPicture
+    after: DepthPicture
     is_open: np.ndarray
     is_still: np.ndarray
 
 
-def draw(gaussians: Gaussians, view: SeenFrom, backend: Backend) -> Drawn:
+def draw(gaussians: Gaussians, view: SeenFrom, backend: Backend) -> DepthPicture:
     """Draw Gaussians over black."""
     found = rasterize(
         gaussians,
@@ -85,7 +85,7 @@ def draw(gaussians: Gaussians, view: SeenFrom, backend: Backend) -> Drawn:
     )
     depth = found.expected_depth
     assert depth is not None
-    return Drawn(host_array(found.image[0]), host_array(found.alpha[0, ..., 0]), host_array(depth[0, ..., 0]))
+    return DepthPicture(host_array(found.image[0]), host_array(found.alpha[0, ..., 0]), host_array(depth[0, ..., 0]))
 
 
 def taken_away(before: Gaussians, is_gone: np.ndarray, n_still: int, view: SeenFrom, backend: Backend) -> Taken:

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from engine.camera.rotations import quats_of
 from engine.cloud.voxel import voxel_keys, voxel_means
-from engine.editing.fill import MAX_FILLED, FillGaussians
+from engine.editing.fills.fill import MAX_FILLED, FillGaussians
 from engine.filling.continuing import continued_colors, continued_depth
 from engine.filling.pictures import COVERED, DEPTH_TOLERANCE, Taken, pixels_of, points_at
 from engine.images.image_filters import dilate

@@ -1,8 +1,8 @@
 """Traces of something that moves in what stands still.
 
 A place through which a person walks is empty: whatever stands still there is a trace of the time when the person stood
-still, which training took for a part of the room. Traces have the colours of what left them; the ground, on which it
-stands, is no trace.
+still, which training took for a part of the room. Traces have the colours of what left them, and
+lie above the ground on which it stands.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from engine.editing.edit import Edit
-from engine.editing.fill import fits, unpacked_fill
+from engine.editing.fills.fill import fits, unpacked_fill
 from engine.editing.picks import n_rows
 
 

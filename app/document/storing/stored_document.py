@@ -14,7 +14,7 @@ from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings, check_bounds
 from engine.capture.exclusions import Exclusions
 from engine.editing.edit import Edit, Picked, PickedRows
-from engine.editing.fill import unpacked_fill
+from engine.editing.fills.fill import unpacked_fill
 from engine.editing.picks import unpack_rows
 from engine.editing.scene_object import NO_OBJECTS, Objects, SceneObject
 from engine.errors import ProjectError

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from app.playback.modes.view_modes import ALL
 from engine.capture.clip import Clip
-from engine.editing.fill import FILLED, GUESSED
+from engine.editing.fills.fill import FILLED, GUESSED
 from engine.editing.gaussian_rows import GaussianRows
 
 if TYPE_CHECKING:

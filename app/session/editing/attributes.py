@@ -10,7 +10,7 @@ import numpy as np
 from app.playback.modes.arrays import GaussianArrays
 from app.playback.modes.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE
 from engine.clip_files.roles import STATIC
-from engine.editing.fill import FILLED, GUESSED
+from engine.editing.fills.fill import FILLED, GUESSED
 
 
 @dataclass(frozen=True, slots=True)

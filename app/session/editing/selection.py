@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.editing.edit import Picked, PickedRows
-from engine.editing.fill import FILLED, GUESSED
+from engine.editing.fills.fill import FILLED, GUESSED
 from engine.editing.gaussian_rows import GaussianRows, RowSet
 from engine.editing.picks import pack_rows, unpack_rows
 

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from engine.editing.edit import Edit, Picked, PickedRows
-from engine.editing.fill import fill_key, fits
+from engine.editing.fills.fill import fill_key, fits
 from engine.editing.picks import pack_rows, unpack_rows
 
 

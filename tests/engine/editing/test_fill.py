@@ -11,7 +11,16 @@ from engine.clip_files.roles import STATIC
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Transform
 from engine.editing.edit import Box, Edit, Everything, Fill, Picked, PickedRows, Scope, Sphere, Target
 from engine.editing.effects import EditStack
-from engine.editing.fill import FILLED, GUESSED, MAX_FILLED, FillGaussians, fill_key, fits, packed_fill, unpacked_fill
+from engine.editing.fills.fill import (
+    FILLED,
+    GUESSED,
+    MAX_FILLED,
+    FillGaussians,
+    fill_key,
+    fits,
+    packed_fill,
+    unpacked_fill,
+)
 from engine.editing.permanent.deleted_anchors import deleted_anchors
 from engine.editing.permanent.renumbering import Renumbered, with_new_numbers
 from engine.editing.picks import pack_rows, unpack_rows

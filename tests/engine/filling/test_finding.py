@@ -9,7 +9,7 @@ from engine.backends.table import backend_called
 from engine.editing.actions import Delete, Expose
 from engine.editing.edit import Edit, Scope, Sphere
 from engine.editing.effects import EditStack
-from engine.editing.fill import fill_key, unpacked_fill
+from engine.editing.fills.fill import fill_key, unpacked_fill
 from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import ProjectError
 from engine.filling.finding import FilledClip, find_fill

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from engine.editing.fill import FillGaussians
+from engine.editing.fills.fill import FillGaussians
 from engine.editing.selection.seen_from import SeenFrom
 from engine.filling.continuing import continued_colors, continued_depth
-from engine.filling.pictures import Drawn, Taken, holes_of, pixels_of, points_at
+from engine.filling.pictures import DepthPicture, Taken, holes_of, pixels_of, points_at
 from engine.filling.surface import surface_behind
 
 WIDTH, HEIGHT = 64, 48
@@ -41,8 +41,8 @@ def taken(x: float, is_hole: np.ndarray) -> Taken:
     depth = plane_depth(view)
     image = np.tile(color, (HEIGHT, WIDTH, 1))
     ones = np.ones((HEIGHT, WIDTH))
-    before = Drawn(np.where(is_hole[..., None], 0.5, image), ones, np.where(is_hole, 1.0, depth))
-    after = Drawn(np.where(is_hole[..., None], 0.0, image), ones * ~is_hole, np.where(is_hole, 0.0, depth))
+    before = DepthPicture(np.where(is_hole[..., None], 0.5, image), ones, np.where(is_hole, 1.0, depth))
+    after = DepthPicture(np.where(is_hole[..., None], 0.0, image), ones * ~is_hole, np.where(is_hole, 0.0, depth))
     return Taken(view, before, after, is_hole, is_hole)
 
 
@@ -113,7 +113,7 @@ def test_they_have_its_colors_and_are_a_guess(filled: FillGaussians):
 def test_a_surface_that_another_camera_sees_is_no_hole():
     is_hole = hole()
     whole = taken(0.0, is_hole)
-    behind = Drawn(whole.after.image, np.ones((HEIGHT, WIDTH)), plane_depth(whole.view))
+    behind = DepthPicture(whole.after.image, np.ones((HEIGHT, WIDTH)), plane_depth(whole.view))
     sees_it = Taken(camera(0.0), behind, behind, np.zeros_like(is_hole), np.zeros_like(is_hole))
     asked = Taken(whole.view, whole.before, behind, is_hole, is_hole)
     assert not holes_of([asked, sees_it])[0].any()
@@ -123,7 +123,7 @@ def test_a_surface_that_another_camera_sees_is_no_hole():
 def test_a_hole_that_would_float_before_a_wall_is_not_filled():
     is_hole = hole()
     one = taken(0.0, is_hole)
-    far = Drawn(one.after.image, np.ones((HEIGHT, WIDTH)), np.full((HEIGHT, WIDTH), 9.0))
+    far = DepthPicture(one.after.image, np.ones((HEIGHT, WIDTH)), np.full((HEIGHT, WIDTH), 9.0))
     others = [Taken(camera(x), far, far, np.zeros_like(is_hole), np.zeros_like(is_hole)) for x in (0.0, 0.01)]
     nothing = [np.zeros_like(is_hole)] * 2
     assert len(surface_behind([one, *others], [is_hole, *nothing], 0.06)) == 0
@@ -132,5 +132,5 @@ def test_a_hole_that_would_float_before_a_wall_is_not_filled():
 def test_a_dark_doorway_stays_dark():
     is_hole = hole()
     one = taken(0.0, is_hole)
-    dark = Drawn(one.after.image, np.full((HEIGHT, WIDTH), 0.4), one.after.depth)
+    dark = DepthPicture(one.after.image, np.full((HEIGHT, WIDTH), 0.4), one.after.depth)
     assert not holes_of([Taken(one.view, one.before, dark, is_hole, is_hole)])[0].any()

@@ -18,7 +18,7 @@ from app.session.part import SessionPart
 from engine.editing.actions import Delete, Hide
 from engine.editing.edit import Edit
 from engine.editing.effects import EditStack
-from engine.editing.fill import fill_key
+from engine.editing.fills.fill import fill_key
 from engine.errors import EngineError, ProjectError
 
 Fills = Callable[[OpenedProject, EditStack, int, Callable[[int, int], None]], Edit]

@@ -12,7 +12,7 @@ from engine.editing.actions import Delete, Expose, Hide, Recolor, Transform
 from engine.editing.changed_gaussians import faded, recolored, transformed
 from engine.editing.edit import Picked
 from engine.editing.effects import Effect, Effects
-from engine.editing.fill import FILLED, GUESSED, unpacked_fill
+from engine.editing.fills.fill import FILLED, GUESSED, unpacked_fill
 from engine.editing.gaussian_rows import GaussianRows, RowSet
 from engine.editing.selecting import is_within
 from engine.errors import ProjectError

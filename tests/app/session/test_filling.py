@@ -8,7 +8,7 @@ from msgspec import structs
 from app.session.editing.edit_commands import AddEdit, ChangeEdit, FillBehind, Redo, Undo
 from engine.editing.actions import Delete, Expose
 from engine.editing.edit import Box, Fill
-from engine.editing.fill import fill_key
+from engine.editing.fills.fill import fill_key
 from engine.errors import ProjectError
 from tests.app.conftest import poll_until
 
