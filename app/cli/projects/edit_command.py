@@ -192,7 +192,7 @@ def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict
         "schema": EDIT_SCHEMA,
         "path": str(project.folder),
         "edits": [
-            to_builtins(edit)
+            _plain(edit)
             | {
                 "title": edit_title(edit, project.document.objects),
                 "acts": reaches[edit.edit_id].acts,
@@ -206,6 +206,14 @@ def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict
     if has_steps:
         found |= {"past": [step.name for step in history.past], "future": [step.name for step in history.future]}
     return found
+
+
+def _plain(edit: Edit) -> dict[str, Any]:
+    """An edit as plain data; few have a fill."""
+    plain = to_builtins(edit)
+    if edit.fill is None:
+        del plain["fill"]
+    return plain
 
 
 def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str]:
