@@ -53,8 +53,7 @@ def deletes_something(clip: EditedClip, edits: tuple[Edit, ...], edit: Edit) -> 
             continue
         without = EditStack(before).at(frame)
         then = Effects.made((*without.all, *EditStack((edit,)).at(frame).all))
-        clip_time = clip.clip.clip_time(frame)
-        if len(clip.decode(clip_time, without).rows) != len(clip.decode(clip_time, then).rows):
+        if (_flags(clip, frame, without) != _flags(clip, frame, then)).any():
             return True
     return False
 

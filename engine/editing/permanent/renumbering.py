@@ -9,6 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from engine.editing.edit import Edit, Picked, PickedRows
+from engine.editing.fills.fill import fill_key, fits
 from engine.editing.picks import pack_rows, unpack_rows
 
 
@@ -48,14 +49,24 @@ def with_new_numbers(edits: tuple[Edit, ...], sets: Mapping[tuple[str, str], Ren
 
 
 def _renumbered(edit: Edit, sets: Mapping[tuple[str, str], Renumbered]) -> Edit:
-    if not isinstance(edit.target, Picked):
-        return edit
-    known = {(one.origin, one.role) for one in edit.target.sets}
+    now, fill = edit, edit.fill
+    if isinstance(edit.target, Picked):
+        added = _added(edit.target.sets, sets)
+        now = replace(edit, target=Picked((*edit.target.sets, *added))) if added else edit
+    if fill is None or not fits(edit):
+        return now
+    traces = (*fill.traces, *_added(fill.traces, sets))
+    return replace(now, fill=replace(fill, made_for=fill_key(now), traces=traces))
+
+
+def _added(picked: tuple[PickedRows, ...], sets: Mapping[tuple[str, str], Renumbered]) -> list[PickedRows]:
+    """The same picks in sets that have other numbers now."""
+    known = {(one.origin, one.role) for one in picked}
     added: list[PickedRows] = []
-    for one in edit.target.sets:
+    for one in picked:
         now = sets.get((one.origin, one.role))
         if now is not None and (now.origin, one.role) not in known:
             added.append(
                 PickedRows(one.clip_index, now.origin, one.role, pack_rows(now.numbers(unpack_rows(one.rows))))
             )
-    return replace(edit, target=Picked((*edit.target.sets, *added))) if added else edit
+    return added

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
+from msgspec import structs
 from pyglet.window import key, mouse
 
 from app.session.clips.clip_commands import ApplyDeletions
@@ -12,6 +13,7 @@ from app.session.edit_status import EditsStatus, HistoryStatus
 from app.session.editing.edit_commands import (
     AddEdit,
     ChangeEdit,
+    FillBehind,
     GoToStep,
     MoveMarker,
     PutMarker,
@@ -25,7 +27,8 @@ from app.session.editing.edit_commands import (
 from app.session.editing.mark_commands import MarkBox, MarkRegion
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.actions import Delete, Expose, Hide, Smooth
-from engine.editing.edit import Box, Scope, Sphere
+from engine.editing.edit import Box, Fill, Scope, Sphere
+from engine.editing.fills.fill import fill_key
 from engine.editing.gaussian_rows import RowSet
 from engine.editing.reach import ClipAnchors
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -300,3 +303,25 @@ def test_without_a_capture_both_panels_say_so(open_pilot) -> None:
         pilot.draw(3)
     assert pilot.session.edits == EditsStatus(why_not="Open a capture first.")
     assert len(pilot.session.notices) == 0
+
+
+def test_what_takes_something_away_is_filled_behind(panel: Pilot) -> None:
+    ui = panel.studio.frame.ui
+    ui.selecting.kind, ui.selecting.volume = "box", BOX
+    panel.draw(3)
+    panel.click("edits.make delete")
+    panel.draw(3)
+    panel.click("edits.fill")
+    assert panel.sent(FillBehind) == [FillBehind(1)]
+    assert "edits.remove_fill" not in panel.rects
+    edit = panel.session.edits.edits[0]
+    panel.session.dispatch(ChangeEdit(structs.replace(edit, fill=Fill(fill_key(edit)))))
+    panel.draw(3)
+    panel.click("edits.remove_fill")
+    assert panel.session.edits.edits == (edit,)
+
+
+def test_only_what_takes_something_away_has_a_fill(panel: Pilot) -> None:
+    panel.click("edits.make expose")
+    panel.draw(3)
+    assert "edits.fill" not in panel.rects

@@ -9,12 +9,13 @@ from imgui_bundle import imgui
 from msgspec import structs
 
 from app.document.changes.edit_words import edit_title, scope_text, target_text
+from app.document.changes.fill_words import fill_text
 from app.document.changes.reach_words import reach_note
-from app.session.editing.edit_commands import ChangeEdit, RenameEdit
+from app.session.editing.edit_commands import ChangeEdit, FillBehind, RenameEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_of, chosen_scope, extent_text
 from app.session.session_view import SessionView
 from engine.camera.rotations import quats_of_turns, turns_of_quats
-from engine.editing.actions import Action, Quat, Transform, Vector
+from engine.editing.actions import Action, Delete, Hide, Quat, Transform, Vector
 from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Scope, Sphere, Target
 from engine.setting import Setting, settings_of
 from engine.text import one_line
@@ -51,6 +52,26 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
     action = _draw_action(session, ui, edit.action)
     if action is not None:
         dispatch(ChangeEdit(structs.replace(edit, action=action), ui.editing.gesture, "change"))
+    if isinstance(edit.action, Delete | Hide):
+        _draw_fill(session, dispatch, ui, edit)
+
+
+def _draw_fill(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
+    """The fill of an edit that takes something away: its figures, and the way to make it or to remove it."""
+    imgui.begin_disabled(not session.edits.can_edit)
+    if imgui.button("Fill behind"):
+        dispatch(FillBehind(edit.edit_id))
+    imgui.end_disabled()
+    ui.mark("edits.fill")
+    imgui.set_item_tooltip("Continue the room behind it where no camera saw it, and take traces of it away")
+    if edit.fill is None:
+        return
+    imgui.same_line()
+    if imgui.button("Remove fill"):
+        dispatch(ChangeEdit(structs.replace(edit, fill=None), verb="remove fill"))
+    ui.mark("edits.remove_fill")
+    text = fill_text(edit)
+    text_wrapped_dim(f"{text[0].upper()}{text[1:]}. The view mode Birth clip shows where.")
 
 
 def _draw_name(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
