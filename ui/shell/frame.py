@@ -25,10 +25,9 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.camera_path import draw_paths
 from ui.panels.capture import CapturePanel
 from ui.panels.doctor.panel import DoctorPanel
-from ui.panels.editing.edits_panel import draw_edits
 from ui.panels.editing.history_panel import HistoryPanel
 from ui.panels.editing.mend_panel import draw_mending
-from ui.panels.editing.selecting.select_panel import draw_selection
+from ui.panels.editing.panel.edit_panel import draw_edit
 from ui.panels.exports import draw_exports
 from ui.panels.guard import Guard, draw_failed
 from ui.panels.log import LogPanel
@@ -37,20 +36,17 @@ from ui.panels.panel_keys import step_panel
 from ui.panels.picture.heat_overlay import HeatOverlay
 from ui.panels.picture.picture_pane import PicturePane
 from ui.panels.picture.viewport import ViewportPanel
-from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
-    EDITS,
+    EDIT,
     EXPORTS,
     HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
-    REGIONS,
     RESIDUALS,
-    SELECTION,
     TIMELINE,
     TRAINING,
     VIEWPORT,
@@ -177,9 +173,7 @@ class Frame:
         self._panels: tuple[tuple[str, Callable[[WindowSession, Dispatch, UiState], None], bool], ...] = (
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
-            (REGIONS, draw_regions, True),
-            (SELECTION, draw_selection, True),
-            (EDITS, draw_edits, True),
+            (EDIT, draw_edit, True),
             (RESIDUALS, self.residuals.draw, True),
             (PATHS, draw_paths, True),
             (TIMELINE, draw_timeline, True),

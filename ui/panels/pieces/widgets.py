@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -139,6 +139,17 @@ def box_flags(width: float) -> int:
     """Of a box of choices in a row of them: all choices at once, and no arrow where its word needs the room."""
     flags = int(imgui.ComboFlags_.height_largest)
     return flags if width >= LEAST_WITH_ARROW else flags | int(imgui.ComboFlags_.no_arrow_button)
+
+
+ROW_GAP = 4.0
+"""Between buttons that fill a row, units."""
+
+
+def row_widths(labels: Sequence[str]) -> list[float]:
+    """Of buttons that fill a row, units: each as wide as its words need, and an equal part of the rest."""
+    words = [imgui.calc_text_size(label).x for label in labels]
+    rest = imgui.get_content_region_avail().x - ROW_GAP * (len(labels) - 1) - sum(words)
+    return [width + rest / len(labels) for width in words]
 
 
 def segment(label: str, is_on: bool, width: float = 0.0) -> bool:

@@ -12,15 +12,13 @@ from imgui_bundle import ImVec2, imgui
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
-    EDITS,
+    EDIT,
     EXPORTS,
     HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
-    REGIONS,
     RESIDUALS,
-    SELECTION,
     TIMELINE,
     TRAINING,
     VIEWPORT,
@@ -30,9 +28,7 @@ SIDE = (236.0, 0.0)
 SMALLEST = {
     CAPTURE: (176.0, 0.0),
     TRAINING: SIDE,
-    REGIONS: SIDE,
-    SELECTION: SIDE,
-    EDITS: SIDE,
+    EDIT: SIDE,
     RESIDUALS: SIDE,
     PATHS: (176.0, 0.0),
     TIMELINE: (0.0, 140.0),
@@ -46,7 +42,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture and camera path left, training, regions and residuals right, the others below, the picture in the rest.
+    """Capture and camera path left, training, editing and residuals right, the others below, the picture in the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -70,9 +66,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
         (PATHS, left),
         (CAPTURE, left),
         (TRAINING, right),
-        (REGIONS, right),
-        (SELECTION, right),
-        (EDITS, right),
+        (EDIT, right),
         (RESIDUALS, right),
         (TIMELINE, bottom),
         (LOG, bottom),
