@@ -48,7 +48,7 @@ EXAMPLE = {
         "                    left = faded(shapes.opacities, is_chosen, effect.action)\n"
         "                    shapes = replace(shapes, opacities=left)\n" + CASE,
     },
-    "ui/panels/editing/making.py": {
+    "ui/panels/editing/panel/making.py": {
         "import Action, Delete, Expose,": "import Action, Delete, Expose, Fade,",
         "    DELETE,\n": "    DELETE,\n    _making(Fade, lambda *where: Fade(0.5)),\n",
     },

@@ -32,6 +32,8 @@ RESIDUALS, LOG, DOCTOR = "Residuals", "Log", "Capture doctor"
 PATHS, EXPORTS, HISTORY = "Camera path", "Exports", "History"
 PANELS = (CAPTURE, TRAINING, EDIT, RESIDUALS, PATHS, HISTORY, TIMELINE, LOG, DOCTOR, EXPORTS)
 """Titles of the panels around the picture."""
+DRAWER = (LOG, DOCTOR, EXPORTS, HISTORY)
+"""Titles of panels that share a drawer between picture and timeline, and are there once they are asked for."""
 EDIT_SECTIONS = {
     "selection": "Selection",
     "options": "Selection options",
@@ -103,6 +105,7 @@ class UiState:
         is_view_popup_wanted: Open the popup of lens, axes and bookmarks.
         last_heat: The heat map that was shown last, to be shown again; empty before the first.
         wanted_panel: Title of a panel that is to come to the front, or None.
+        open_drawer: Titles of the panels of the drawer that are open.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
 
@@ -125,6 +128,7 @@ class UiState:
     timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""
     wanted_panel: str | None = None
+    open_drawer: set[str] = field(default_factory=set)
     is_quality_open: bool = False
     is_quality_seen: bool = False
     is_picture_only: bool = False

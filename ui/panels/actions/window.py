@@ -124,6 +124,11 @@ def _show_panel(title: str) -> Run:
     return show
 
 
+def _close_drawer(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    ui.open_drawer.clear()
+    ui.redraw_within(0.0)
+
+
 def _show_section(name: str) -> Run:
     def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.is_picture_only = False
@@ -188,6 +193,14 @@ ACTIONS = (
     *(
         Action(f"window.panel.{name}", f"Show in the panel Edit: {title}", WINDOW, _show_section(name), **_PANELS)
         for name, title in EDIT_SECTIONS.items()
+    ),
+    Action(
+        "window.close_drawer",
+        "Close Log, Capture doctor, Exports and History",
+        WINDOW,
+        _close_drawer,
+        keys=("Ctrl+W",),
+        **_PANELS,
     ),
     Action(
         "window.picture_only",
