@@ -129,7 +129,7 @@ class Icon:
 
 TOOL_ICONS: dict[str, str] = {
     "rectangle": "\uf5cb",
-    "lasso": "\uf5ee",
+    "lasso": "\uf5b7",
     "brush": "\uf1fc",
     "box": "\uf1b2",
     "sphere": "\uf111",

@@ -152,13 +152,13 @@ def row_widths(labels: Sequence[str]) -> list[float]:
     return [width + rest / len(labels) for width in words]
 
 
-def segment(label: str, is_on: bool, width: float = 0.0) -> bool:
-    """One of several buttons side by side, of which some are on. width: Units; that of its words when 0."""
+def segment(label: str, is_on: bool, width: float = 0.0, height: float = 0.0) -> bool:
+    """One of several buttons side by side, of which some are on. width, height: Units; those of its words when 0."""
     if is_on:
         imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
         imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY))
         imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
-    is_clicked = imgui.button(f"{label}##segment", ImVec2(width, 0))
+    is_clicked = imgui.button(f"{label}##segment", ImVec2(width, height))
     if is_on:
         imgui.pop_style_color(3)
     return is_clicked

@@ -39,7 +39,7 @@ SMALLEST = {
     TIMELINE: (0.0, 116.0),
 }
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
-SMALLEST_PICTURE = (300.0, 150.0)
+SMALLEST_PICTURE = (336.0, 150.0)
 TALL_TIMELINE = 0.4
 """Share of the height that the timeline has in the layout for long captures."""
 WIDE_UNITS = 1240.0
