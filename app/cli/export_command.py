@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     opened = open_trained(open_project(options.project, is_writable=False))
     job = job_of(options, opened)
     line = ProgressLine(is_quiet=options.quiet)
-    if said := edits_line(opened.project.document.edits, has_edits=job.applies_edits):
+    if said := edits_line(opened.project.document, has_edits=job.applies_edits):
         line.say(said)
     work = job.load()
     said_before = work.estimate(opened, job).lines

@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     opened = open_trained(open_project(options.project, is_writable=False))
     job = job_of(options, opened)
     line = ProgressLine(is_quiet=options.quiet)
-    if said := edits_line(opened.project.document.edits, has_edits=job.has_edits):
+    if said := edits_line(opened.project.document, has_edits=job.has_edits):
         line.say(said)
     written = render_video(job, opened, lambda progress: line.update(progress.stage, progress.done, progress.message))
     for note in written.notes:

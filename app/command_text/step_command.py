@@ -14,7 +14,18 @@ from app.document.changes import edit_changes
 from app.document.project_document import ProjectDocument
 from app.document.storing.stored_document import plain_document
 from engine.editing.actions import Action
-from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
+from engine.editing.edit import (
+    EVERYWHERE,
+    Box,
+    Edit,
+    Everything,
+    ObjectTarget,
+    Picked,
+    PickedRows,
+    Scope,
+    Sphere,
+    Target,
+)
 from engine.storage.json_files import json_text
 
 
@@ -148,7 +159,7 @@ def _target_arguments(target: Target, *, in_full: bool) -> tuple[tuple[str, ...]
             return ("--turned-box", *_numbers((*center, *half_sizes, *quat))), ""
         case Sphere(center=center, radius=radius):
             return ("--sphere", *_numbers((*center, radius))), ""
-        case Picked():
+        case Picked() | ObjectTarget():
             return ("--target", "-"), json_text(to_builtins(target))
 
 

@@ -13,6 +13,8 @@ from engine.camera.camera_path import CameraPath
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.actions import Vector
 from engine.editing.edit import Edit
+from engine.editing.effects import EditStack
+from engine.editing.scene_object import NO_OBJECTS, Objects
 from engine.gate.regions import GateRegion
 
 MAX_TEXT_CHARACTERS = 200
@@ -78,6 +80,7 @@ class ProjectDocument:
         labels: The user's own names.
         exclusions: Cameras, pictures and painted parts that training never sees.
         world: Up and scale.
+        objects: People and things that were given a name, in the user's order.
     """
 
     settings: ProjectSettings
@@ -88,3 +91,8 @@ class ProjectDocument:
     labels: tuple[Label, ...] = ()
     exclusions: Exclusions = NOTHING_EXCLUDED
     world: World = AS_CAPTURED
+    objects: Objects = NO_OBJECTS
+
+    def stack(self) -> EditStack:
+        """Its edits, to be asked moment by moment."""
+        return EditStack(self.edits, self.objects)

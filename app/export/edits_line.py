@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from app.document.changes.edit_words import edit_title
-from engine.editing.edit import Edit
+from app.document.project_document import ProjectDocument
 from engine.text import one_line
 
 MAX_TITLES = 3
 
 
-def edits_line(edits: Sequence[Edit], *, has_edits: bool = True) -> str:
+def edits_line(document: ProjectDocument, *, has_edits: bool = True) -> str:
     """How many edits an export includes, and which: "2 edits are included: delete box 1 × 1 × 1, red".
     Empty where none is on, or the export leaves them out.
 
     Args:
-        edits: All of the project.
+        document: Of the project.
         has_edits: Whether the export applies them.
     """
-    titles = [one_line(edit_title(edit)) for edit in edits if edit.is_on]
+    titles = [one_line(edit_title(edit, document.objects)) for edit in document.edits if edit.is_on]
     if not titles or not has_edits:
         return ""
     more = [f"{len(titles) - MAX_TITLES} more"] if len(titles) > MAX_TITLES else []

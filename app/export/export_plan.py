@@ -69,7 +69,7 @@ def plan_export(
             job = answers.make_job()
             found = job.load().estimate(opened, job)
             n_files, n_bytes, lines = found.n_files, found.n_bytes, found.lines
-            if said := edits_line(opened.project.document.edits, has_edits=job.applies_edits):
+            if said := edits_line(opened.project.document, has_edits=job.applies_edits):
                 lines = (said, *lines)
             _check_place(answers, opened, n_bytes)
             _check_name(answers)

@@ -12,7 +12,6 @@ from app.evaluation.headless import TrainedProject
 from app.playback.modes.contents import part_of
 from engine.capture.clip import Clip
 from engine.capture.files.frame_runs import runs_of
-from engine.editing.edit import Edit
 from engine.editing.effects import EditStack, Effects
 from engine.errors import ProjectError
 
@@ -52,7 +51,7 @@ class SceneFrames:
         opened: A project opened for reading.
         n_threads: Threads to decode with; None for all.
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
-        edits: Edits to apply; None for the edits of the project, empty for the scene as it was trained.
+        edits: Edits to apply; None for the edits of the project, an empty stack for the scene as it was trained.
     """
 
     def __init__(
@@ -61,10 +60,10 @@ class SceneFrames:
         *,
         n_threads: int | None = None,
         features: Features = "both",
-        edits: tuple[Edit, ...] | None = None,
+        edits: EditStack | None = None,
     ) -> None:
         self.opened = opened
-        self._edits = EditStack(opened.project.document.edits if edits is None else edits)
+        self._edits = opened.project.document.stack() if edits is None else edits
         self._n_threads = n_threads
         self._features: Features = features
         self._clip_of = [clip for clip in opened.clips for _ in clip.frame_indices()]

@@ -313,9 +313,10 @@ class Playback:
 
     def _edits(self) -> EditStack:
         """Those of the document as it is now; frames that a change of them leaves alone stay as they are."""
-        edits = () if self._opened is None else self._opened.project.document.edits
-        if edits is not self._stack.edits:
-            self._stack = EditStack(edits)
+        document = None if self._opened is None else self._opened.project.document
+        edits, objects = ((), ()) if document is None else (document.edits, document.objects)
+        if edits is not self._stack.edits or objects is not self._stack.objects:
+            self._stack = EditStack(edits, objects)
         return self._stack
 
     def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:

@@ -246,7 +246,7 @@ class ScriptedProject:
         target = Everything() if target is None else target
         command = AddEdit(chosen, target, scope, is_inverted=is_inverted != inverts, name=name)
         made = changed(self.document, command).document.edits[-1]
-        reach = reach_of_edit(made, self._anchors())
+        reach = reach_of_edit(made, self._anchors(), self.document.objects)
         check_acts(reach, scope)
         self._tell(reach_note(reach, scope), on_note)
         self._carry_out(command)
@@ -254,14 +254,14 @@ class ScriptedProject:
 
     def replace_edit(self, edit: Edit, *, on_note: TellNote | None = None) -> None:
         """Put an edit in the place of the one with its number. on_note: See `apply_edit`. Raises ProjectError."""
-        self._tell(reach_note(reach_of_edit(edit, self._anchors()), edit.scope), on_note)
+        self._tell(reach_note(reach_of_edit(edit, self._anchors(), self.document.objects), edit.scope), on_note)
         self._carry_out(ChangeEdit(edit))
 
     @property
     def reaches(self) -> dict[int, Reach]:
         """In which frames each edit of the stack acts, by its number."""
         anchors = self._anchors()
-        return {edit.edit_id: reach_of_edit(edit, anchors) for edit in self.edits}
+        return {edit.edit_id: reach_of_edit(edit, anchors, self.document.objects) for edit in self.edits}
 
     def _anchors(self) -> tuple[ClipAnchors, ...]:
         """Which anchors each clip has; none while the capture cannot be opened, which is nothing to an edit."""
@@ -322,7 +322,7 @@ class ScriptedProject:
 
         self._check_open()
         opened = self.open_trained()
-        return select(opened, self.edits, frame_index, volume=volume, where=where, is_inverted=is_inverted)
+        return select(opened, self.document.stack(), frame_index, volume=volume, where=where, is_inverted=is_inverted)
 
     def apply_permanently(self, on_progress: Callable[[int, int], None] | None = None) -> tuple[int, ...]:
         """Take deleted anchors out of the clips for good; earlier clips become versions.

@@ -14,7 +14,7 @@ from app.session.editing.finding import Ground, found_by, selection_after
 from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.editing.selection_commands import How, SelectAll, SelectByAttribute, SelectionCommand, SelectVolume
 from engine.backends.table import process_backend
-from engine.editing.edit import Box, Edit, Picked, Sphere
+from engine.editing.edit import Box, Picked, Sphere
 from engine.editing.effects import EditStack
 from engine.errors import ProjectError
 from engine.text import shown
@@ -29,7 +29,7 @@ _MEASURED = tuple(name for name, attribute in ATTRIBUTES.items() if attribute.co
 
 def select(
     opened: TrainedProject,
-    edits: tuple[Edit, ...],
+    edits: EditStack,
     frame_index: int,
     *,
     volume: Box | Sphere | None = None,
@@ -50,7 +50,7 @@ def select(
         generation=0,
         reference_path=None if header.reference_fingerprint is None else project.reference_path,
         clip=clip,
-        effects=EditStack(edits).at(frame_index),
+        effects=edits.at(frame_index),
     )
     loaded = ClipFiles().read(request, process_backend())
     gaussians = decode_frame(loaded, request).gaussians

@@ -10,6 +10,7 @@ from engine.camera.camera_path import CameraKey, CameraPath
 from engine.editing.edit import Edit
 from engine.editing.lost_picks import LostPicks
 from engine.editing.reach import UNKNOWN, ClipAnchors, Reach
+from engine.editing.scene_object import NO_OBJECTS, Objects, SceneObject
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,7 @@ class EditsStatus:
         edits: The stack, bottom first.
         labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
         world: Up and scale.
+        objects: Those that have a name, in the user's order.
         lost: Those that have lost their picks because a clip was trained anew.
         clips: Which anchors each clip has; none while that is not known.
         reaches: Where each edit acts, by its number.
@@ -46,6 +48,7 @@ class EditsStatus:
     edits: tuple[Edit, ...] = ()
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     world: World = AS_CAPTURED
+    objects: Objects = NO_OBJECTS
     lost: tuple[LostPicks, ...] = ()
     clips: tuple[ClipAnchors, ...] = ()
     reaches: Mapping[int, Reach] = field(default_factory=dict)
@@ -55,6 +58,10 @@ class EditsStatus:
     def edit(self, edit_id: int | None) -> Edit | None:
         """The edit of that number; None without one."""
         return next((edit for edit in self.edits if edit.edit_id == edit_id), None)
+
+    def object(self, object_id: int | None) -> SceneObject | None:
+        """The object of that number; None without one."""
+        return next((one for one in self.objects if one.object_id == object_id), None)
 
     def reach(self, edit_id: int) -> Reach:
         """Where an edit acts; one that knows nothing where that is not known."""

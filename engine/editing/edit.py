@@ -120,7 +120,19 @@ class Picked(Struct, frozen=True, forbid_unknown_fields=True, tag="picked"):
     sets: tuple[PickedRows, ...]
 
 
-Target = Everything | Box | Sphere | Picked
+class ObjectTarget(Struct, frozen=True, forbid_unknown_fields=True, tag="object"):
+    """A named object, see engine.editing.scene_object: what it consists of is known in each clip.
+
+    Attributes:
+        object_id: Of the object in the same document; one that was removed stands for nothing.
+    """
+
+    object_id: _Count
+
+
+TargetOfMoment = Everything | Box | Sphere | Picked
+"""Those that can be looked up in one clip at one moment; see engine.editing.scene_object.at_moment."""
+Target = TargetOfMoment | ObjectTarget
 
 # ---------------------------------------------------------------- the edit
 

@@ -14,13 +14,14 @@ import msgspec
 from msgspec import Struct
 
 from engine.editing.actions import Action
-from engine.editing.edit import Edit, Target, edits_at
+from engine.editing.edit import Edit, ObjectTarget, TargetOfMoment, edits_at
+from engine.editing.scene_object import Objects, at_moment, object_of
 
 
 class Effect(Struct, frozen=True):
-    """The effect of one edit where it holds. See Edit and Scope."""
+    """The effect of one edit where it holds. See Edit and Scope; its target is one of the moment, see `at_moment`."""
 
-    target: Target
+    target: TargetOfMoment
     action: Action
     is_inverted: bool = False
     is_reference_only: bool = False
@@ -48,10 +49,11 @@ class Effects:
         return hash(self.digest)
 
     @classmethod
-    def of(cls, edits: tuple[Edit, ...]) -> Effects:
-        """Of edits that hold at a moment."""
+    def of(cls, edits: tuple[Edit, ...], frame: float = 0.0, objects: Objects = ()) -> Effects:
+        """Of edits that hold at a moment. frame: When; objects: Of the document."""
         return cls.made(
-            Effect(edit.target, edit.action, edit.is_inverted, edit.scope.is_reference_only) for edit in edits
+            Effect(at_moment(edit.target, frame, objects), edit.action, edit.is_inverted, edit.scope.is_reference_only)
+            for edit in edits
         )
 
     @classmethod
@@ -72,12 +74,16 @@ class EditStack:
 
     Args:
         edits: In the order of the stack.
+        objects: Of the document, for edits of objects.
     """
 
-    def __init__(self, edits: tuple[Edit, ...] = ()) -> None:
-        self.edits = edits
+    def __init__(self, edits: tuple[Edit, ...] = (), objects: Objects = ()) -> None:
+        self.edits, self.objects = edits, objects
         scopes = [edit.scope for edit in edits if edit.is_on]
         bounds = {scope.first for scope in scopes} | {scope.stop for scope in scopes if scope.stop is not None}
+        for edit in edits:
+            found = object_of(edit.target, objects) if isinstance(edit.target, ObjectTarget) else None
+            bounds |= set() if found is None or not edit.is_on else found.bounds
         self._bounds = sorted(bounds - {0})
         self._effects: dict[int, Effects] = {}
 
@@ -86,5 +92,5 @@ class EditStack:
         place = bisect_right(self._bounds, math.floor(frame))
         if place not in self._effects:
             first = self._bounds[place - 1] if place else 0
-            self._effects[place] = Effects.of(edits_at(self.edits, first))
+            self._effects[place] = Effects.of(edits_at(self.edits, first), first, self.objects)
         return self._effects[place]

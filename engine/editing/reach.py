@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from engine.clip_files.roles import REFERENCE_ROLES, STATIC
-from engine.editing.edit import Edit, Picked, Scope, Target
+from engine.editing.edit import Edit, ObjectTarget, Picked, Scope, Target
 from engine.editing.gaussian_rows import RowSet
 from engine.editing.picks import n_rows
+from engine.editing.scene_object import NO_OBJECTS, Objects, SceneObject, object_of
 
 Frames = tuple[tuple[int, int], ...]
 """Runs of frames, as first ones and those after the last."""
@@ -72,8 +73,10 @@ class Reach:
 UNKNOWN = Reach()
 
 
-def reach_of_edit(edit: Edit, clips: Iterable[ClipAnchors]) -> Reach:
-    """Where an edit acts. Raises ValueError where picked numbers are damaged."""
+def reach_of_edit(edit: Edit, clips: Iterable[ClipAnchors], objects: Objects = NO_OBJECTS) -> Reach:
+    """Where an edit acts. Raises ValueError where picked numbers are damaged. objects: Of the document."""
+    if isinstance(edit.target, ObjectTarget):
+        return _reach_of_object(object_of(edit.target, objects), edit, tuple(clips))
     return reach_of(sets_of(edit.target), edit.scope, clips, is_inverted=edit.is_inverted)
 
 
@@ -124,6 +127,18 @@ def reach_of(
         ending=_runs(where),
         has_newcomers=bool(moving and others) and not scope.is_reference_only,
     )
+
+
+def _reach_of_object(found: SceneObject | None, edit: Edit, clips: Sequence[ClipAnchors]) -> Reach:
+    """Of an edit of an object: it acts where the object was found, an inverted one everywhere."""
+    if found is None:
+        return UNKNOWN
+    there = {(clip.start, clip.stop) for clip in found.clips if clip.sets}
+    having = [clip for clip in clips if (clip.start, clip.stop) in there]
+    within = [clip for clip in clips if edit.scope.touches(clip.start, clip.stop)]
+    acts = within if edit.is_inverted else [clip for clip in within if clip in having]
+    exists = clips if edit.is_inverted else having
+    return Reach(_runs(acts, edit.scope), exists=_runs(exists))
 
 
 def _runs(clips: Sequence[ClipAnchors], scope: Scope | None = None) -> Frames:

@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from app.scripting.scripted_project import ScriptedProject
 from engine.editing.actions import ACTIONS, Action, Quat, Vector
-from engine.editing.edit import Box, Everything, Picked, Scope, Sphere, Target
+from engine.editing.edit import Box, Everything, ObjectTarget, Picked, Scope, Sphere, Target
 from engine.errors import ProjectError
 from engine.storage.json_files import JsonError, parse_json
 from engine.storage.typed_json import EntryError, to_type
@@ -124,7 +124,7 @@ def chosen_target(options: argparse.Namespace, project: ScriptedProject, read_te
         if options.at is not None:
             raise ProjectError("--at is given without --where.", hint="Leave it out.")
         return target
-    if isinstance(target, Picked):
+    if isinstance(target, Picked | ObjectTarget):
         raise ProjectError("--where goes with a box, a sphere or everything.", hint="Leave --target out.")
     volume = None if isinstance(target, Everything) else target
     return project.select(options.where, frame_index=options.at or 0, volume=volume)

@@ -189,7 +189,7 @@ def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict
         "edits": [
             to_builtins(edit)
             | {
-                "title": edit_title(edit),
+                "title": edit_title(edit, project.document.objects),
                 "acts": reaches[edit.edit_id].acts,
                 "note": reach_note(reaches[edit.edit_id], edit.scope),
             }
@@ -210,7 +210,7 @@ def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str
     for edit in edits:
         state = "" if edit.is_on else " (off)"
         where = acting_text(edit.scope, reaches[edit.edit_id])
-        lines.append(f"{edit.edit_id:>5}  {one_line(edit_title(edit))}, {where}{state}")
+        lines.append(f"{edit.edit_id:>5}  {one_line(edit_title(edit, project.document.objects))}, {where}{state}")
     if has_steps:
         history = project.history
         lines.append(f"Steps: {len(history.past)}")

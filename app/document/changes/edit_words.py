@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 from engine.capture.clip import Clip
 from engine.editing.actions import Action
-from engine.editing.edit import Box, Edit, Everything, Picked, Scope, Sphere, Target
+from engine.editing.edit import Box, Edit, Everything, ObjectTarget, Picked, Scope, Sphere, Target
 from engine.editing.picks import n_rows
+from engine.editing.scene_object import NO_OBJECTS, Objects, object_of
+from engine.text import one_line
 
 
-def target_text(target: Target, *, is_inverted: bool = False) -> str:
-    """The target of an edit: "1,240 Gaussians of clip 2", "box 0.8 x 0.5 x 1.2"."""
-    text = _shape_text(target)
+def target_text(target: Target, objects: Objects = NO_OBJECTS, *, is_inverted: bool = False) -> str:
+    """The target of an edit: "1,240 Gaussians of clip 2", "box 0.8 x 0.5 x 1.2". objects: Of the document."""
+    text = _shape_text(target, objects)
     return f"all but {text}" if is_inverted else text
 
 
@@ -28,17 +30,18 @@ def scope_text(scope: Scope, clips: Sequence[Clip] = ()) -> str:
     return "the reference" if text == "everywhere" else f"the reference, {text}"
 
 
-def edit_title(edit: Edit) -> str:
-    """The user's name for an edit, else its effect and target."""
-    return edit.name or what_text(edit.action, edit.target, is_inverted=edit.is_inverted)
+def edit_title(edit: Edit, objects: Objects = NO_OBJECTS) -> str:
+    """The user's name for an edit, else its effect and target. objects: Of the document."""
+    return edit.name or what_text(edit.action, edit.target, objects, is_inverted=edit.is_inverted)
 
 
-def what_text(action: Action, target: Target, *, is_inverted: bool = False) -> str:
+def what_text(action: Action, target: Target, objects: Objects = NO_OBJECTS, *, is_inverted: bool = False) -> str:
     """Effect and target, as they can follow "Undo": "delete 1,240 Gaussians of clip 2", "crop to box 1 x 1 x 1"."""
     if is_inverted and action.opposite:
-        return f"{action.opposite if isinstance(target, Picked) else 'crop to'} {target_text(target)}"
+        is_of_gaussians = isinstance(target, Picked | ObjectTarget)
+        return f"{action.opposite if is_of_gaussians else 'crop to'} {target_text(target, objects)}"
     before, after = action.words
-    return f"{before} {target_text(target, is_inverted=is_inverted)} {after}".rstrip()
+    return f"{before} {target_text(target, objects, is_inverted=is_inverted)} {after}".rstrip()
 
 
 def n_picked(picked: Picked) -> int:
@@ -49,7 +52,7 @@ def n_picked(picked: Picked) -> int:
 # ---------------------------------------------------------------- pieces
 
 
-def _shape_text(target: Target) -> str:
+def _shape_text(target: Target, objects: Objects) -> str:
     match target:
         case Everything():
             return "everything"
@@ -57,6 +60,9 @@ def _shape_text(target: Target) -> str:
             return "box " + " × ".join(f"{2 * half:.3g}" for half in half_sizes)
         case Sphere(radius=radius):
             return f"sphere of radius {radius:.3g}"
+        case ObjectTarget():
+            found = object_of(target, objects)
+            return f"object {target.object_id}, which was removed" if found is None else one_line(found.name)
         case Picked(sets=sets):
             clips = sorted({rows.clip_index for rows in sets})
             of_clips = f"clip {clips[0]}" if len(clips) == 1 else f"{len(clips)} clips"

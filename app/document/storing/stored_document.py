@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -13,8 +13,9 @@ from app.document.camera_paths import StoredPath, check_paths, stored_path, to_p
 from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings, check_bounds
 from engine.capture.exclusions import Exclusions
-from engine.editing.edit import Edit, Picked
+from engine.editing.edit import Edit, Picked, PickedRows
 from engine.editing.picks import unpack_rows
+from engine.editing.scene_object import NO_OBJECTS, Objects, SceneObject
 from engine.errors import ProjectError
 from engine.gate.regions import parse_region
 from engine.storage.typed_json import EntryError, to_type
@@ -24,7 +25,7 @@ _sound: set[bytes] = set()
 """Digests of packed numbers that could be unpacked, of this process."""
 
 
-class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
+class _Stored(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The declared entries; regions are parsed by their own reader."""
 
     settings: ProjectSettings
@@ -34,6 +35,7 @@ class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
     markers: tuple[Marker, ...]
     labels: tuple[Label, ...]
     exclusions: Exclusions
+    objects: Objects = NO_OBJECTS  # what earlier versions did not write
     world: World
 
 
@@ -49,6 +51,7 @@ def plain_document(document: ProjectDocument) -> dict[str, Any]:
     """
     check_paths(document.camera_paths)
     check_numbers(document.edits)
+    check_objects(document.objects)
     return {name: plain_entry(name, getattr(document, name)) for name in ENTRIES}
 
 
@@ -109,6 +112,12 @@ def _to_edit(data: Any) -> Edit:
     return edit
 
 
+def _to_object(data: Any) -> SceneObject:
+    found = to_type(data, SceneObject)
+    check_rows(f"Object {found.object_id}", _rows_of(found))
+    return found
+
+
 CODECS = {
     "settings": Codec(False, _plain_settings, _to_settings),
     "regions": Codec(True, lambda region: parse_region(region.as_dict()).as_dict(), parse_region),
@@ -123,6 +132,7 @@ CODECS = {
     "labels": _struct(Label, lambda label: (label.kind, label.name)),
     "exclusions": _struct(Exclusions, is_list=False),
     "world": _struct(World, is_list=False),
+    "objects": Codec(True, _checked(SceneObject), _to_object, lambda one: one.object_id),
 }
 
 
@@ -140,8 +150,11 @@ def document_of(content: Any) -> ProjectDocument:
     paths = tuple(to_path(path) for path in stored.camera_paths)
     check_paths(paths)
     check_numbers(stored.edits)
+    check_objects(stored.objects)
     for edit in stored.edits:
         check_picks(edit)
+    for one in stored.objects:
+        check_rows(f"Object {one.object_id}", _rows_of(one))
     return ProjectDocument(
         settings,
         tuple(parse_region(values) for values in stored.regions),
@@ -151,6 +164,7 @@ def document_of(content: Any) -> ProjectDocument:
         stored.labels,
         stored.exclusions,
         stored.world,
+        stored.objects,
     )
 
 
@@ -164,6 +178,18 @@ def check_numbers(edits: Sequence[Edit]) -> None:
         raise ProjectError("Two edits have the same number.")
 
 
+def check_objects(objects: Sequence[SceneObject]) -> None:
+    """Check that objects can be distinguished, by number and by name.
+
+    Raises:
+        ProjectError: They cannot.
+    """
+    if len({one.object_id for one in objects}) != len(objects):
+        raise ProjectError("Two objects have the same number.")
+    if len({one.name.casefold() for one in objects}) != len(objects):
+        raise ProjectError("Two objects have the same name.")
+
+
 def check_picks(edit: Edit) -> None:
     """Check that the picks of an edit can be read.
 
@@ -171,11 +197,27 @@ def check_picks(edit: Edit) -> None:
         ProjectError: It cannot.
     """
     if isinstance(edit.target, Picked):
-        try:
-            for picked in edit.target.sets:
-                digest = hashlib.blake2b(picked.rows, digest_size=16).digest()
-                if digest not in _sound:  # unpacking takes far longer, and a document is read again and again
-                    unpack_rows(picked.rows)
-                    _sound.add(digest)
-        except ValueError as error:
-            raise ProjectError(f"Edit {edit.edit_id} cannot be read: {error}.") from error
+        check_rows(f"Edit {edit.edit_id}", edit.target.sets)
+
+
+def check_rows(owner: str, sets: Iterable[PickedRows]) -> None:
+    """Check that picked Gaussians can be read. owner: Begins the sentence that says that they cannot.
+
+    Raises:
+        ProjectError: They cannot.
+    """
+    try:
+        for picked in sets:
+            digest = hashlib.blake2b(picked.rows, digest_size=16).digest()
+            if digest not in _sound:  # unpacking takes far longer, and a document is read again and again
+                unpack_rows(picked.rows)
+                _sound.add(digest)
+    except ValueError as error:
+        raise ProjectError(f"{owner} cannot be read: {error}.") from error
+
+
+def _rows_of(found: SceneObject) -> Iterable[PickedRows]:
+    for seed in found.seeds:
+        yield from (*seed.added, *seed.removed)
+    for clip in found.clips:
+        yield from clip.sets

@@ -64,7 +64,7 @@ class Edits:
             edits_status(content, why_not),
             lost=self._lost.of(content.edits),
             clips=self._reaches.clips(),
-            reaches=self._reaches.of(content.edits),
+            reaches=self._reaches.of(content),
         )
 
     def apply(self, command: c.EditCommand) -> None:
@@ -95,7 +95,7 @@ class Edits:
     def _check_acts(self, command: c.EditCommand, change: Change) -> None:
         if isinstance(command, c.AddEdit):
             edit = change.document.edits[-1]
-            check_acts(reach_of_edit(edit, self._reaches.clips()), edit.scope)
+            check_acts(reach_of_edit(edit, self._reaches.clips(), change.document.objects), edit.scope)
 
     def go(self, n_steps: int) -> None:
         """Undo steps, or redo them where the number is positive; as many as there are.
@@ -111,7 +111,9 @@ class Edits:
 def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
     """The edits of a document as a window shows them. why_not: Why nothing can be changed now; empty when it can."""
     labels = {(label.kind, label.name): label.text for label in document.labels}
-    return EditsStatus(document.edits, labels, document.world, can_edit=not why_not, why_not=why_not)
+    return EditsStatus(
+        document.edits, labels, document.world, objects=document.objects, can_edit=not why_not, why_not=why_not
+    )
 
 
 def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
@@ -119,12 +121,12 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
     match command:
         case c.AddEdit(action=action, target=target, scope=scope, is_inverted=is_inverted, name=name):
             added = edit_changes.add_edit(document, action, target, scope=scope, is_inverted=is_inverted, name=name)
-            title = what_text(action, added.edits[-1].target, is_inverted=is_inverted)
+            title = what_text(action, added.edits[-1].target, document.objects, is_inverted=is_inverted)
             return Change(added, name or title)
         case c.ChangeEdit(edit=edit, gesture=gesture, verb=verb):
             merge = ("edit", verb, edit.edit_id, gesture) if gesture else None
-            before = edit_changes.edit_with(document, edit.edit_id)
-            return Change(edit_changes.change_edit(document, edit), f"{verb}: {edit_title(before)}", merge)
+            title = edit_title(edit_changes.edit_with(document, edit.edit_id), document.objects)
+            return Change(edit_changes.change_edit(document, edit), f"{verb}: {title}", merge)
         case c.RemoveEdit(edit_id=edit_id):
             title = _title(document, edit_id)
             return Change(edit_changes.remove_edit(document, edit_id), f"remove edit: {title}")
@@ -167,7 +169,7 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
 
 
 def _title(document: ProjectDocument, edit_id: int) -> str:
-    return edit_title(edit_changes.edit_with(document, edit_id))
+    return edit_title(edit_changes.edit_with(document, edit_id), document.objects)
 
 
 def _is_same(before: ProjectDocument, after: ProjectDocument) -> bool:

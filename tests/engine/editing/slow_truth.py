@@ -10,7 +10,7 @@ import numpy as np
 from engine.camera.rotations import matrices_of, quat_product
 from engine.capture.clip import Clip
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Everything, Picked, Sphere, Target
+from engine.editing.edit import Box, Everything, Picked, Sphere, TargetOfMoment
 from engine.editing.effects import Effect
 from engine.editing.picks import unpack_rows
 from engine.images.srgb import encoded_of, linear_of
@@ -80,7 +80,7 @@ class SlowTruth:
         is_in = self._is_in(effect.target, role, number, one)
         return False if is_in is None else is_in != effect.is_inverted
 
-    def _is_in(self, target: Target, role: str, number: int, one: One) -> bool | None:
+    def _is_in(self, target: TargetOfMoment, role: str, number: int, one: One) -> bool | None:
         """None where the target stands for nothing in this clip."""
         match target:
             case Everything():

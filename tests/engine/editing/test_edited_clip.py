@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
+from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere, TargetOfMoment
 from engine.editing.edited_clip import EditedGaussians
 from engine.editing.effects import NO_EFFECTS, EditStack, Effect, Effects
 from engine.editing.picks import pack_rows
@@ -19,7 +19,7 @@ from tests.engine.editing.edited_clips import CLIP, OWN, REFERENCE, K, edited, m
 from tests.engine.editing.slow_truth import One, SlowTruth
 
 TURN = (math.cos(0.3), 0.0, math.sin(0.3), 0.0)
-TARGETS: dict[str, Target] = {
+TARGETS: dict[str, TargetOfMoment] = {
     "everything": Everything(),
     "box": Box((0.5, 0.4, 0.5), (0.3, 0.5, 0.25), TURN),
     "sphere": Sphere((0.5, 0.5, 0.5), 0.45),

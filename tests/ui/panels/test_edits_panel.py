@@ -84,7 +84,7 @@ def test_the_details_of_a_new_edit_come_into_sight_and_stay_while_numbers_are_ty
     pilot.click("edits.make recolor")
     pilot.draw(3)
     opacity = pilot.rects["edits.opacity"]
-    assert opacity.y1 < pilot.rects["timeline.track"].y0 - 60, "the last field is in sight"
+    assert opacity.y1 < pilot.rects["viewport.canvas"].y1, "the last field is in sight, above the timeline"
     drawn: list[list[str]] = []
     real = details.numbers
 

@@ -51,7 +51,8 @@ def draw_chosen(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 
 def _draw_fields(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> float:
     """Where the fields of its action end, from the top of the panel, units."""
-    imgui.separator_text(elided(one_line(edit_title(edit)), imgui.get_content_region_avail().x - 2 * TITLE_MARGIN))
+    title = one_line(edit_title(edit, session.edits.objects))
+    imgui.separator_text(elided(title, imgui.get_content_region_avail().x - 2 * TITLE_MARGIN))
     imgui.begin_disabled(not session.edits.can_edit)
     imgui.push_id(edit.edit_id)
     # First what the edit does, for which it was just made, then the rest.
@@ -74,7 +75,7 @@ def _draw_rest(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit
             if segment(words, ui.editing.is_shape_meant == is_shape):
                 ui.editing.is_shape_meant = is_shape
             ui.mark(f"edits.handles {'shape' if is_shape else 'movement'}")
-    target = _draw_target(ui, edit.target)
+    target = _draw_target(session, ui, edit.target)
     if target is not None:
         dispatch(ChangeEdit(structs.replace(edit, target=target), ui.editing.gesture, "change"))
     _draw_scope(session, dispatch, ui, edit)
@@ -82,14 +83,16 @@ def _draw_rest(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit
     ui.mark("edits.inverted")
     if is_clicked:
         dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
-    _draw_name(dispatch, ui, edit)
+    _draw_name(session, dispatch, ui, edit)
 
 
-def _draw_name(dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
+def _draw_name(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     label_before("Name")
     shown = one_line(edit.name) if ui.editing.renamed is None else ui.editing.renamed
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
-    is_entered, typed = imgui.input_text_with_hint("##edit name", one_line(edit_title(edit)), shown, flags)
+    is_entered, typed = imgui.input_text_with_hint(
+        "##edit name", one_line(edit_title(edit, session.edits.objects)), shown, flags
+    )
     ui.mark("edits.name")
     ui.editing.renamed = typed if imgui.is_item_active() or is_entered else ui.editing.renamed
     if is_entered or imgui.is_item_deactivated_after_edit():
@@ -130,7 +133,7 @@ def _draw_scope(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edi
 # Every field is drawn, whichever was changed: with fewer the panel would be lower for a moment, and scroll.
 
 
-def _draw_target(ui: UiState, target: Target) -> Target | None:
+def _draw_target(session: SessionView, ui: UiState, target: Target) -> Target | None:
     """Numbers of what an edit acts on; what they were changed to."""
     changed = target
     match target:
@@ -155,7 +158,7 @@ def _draw_target(ui: UiState, target: Target) -> Target | None:
             if found is not None:
                 changed = structs.replace(changed, radius=found[0])
         case _:
-            text_wrapped_dim(f"Acts on {target_text(target)}.")
+            text_wrapped_dim(f"Acts on {target_text(target, session.edits.objects)}.")
     return None if changed is target else changed
 
 

@@ -72,13 +72,13 @@ def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit,
     draw = imgui.get_window_draw_list()
     x, room = low.x + BUTTON_WIDTH + 6, high.x - low.x - 2 * BUTTON_WIDTH - 14
     color = theme.TEXT if edit.is_on else theme.TEXT_DIM
-    title = one_line(edit_title(edit))
+    title = one_line(edit_title(edit, session.edits.objects))
     shown = elided(title, room)
     draw.add_text(ImVec2(x, low.y + 3), theme.u32(color), shown)
     reach = session.edits.reach(edit.edit_id)
     words = acting_text(edit.scope, reach, session.timeline.clips)
     if edit.name:
-        words = f"{target_text(edit.target, is_inverted=edit.is_inverted)}, {words}"
+        words = f"{target_text(edit.target, session.edits.objects, is_inverted=edit.is_inverted)}, {words}"
     words = words if edit.is_on else f"off, {words}"
     lost = next((one for one in session.edits.lost if one.edit_id == edit.edit_id), None)
     if lost is not None:

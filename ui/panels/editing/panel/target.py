@@ -45,7 +45,7 @@ def _target_words(session: SessionView, ui: UiState) -> tuple[str, str]:
         return status.words, f"{status.n_shown:,} in this frame" if is_part else "Selected"
     edit = session.edits.edit(ui.editing.chosen)
     if edit is not None:
-        return "Nothing is selected", f"Chosen: {one_line(edit_title(edit))}"
+        return "Nothing is selected", f"Chosen: {one_line(edit_title(edit, session.edits.objects))}"
     return "Nothing is selected", "" if status.can_select else "No Gaussians in this frame yet"
 
 
