@@ -70,7 +70,7 @@ from tests.app.made_projects import make_project
 from tests.documents.edits import edits_table
 from tests.engine.editing.edited_clips import edited, make_clip
 from ui.panels.actions.table import ACTIONS
-from ui.panels.editing import details
+from ui.panels.editing.panel import details
 
 found = {"file": clipgstream.__file__}
 made = make_project(Path(sys.argv[1]))
