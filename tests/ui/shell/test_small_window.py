@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from imgui_bundle import imgui
 from app.session.editing.selection_status import SelectionStatus
 from app.session.projects.window_memory import WindowMemory
 from engine.editing.actions import Delete
+from engine.editing.gaussian_rows import RowSet
+from engine.editing.reach import ClipAnchors
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
 from ui.panels.state import EDIT, EXPORTS, TRAINING
@@ -71,6 +74,18 @@ def test_what_the_first_hour_needs_is_in_sight(small: Pilot, monkeypatch: pytest
     small.rest()
     small.click("edits.make delete")
     assert isinstance(small.session.edits.edits[0].action, Delete)
+
+
+def test_a_remark_on_the_selection_does_not_push_the_buttons_away(
+    small: Pilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clips = (ClipAnchors(0, 0, 10, "a"), ClipAnchors(1, 10, 20, "b", "a"))
+    small.session.edits = replace(small.session.edits, clips=clips)
+    small.session.selection = replace(small.session.selection, counts=((RowSet("b", 1, "residual"), 3),))
+    small.session.timeline.seek(12)
+    small.studio.frame.ui.wanted_panel = EDIT
+    small.draw(6)
+    assert {"edits.note", "edits.make delete"} <= seen(small, monkeypatch)
 
 
 def test_parts_of_the_toolbar_without_room_are_in_its_menu(small: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,8 @@ from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, 
 from engine.editing.edit import Box, Everything, Scope, Sphere, Target
 from engine.editing.reach import Reach, reach_of
 from ui.panels.editing.edit_subject import bounds_of, meant, pivot_of
-from ui.panels.pieces.widgets import ROW_GAP, row_widths, segment, text_warning
+from ui.panels.editing.panel.sections import TALL
+from ui.panels.pieces.widgets import ROW_GAP, elided, row_widths, segment, text_warning
 from ui.panels.state import Dispatch, UiState
 
 FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
@@ -81,7 +82,7 @@ MAKINGS = (
     _making(Hold, lambda session, volume: Hold(session.timeline.frame_index)),
     _making(Smooth, lambda *where: Smooth(FIRST_SIGMA_FRAMES), is_for_everything=True),
 )
-PER_ROW = 3
+PER_ROW, WARNING_WIDTH = 3, 30.0
 
 
 def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Making) -> None:
@@ -122,6 +123,15 @@ def _reach(session: SessionView, volume: Box | Sphere | None, scope: Scope, *, i
     return reach_of(picked, scope, session.edits.clips, is_inverted=is_inverted)
 
 
+def _draw_note(note: str) -> None:
+    """As a whole; in a low panel in one line, as the buttons below have to be in sight."""
+    if imgui.get_window_height() >= TALL:
+        text_warning(note)
+        return
+    text_warning(elided(note, imgui.get_content_region_avail().x - WARNING_WIDTH))
+    imgui.set_item_tooltip(note.replace("%", "%%"))
+
+
 def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Where new edits are to hold, and a button for each kind."""
     volume, words = meant(session, ui)
@@ -138,7 +148,7 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
             ui.mark(f"edits.scope {choice}")
     reach = _reach(session, volume, scope)
     if note := reach_note(reach, scope):
-        text_warning(note)
+        _draw_note(note)
         ui.mark("edits.note")
     imgui.begin_disabled(not session.edits.can_edit)
     width = (imgui.get_content_region_avail().x - (PER_ROW - 1) * ROW_GAP) / PER_ROW

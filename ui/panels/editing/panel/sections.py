@@ -6,6 +6,9 @@ from imgui_bundle import imgui
 
 from ui.panels.state import EDIT_SECTIONS, UiState
 
+TALL = 480.0
+"""In a panel so high, units, there is room for what could be shorter."""
+
 
 def reach_section(ui: UiState, name: str) -> bool:
     """At the beginning of a part: scroll there where the user asked for it. Returns whether that was so."""

@@ -20,15 +20,13 @@ from app.session.editing.selection_status import SelectionStatus
 from app.session.session_view import SessionView
 from engine.editing.selection.set_algebra import SELECT_MODES
 from ui.panels.editing.edit_subject import invert_selection
-from ui.panels.editing.panel.sections import reach_section, section_header
+from ui.panels.editing.panel.sections import TALL, reach_section, section_header
 from ui.panels.pieces.slider import slider, slider_text
 from ui.panels.pieces.widgets import ROW_GAP, elided, row_widths, segment
 from ui.panels.state import Dispatch, UiState
 from ui.style.theme import TOOL_ICONS
 from ui.viewport.editing.select_tool import MODE_WORDS, TOOL_HINTS, TOOL_WORDS, TOOLS, SelectTool
 
-TALL = 480.0
-"""In a panel so high, units, the options begin unfolded."""
 CLAMPED = imgui.SliderFlags_.always_clamp
 
 
