@@ -38,6 +38,7 @@ EDIT_SECTIONS = {
     "selection": "Selection",
     "options": "Selection options",
     "edits": "Edits",
+    "timing": "Timing",
     "attribute": "Select by attribute",
     "volume": "Box or sphere by numbers",
     "regions": "Marks for training",

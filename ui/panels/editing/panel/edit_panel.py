@@ -15,6 +15,7 @@ from ui.panels.editing.panel.select_tools import draw_select_tools
 from ui.panels.editing.panel.select_volume import draw_volume_numbers
 from ui.panels.editing.panel.stack import draw_stack
 from ui.panels.editing.panel.target import draw_target
+from ui.panels.editing.panel.timing import draw_timing
 from ui.panels.editing.panel.world import draw_world
 from ui.panels.pieces.widgets import text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
@@ -27,6 +28,7 @@ SECTIONS: tuple[Section, ...] = (
     draw_making,
     draw_chosen,
     draw_stack,
+    draw_timing,
     draw_attribute,
     draw_volume_numbers,
     draw_marks,
