@@ -32,8 +32,8 @@ from engine.editing.fills.fill import fill_key
 from engine.editing.gaussian_rows import RowSet
 from engine.editing.reach import ClipAnchors
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.panels.editing import details
-from ui.panels.state import EDITS, HISTORY
+from ui.panels.editing.panel import details
+from ui.panels.state import EDIT, HISTORY
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 BOX = Box((0.0, 0.0, 0.0), (0.5, 0.4, 0.3))
@@ -42,8 +42,8 @@ BOX = Box((0.0, 0.0, 0.0), (0.5, 0.4, 0.3))
 @pytest.fixture
 def panel(open_pilot) -> Pilot:
     """With the panel in front."""
-    pilot = open_pilot(size=(1280, 1100))
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot = open_pilot(size=(1280, 1500))
+    pilot.studio.frame.ui.wanted_panel = EDIT
     pilot.draw(4)
     return pilot
 
@@ -82,12 +82,12 @@ def test_a_drawn_volume_is_cropped_to_and_its_handles_become_those_of_the_edit(p
 
 def test_the_details_of_a_new_edit_come_into_sight_and_stay_while_numbers_are_typed(open_pilot, monkeypatch) -> None:
     pilot = open_pilot(size=(1280, 720))
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot.studio.frame.ui.wanted_panel = EDIT
     pilot.draw(4)
     pilot.click("edits.make recolor")
     pilot.draw(3)
     opacity = pilot.rects["edits.opacity"]
-    assert opacity.y1 < pilot.rects["timeline.track"].y0 - 60, "the last field is in sight"
+    assert opacity.y1 < pilot.rects["viewport.canvas"].y1, "the last field is in sight, above the timeline"
     drawn: list[list[str]] = []
     real = details.numbers
 
@@ -196,7 +196,7 @@ def test_names_of_users_are_shown_as_they_are(panel: Pilot) -> None:
 
 def test_where_nothing_can_be_edited_it_says_why(panel: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    monkeypatch.setattr("ui.panels.editing.edits_panel.text_warning", said.append)
+    monkeypatch.setattr("ui.panels.editing.panel.edit_panel.text_warning", said.append)
     panel.session.dispatch(AddEdit(Hide(), BOX))
     panel.draw(2)
     choose(panel, 1)
@@ -298,7 +298,7 @@ def test_without_a_capture_both_panels_say_so(open_pilot) -> None:
     from tests.ui.fake_session import FakeSession
 
     pilot = open_pilot(FakeSession(has_capture=False))
-    for title in (EDITS, HISTORY):
+    for title in (EDIT, HISTORY):
         pilot.studio.frame.ui.wanted_panel = title
         pilot.draw(3)
     assert pilot.session.edits == EditsStatus(why_not="Open a capture first.")

@@ -20,24 +20,54 @@ from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Scope, Sphere, T
 from engine.setting import Setting, settings_of
 from engine.text import one_line
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
-from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
+from ui.panels.pieces.widgets import elided, segment, text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 
 FAR = 1e6
 """Largest coordinate that fields take, scene units."""
 LEAST_SIZE = 1e-6
+TITLE_MARGIN = 24.0
+"""Of the line beside a title, units."""
 SPEED_SHARE = 2e-3
 """Of a drag over a field, per unit: as a share of the size of the changed thing."""
 
 
-def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
-    """Fields of the chosen edit."""
-    _draw_name(session, dispatch, ui, edit)
-    _draw_scope(session, dispatch, ui, edit)
-    is_clicked, is_inverted = imgui.checkbox("Acts on everything else", edit.is_inverted)
-    ui.mark("edits.inverted")
-    if is_clicked:
-        dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
+def draw_chosen(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    """The chosen edit in numbers. Where one was just made, what it does comes into sight; a row of the stack below that
+    was clicked stays under the pointer."""
+    edit, top = session.edits.edit(ui.editing.chosen), imgui.get_cursor_pos_y()
+    end_of_action = top if edit is None else _draw_fields(session, dispatch, ui, edit)
+    height, tool, scroll = imgui.get_cursor_pos_y() - top, ui.editing, imgui.get_scroll_y()
+    grown, tool.details_height = height - tool.details_height, height
+    wanted = scroll
+    if tool.is_new and end_of_action > scroll + imgui.get_window_height():
+        wanted = min(top, end_of_action - imgui.get_window_height())
+    elif tool.is_row_clicked:
+        wanted = scroll + grown if edit is None else min(scroll + grown, top)
+    tool.is_new = tool.is_row_clicked = False
+    if wanted != scroll:
+        imgui.set_scroll_y(wanted)
+        ui.redraw_within(0.0)  # the panel scrolls in the next frame
+
+
+def _draw_fields(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> float:
+    """Where the fields of its action end, from the top of the panel, units."""
+    title = one_line(edit_title(edit, session.edits.objects))
+    imgui.separator_text(elided(title, imgui.get_content_region_avail().x - 2 * TITLE_MARGIN))
+    imgui.begin_disabled(not session.edits.can_edit)
+    imgui.push_id(edit.edit_id)
+    # First what the edit does, for which it was just made, then the rest.
+    action = _draw_action(session, ui, edit.action)
+    if action is not None:
+        dispatch(ChangeEdit(structs.replace(edit, action=action), ui.editing.gesture, "change"))
+    end_of_action = imgui.get_cursor_pos_y()
+    _draw_rest(session, dispatch, ui, edit)
+    imgui.pop_id()
+    imgui.end_disabled()
+    return end_of_action
+
+
+def _draw_rest(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     both = isinstance(edit.action, Transform) and isinstance(edit.target, Box | Sphere)
     if both:
         imgui.text_disabled("Handles")
@@ -49,9 +79,12 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
     target = _draw_target(session, ui, edit.target)
     if target is not None:
         dispatch(ChangeEdit(structs.replace(edit, target=target), ui.editing.gesture, "change"))
-    action = _draw_action(session, ui, edit.action)
-    if action is not None:
-        dispatch(ChangeEdit(structs.replace(edit, action=action), ui.editing.gesture, "change"))
+    _draw_scope(session, dispatch, ui, edit)
+    is_clicked, is_inverted = imgui.checkbox("Acts on everything else", edit.is_inverted)
+    ui.mark("edits.inverted")
+    if is_clicked:
+        dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
+    _draw_name(session, dispatch, ui, edit)
     if isinstance(edit.action, Delete | Hide):
         _draw_fill(session, dispatch, ui, edit)
 
