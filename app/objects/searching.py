@@ -4,7 +4,7 @@ it on a thread, the command line and scripts.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
@@ -13,7 +13,7 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from engine.capture.capture import Capture
-from engine.editing.scene_object import ObjectInClip, SceneObject
+from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 
 if TYPE_CHECKING:
     from engine.editing.edited_clip import EditedClip
@@ -49,9 +49,30 @@ def find_in_project(
     catalog = ClipCatalog(project, len(opened.clips))
     trained = [clip for clip in opened.clips if catalog[clip.clip_index].state == "trained"]
     clips = [SearchedClip(clip, lambda index=clip.clip_index: edited_clip(opened, index)) for clip in trained]
-    found = (find_object if search is None else search)(one, clips, report)
     origins = {clip.start: catalog[clip.clip_index].origin for clip in trained}
+    present = {*origins.values(), *(catalog[clip.clip_index].inherits for clip in trained)} - {""}
+    meant = structs.replace(one, seeds=living_seeds(one, origins, present))
+    found = (find_object if search is None else search)(meant, clips, report)
     return tuple(structs.replace(clip, origin=origins.get(clip.start, "")) for clip in found)
+
+
+def living_seeds(one: SceneObject, origins: Mapping[int, str], present: Collection[str]) -> tuple[ObjectSeed, ...]:
+    """What is known of an object by Gaussians that there are: a clip that is trained anew has others, so that what was
+    selected in it is lost. Then the clip next to it stands for that in which the object was found and is still the same.
+
+    Args:
+        origins: Of the trained clips as they are now, by first frame.
+        present: All origins of Gaussians that there are.
+    """
+    seeds = [seed for seed in one.seeds if any(part.origin in present for part in (*seed.added, *seed.removed))]
+    if seeds and seeds[0] is one.seeds[0]:
+        return tuple(seeds)
+    first = one.seeds[0].frame_index if one.seeds else 0
+    known = [clip for clip in one.clips if clip.sets and clip.seen and clip.origin == origins.get(clip.start)]
+    nearest = min(known, key=lambda clip: abs((clip.start + clip.stop) / 2 - first), default=None)
+    if nearest is None:
+        return one.seeds
+    return (ObjectSeed(nearest.seen[0][0], nearest.sets), *seeds)
 
 
 def edited_clip(opened: TrainedProject, clip_index: int) -> EditedClip:

@@ -114,13 +114,13 @@ class ScriptedObjects:
             ProjectError: There is no such object, nothing is given, or what `change` raises.
         """
         one = self._named(name)
-        seed = ObjectSeed(
-            frame_index, () if added is None else added.sets, () if removed is None else removed.sets
-        )
+        seed = ObjectSeed(frame_index, () if added is None else added.sets, () if removed is None else removed.sets)
         made = object_changes.correct_object(
             self.document, one.object_id, seed, within=self._frames_around(frame_index)
         )
-        what = f"add to {one.name}" if removed is None else f"{'remove from' if added is None else 'correct'} {one.name}"
+        what = (
+            f"add to {one.name}" if removed is None else f"{'remove from' if added is None else 'correct'} {one.name}"
+        )
         self.change(self._searched(made, one.object_id, on_progress), what)
         return self._named(one.object_id)
 
@@ -177,9 +177,7 @@ class ScriptedObjects:
             raise ProjectError(f"There is no frame {frame_index}; the last one is {self.clips[-1].stop - 1}.")
         return clip.start, clip.stop
 
-    def _searched(
-        self, document: ProjectDocument, object_id: int, on_progress: TellSearch | None
-    ) -> ProjectDocument:
+    def _searched(self, document: ProjectDocument, object_id: int, on_progress: TellSearch | None) -> ProjectDocument:
         from app.objects.searching import find_in_project
 
         def report(done: float, total: float) -> None:

@@ -32,7 +32,7 @@ from engine.text import one_line
 
 EDIT_SCHEMA = 1
 VERB_TABLES = (edit_verbs,)
-"""Modules with `VERBS` by name, `add_verb_arguments` and `take_verb`, which turns a verb into the options it stands for."""
+"""Modules with `VERBS` by name, `add_verb_arguments`, and `take_verb`, which turns a verb into the options it means."""
 MAX_STDIN_CHARACTERS = 1 << 28
 _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo", "apply_permanently")
 
