@@ -58,7 +58,7 @@ def find_in_project(
 
 def living_seeds(one: SceneObject, origins: Mapping[int, str], present: Collection[str]) -> tuple[ObjectSeed, ...]:
     """What is known of an object by Gaussians that there are: a clip that is trained anew has others, so that what was
-    selected in it is lost. Then the clip next to it stands for that in which the object was found and is still the same.
+    selected in it is lost. Then the nearest clip that is still the same stands for it, with the object found there.
 
     Args:
         origins: Of the trained clips as they are now, by first frame.

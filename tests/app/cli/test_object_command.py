@@ -166,7 +166,7 @@ def test_scripts_do_the_same(folder):
         corrected = project.correct_object("ball", 4, removed=picked)
         assert len(corrected.seeds) == 2
         project.recolour_object("ball", (1.0, 0.0, 0.0))
-        with pytest.raises(ProjectError, match="There is no object 'cat'. Objects are ball."):
+        with pytest.raises(ProjectError, match="There is no object 'cat'"):
             project.find_object("cat")
         with pytest.raises(KeyboardInterrupt):
             project.find_object("ball", on_progress=_interrupt)
