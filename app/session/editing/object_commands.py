@@ -1,5 +1,5 @@
-"""Commands about objects, as frozen dataclasses in the imperative. They can be taken back, but for FindObject, which
-changes nothing that somebody has decided.
+"""Commands about objects, as frozen dataclasses in the imperative. They can be taken back, but for FindObject and
+SelectObject, which change nothing that somebody has decided.
 """
 
 from __future__ import annotations
@@ -28,6 +28,13 @@ class CorrectObject:
 @dataclass(frozen=True, slots=True)
 class FindObject:
     """Look for an object in all clips again."""
+
+    object_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class SelectObject:
+    """Select the Gaussians that an object consists of in the shown frame."""
 
     object_id: int
 
@@ -77,6 +84,7 @@ ObjectCommand = (
     MakeObject
     | CorrectObject
     | FindObject
+    | SelectObject
     | RemoveObject
     | RenameObject
     | RecolourObject

@@ -30,6 +30,7 @@ from app.session.editing.object_commands import (
     RecolourObject,
     RemoveObject,
     RenameObject,
+    SelectObject,
     SetObjectSpan,
     SetObjectTrained,
 )
@@ -99,6 +100,9 @@ class Objects(SessionPart):
         Raises:
             ProjectError: It cannot be done now, or is not valid.
         """
+        if isinstance(command, SelectObject):
+            self._select(command.object_id)
+            return
         document = self._document.checked().document
         match command:
             case MakeObject(name=name):
@@ -119,6 +123,18 @@ class Objects(SessionPart):
                 change = changed(document, command)
                 if change.document != document:
                     self._document.change(change.document, change.name, change.merge)
+
+    def _select(self, object_id: int) -> None:
+        content = self._document.content
+        if content is None:
+            raise ProjectError("No capture is open.")
+        one, frame_index = object_with(content, object_id), self._timeline().frame_index
+        picked = one.picked(frame_index)
+        if not picked.sets:
+            raise ProjectError(
+                f"{one.name} is not in frame {frame_index}.", hint="The timeline shows in which frames it is."
+            )
+        self._selecting.select(Selection.of_target(picked))
 
     def _look_for(self, object_id: int) -> None:
         """The selection is in the object now, which takes its place."""
