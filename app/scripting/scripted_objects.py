@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from app.document.changes import object_changes
 from app.document.changes.object_changes import object_named
@@ -138,6 +138,29 @@ class ScriptedObjects:
         clips = object_changes.object_with(searched, one.object_id).clips
         self._happen(Found(one.object_id, one.seeds, clips))
         return self._named(one.object_id)
+
+    def measure_object(
+        self,
+        name: str | int,
+        *,
+        clip_indices: Sequence[int] | None = None,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> dict[str, Any]:
+        """PSNR over the pixels of an object alone, by clip; see app.objects.object_figures.
+
+        Args:
+            clip_indices: All that are trained when None.
+            on_progress: Told how many pictures are done, of how many; its exceptions end the work.
+        Raises:
+            ProjectError: There is no such object, or a clip is not trained.
+        """
+        from app.evaluation.headless import open_trained
+        from app.objects.object_figures import object_figures
+
+        one, opened = self._named(name), open_trained(self._project, self.capture)
+        chosen = opened.trained if clip_indices is None else list(clip_indices)
+        tell = (lambda n_done, n_all: None) if on_progress is None else on_progress
+        return object_figures(opened, one, chosen, tell)
 
     def rename_object(self, name: str | int, new_name: str) -> None:
         """Give an object another name. Raises ProjectError."""

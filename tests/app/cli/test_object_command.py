@@ -179,6 +179,28 @@ def test_scripts_do_the_same(folder):
             project.find_object("ball")
 
 
+def test_an_object_is_measured_on_its_own(run, folder, tmp_path):
+    with open_scripted(folder) as project:
+        project.make_object("ball", project.select(frame_index=1), 1)
+        found = project.measure_object("ball")
+        assert found["clips"].keys() == {"0", "1"}
+        of_clip = found["clips"]["0"]
+        assert of_clip["held_out"]["pictures"] > 0
+        assert 0.0 < of_clip["trained_on"]["psnr"] < 100.0
+        assert project.measure_object("ball", clip_indices=[1])["clips"] == {"1": found["clips"]["1"]}
+        project.set_object_span("ball", 5, 6)
+        later = project.measure_object("ball")["clips"]
+        assert later["0"]["held_out"] == {"psnr": None, "pictures": 0, "pixels": 0}
+        assert later["1"]["trained_on"]["pictures"] <= 3
+    out = tmp_path / "figures.json"
+    code, _, err = run("eval", folder, "--json", out, "--metrics", "quick", "--object", "ball")
+    assert code == 0
+    assert "ball alone: PSNR" in err
+    assert json.loads(out.read_text())["object"]["clips"] == later
+    code, _, err = run("eval", folder, "--json", tmp_path / "no.json", "--object", "cat")
+    assert (code, err.strip().endswith("Objects are ball.")) == (2, True)
+
+
 def _interrupt(done: float) -> None:
     raise KeyboardInterrupt
 

@@ -123,7 +123,7 @@ def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, one: SceneO
     dim = theme.u32(theme.TEXT_DIM if is_calm else theme.ORANGE)
     draw.add_text(ImVec2(x, low.y + 22), dim, elided(f"{sign}{words}", room))
     if imgui.is_mouse_hovering_rect(low, high) and imgui.is_window_hovered():
-        imgui.set_tooltip(f"{words}\nDouble-click or F2 to rename".replace("%", "%%"))
+        imgui.set_tooltip(f"{words}\nDouble-click or F2 to rename")
 
 
 def _draw_name_field(session: SessionView, dispatch: Dispatch, ui: UiState, one: SceneObject, at: ImVec2) -> None:

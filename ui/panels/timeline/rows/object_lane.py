@@ -46,7 +46,7 @@ def draw_object_lane(stage: TimelineStage, session: SessionView) -> None:
         _draw_strip(stage, session, one, strip)
     pointed = object_at(stage, session)
     if pointed is not None and stage.pointer is not None:
-        imgui.set_tooltip(_note(session, pointed, stage.scale.frame_at(stage.pointer[0])).replace("%", "%%"))
+        imgui.set_tooltip(_note(session, pointed, stage.scale.frame_at(stage.pointer[0])))
 
 
 def object_at(stage: TimelineStage, session: SessionView) -> SceneObject | None:
@@ -84,6 +84,7 @@ def _draw_strip(stage: TimelineStage, session: SessionView, one: SceneObject, st
         part = _between(stage, strip, clip.start, clip.stop)
         if part is not None:
             draw.add_rect(part.low, part.high, theme.u32(theme.faded(theme.TEXT_DIM, 0.7)), 2)
+    _draw_name(stage, one, strip)
     for seed in one.seeds:
         x = stage.scale.middle_of(seed.frame_index)
         if strip.x0 <= x <= strip.x1:
@@ -91,7 +92,6 @@ def _draw_strip(stage: TimelineStage, session: SessionView, one: SceneObject, st
             draw.add_rect_filled(low, high, theme.u32(theme.TEXT))
     if is_chosen:
         draw.add_rect(ImVec2(strip.x0, strip.y0 - 2), ImVec2(strip.x1, strip.y1 + 2), theme.u32(theme.TEXT), 2)
-    _draw_name(stage, one, strip)
 
 
 def _draw_name(stage: TimelineStage, one: SceneObject, strip: Rect) -> None:
