@@ -74,7 +74,8 @@ class SetObjectSpan:
 
 @dataclass(frozen=True, slots=True)
 class SetObjectTrained:
-    """Let clips that are trained from now on see an object, or not."""
+    """Let clips that are trained from now on see an object, or not: it is masked in the pictures of the clips in which
+    it was found."""
 
     object_id: int
     is_trained: bool

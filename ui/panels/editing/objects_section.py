@@ -187,7 +187,9 @@ def _draw_chosen(session: SessionView, dispatch: Dispatch, ui: UiState, one: Sce
     imgui.same_line()
     is_clicked, is_trained = imgui.checkbox("Trained", one.is_trained)
     ui.mark("objects.trained")
-    imgui.set_item_tooltip("Whether clips that are trained again see it")
+    imgui.set_item_tooltip(
+        "Whether clips that are trained again see it; without, it is masked in the pictures where it was found"
+    )
     if is_clicked:
         dispatch(SetObjectTrained(one.object_id, is_trained))
     imgui.same_line()
