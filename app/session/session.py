@@ -37,8 +37,6 @@ from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.mark_commands import MarkCommand
-from app.session.editing.object_commands import ObjectCommand
-from app.session.editing.objects import Objects
 from app.session.editing.selecting import ProjectSelecting
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.editing.selection_status import SelectionStatus
@@ -52,6 +50,8 @@ from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import ProjectMending
 from app.session.notices import Notices
+from app.session.objects.object_commands import ObjectCommand
+from app.session.objects.objects import Objects
 from app.session.part import SessionParts
 from app.session.paths.camera_paths import CameraPaths
 from app.session.paths.path_commands import PathCommand

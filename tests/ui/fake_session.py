@@ -41,16 +41,16 @@ from app.session.captures.synchronisation_page import SynchronisationPage
 from app.session.commands import CloseQuestion, Command, DismissNotice
 from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
-from app.session.editing import objects
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import Change, changed, edits_status
 from app.session.editing.mark_commands import MarkRegion, RemoveRegion
-from app.session.editing.object_commands import CorrectObject, FindObject, MakeObject, ObjectCommand, SelectObject
 from app.session.editing.selection_status import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.mending.mend_page import MendPage
 from app.session.notices import Notices
+from app.session.objects import objects
+from app.session.objects.object_commands import CorrectObject, FindObject, MakeObject, ObjectCommand, SelectObject
 from app.session.paths import path_commands
 from app.session.paths.path_edits import edited
 from app.session.projects.project_commands import OpenCapture, OpenProject
