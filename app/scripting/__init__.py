@@ -19,7 +19,7 @@ from app.scripting.functions import apply_edit, change, export, open_project, re
 from app.scripting.scripted_project import ScriptedProject
 from engine.editing import actions
 from engine.editing.actions import *  # noqa: F403 - every action
-from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, Picked, PickedRows, Scope, Sphere
+from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, ObjectTarget, Picked, PickedRows, Scope, Sphere
 from engine.errors import CaptureError, DiskError, EngineError, PreparationError, ProjectError, TrainingError
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "Edit",
     "EngineError",
     "Everything",
+    "ObjectTarget",
     "Picked",
     "PickedFrames",
     "PickedRows",

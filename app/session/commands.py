@@ -18,6 +18,7 @@ from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.export_commands import ExportCommand
 from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
+from app.session.objects.object_commands import ObjectCommand
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import ProjectCommand
 from app.session.projects.setting_commands import SettingCommand
@@ -56,6 +57,7 @@ Command = (
     | LookCommand
     | SelectionCommand
     | EditCommand
+    | ObjectCommand
     | TimeEdit
     | FillBehind
     | MarkCommand

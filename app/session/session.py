@@ -52,6 +52,8 @@ from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import ProjectMending
 from app.session.notices import Notices
+from app.session.objects.object_commands import ObjectCommand
+from app.session.objects.objects import Objects
 from app.session.part import SessionParts
 from app.session.paths.camera_paths import CameraPaths
 from app.session.paths.path_commands import PathCommand
@@ -170,6 +172,17 @@ class Session(SessionFace):
         self.marking = Marking(self.document)
         lost, reaches = LostEdits(lambda: live.service), EditReaches(lambda: live.service)
         self.editing = Edits(self.document, self.selecting, lost, reaches)
+        self.objects = parts.add(
+            Objects(
+                self.document,
+                self.selecting,
+                lambda: self.timeline,
+                reaches,
+                jobs,
+                self.notices,
+                is_training=self._is_training,
+            )
+        )
         self.command_texts = CommandTexts(
             lambda: self.project, live.is_finished, lambda: None if self.capture is None else self.capture.n_frames
         )
@@ -222,6 +235,8 @@ class Session(SessionFace):
                 self.editing.apply(command)
             case FillBehind():
                 self.filling.apply(command)
+            case _ if isinstance(command, ObjectCommand):
+                self.objects.apply(command)
             case _ if isinstance(command, HistoryCommand):
                 with self.camera_paths.showing_change():
                     self.editing.go(command.n_steps)

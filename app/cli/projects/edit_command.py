@@ -20,6 +20,7 @@ from app.cli.projects.edit_arguments import (
     has_target,
 )
 from app.cli.projects.edit_timing import add_time_arguments, change_time, given_time_options, take_lines
+from app.cli.projects.edit_verbs import VERBS, add_verb_arguments, check_words, take_verb
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.edit_words import edit_title
 from app.document.changes.fill_words import fill_text
@@ -41,9 +42,14 @@ _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "fill", "put
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream edit`."""
     command.add_argument("project", type=path_argument, help="project folder")
+    verbs = {**{name: verb.meaning for name, verb in VERBS.items()}, **{name: "see below" for name in TIME_EDITS}}
     command.add_argument(
-        "words", nargs="*", metavar="VERB", help=f"changes the time of the take: {', '.join(TIME_EDITS)}; see below"
+        "words",
+        nargs="*",
+        metavar="VERB",
+        help=f"what to do: {'; '.join(f'{name}: {words}' for name, words in verbs.items())}",
     )
+    add_verb_arguments(command)
     add_edit_arguments(command)
     add_time_arguments(command)
     stack = command.add_argument_group("the stack and the history")
@@ -77,8 +83,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
-    if options.words:
+    verb = options.words[0] if options.words else ""
+    if verb in TIME_EDITS:
         return _run_verb(options, launch)
+    take_verb(options)
     chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
     is_new = not chosen and has_action(options)
     _check_options(options, chosen[0] if chosen else "")
@@ -96,8 +104,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 def _run_verb(options: argparse.Namespace, launch: Launch) -> int:
     """A verb, such as `clipgstream edit PROJECT trim --frames 10:60`. Returns the exit code."""
     verb = options.words[0]
-    if verb not in TIME_EDITS:
-        raise ProjectError(f"'{verb}' is not a verb.", hint=f"Verbs are {', '.join(TIME_EDITS)}.")
+    check_words(options, verb, "by")
     of_edits = [name for name in _OF_STACK if getattr(options, name) is not None]
     frames, at = options.frames, options.at
     options.frames = options.at = None  # the verb's own

@@ -16,8 +16,8 @@ from engine.errors import ProjectError
 from engine.setting import Setting, settings_of
 from engine.timing.timing import TakeTiming
 
-_SHARED = ("frames", "at")
-"""Options that edits have, too."""
+_SHARED = ("frames", "at", "by")
+"""Options that edits and their verbs have, too."""
 _OWN = {one.name: one for kind in TIME_EDITS.values() for one in settings_of(kind).values() if one.name not in _SHARED}
 _WORDS = ("places",)
 """Given without an option: `order 2,0,1`."""
@@ -56,6 +56,10 @@ def change_time(options: argparse.Namespace, words: list[str], project: Scripted
     verb, *rest = words
     declared = settings_of(TIME_EDITS[verb])
     given: dict[str, Any] = {name: getattr(options, name, None) for name in _SHARED}
+    if given["by"] is not None:
+        if len(given["by"]) != 1:
+            raise ProjectError(f"--by has {len(given['by'])} values; {verb} takes 1.")
+        given["by"] = given["by"][0]
     given |= {name: getattr(options, f"time_{name}", None) for name in _OWN}
     if "places" in declared and rest:
         given["places"] = declared["places"].parse(",".join(rest))

@@ -50,6 +50,15 @@ EDITS = option(
     flags=(Flag("--without-edits", "Left out: the scene as it was trained", constant=False),),
 )
 
+OBJECT = option(
+    "Only this object, without the rest of the scene",
+    "Object",
+    none="the whole scene",
+    titles={"": "Whole scene", "*": "Only {}"},
+    names="objects",
+    like="NAME",
+    flags=(Flag("--object"),),
+)
 TIMING = option(
     "Whether the timing of the take is followed",
     "Time",

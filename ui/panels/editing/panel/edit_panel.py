@@ -10,6 +10,7 @@ from app.session.session_view import SessionView
 from ui.panels.editing.panel.details import draw_chosen
 from ui.panels.editing.panel.making import draw_making
 from ui.panels.editing.panel.marks import draw_marks
+from ui.panels.editing.panel.objects import draw_objects
 from ui.panels.editing.panel.select_attribute import draw_attribute
 from ui.panels.editing.panel.select_tools import draw_select_tools
 from ui.panels.editing.panel.select_volume import draw_volume_numbers
@@ -24,6 +25,7 @@ ROW_GAP = 3.0
 """Between two rows, units: in the smallest window, the first row of what can be done is in sight."""
 Section = Callable[[SessionView, Dispatch, UiState], None]
 SECTIONS: tuple[Section, ...] = (
+    draw_objects,
     draw_select_tools,
     draw_making,
     draw_chosen,

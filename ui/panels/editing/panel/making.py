@@ -15,9 +15,9 @@ from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_
 from app.session.editing.selection_commands import ClearSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Everything, Scope, Sphere, Target
-from engine.editing.reach import Reach, reach_of
-from ui.panels.editing.edit_subject import bounds_of, meant, pivot_of
+from engine.editing.edit import Box, Edit, Everything, ObjectTarget, Scope, Sphere, Target
+from engine.editing.reach import Reach, reach_of, reach_of_edit
+from ui.panels.editing.edit_subject import Meant, bounds_of, meant, pivot_of
 from ui.panels.editing.panel.sections import TALL
 from ui.panels.pieces.widgets import ROW_GAP, elided, row_widths, segment, text_warning
 from ui.panels.state import Dispatch, UiState
@@ -26,7 +26,7 @@ FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """First values of new edits."""
 
 
-First = Callable[[SessionView, Box | Sphere | None], Action]
+First = Callable[[SessionView, Meant], Action]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,8 @@ def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Mak
     target: Target | None = volume
     if not words and making.is_for_everything:
         target = Everything()
-    is_outside = volume is not None and ui.editing.is_outside
+    is_drawn = isinstance(volume, Box | Sphere)
+    is_outside = is_drawn and ui.editing.is_outside
     before = {edit.edit_id for edit in session.edits.edits}
     scope = chosen_scope(ui.editing.scope, session.timeline)
     dispatch(AddEdit(making.action(session, volume), target, scope, making.is_inverted != is_outside))
@@ -100,7 +101,7 @@ def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Mak
     if added:
         ui.editing.choose(added[-1])
         ui.editing.is_new = True
-        if volume is not None:  # its handles are those of the edit now
+        if is_drawn:  # its handles are those of the edit now
             ui.selecting.leave()
             ui.editing.is_outside = False
             dispatch(ClearSelection())
@@ -117,8 +118,11 @@ def mark_moving(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(MarkBox("dynamic", *bounds))
 
 
-def _reach(session: SessionView, volume: Box | Sphere | None, scope: Scope, *, is_inverted: bool = False) -> Reach:
+def _reach(session: SessionView, volume: Meant, scope: Scope, *, is_inverted: bool = False) -> Reach:
     """Where a new edit would act."""
+    if isinstance(volume, ObjectTarget):
+        edit = Edit(0, "", volume, Hide(), scope, is_inverted)
+        return reach_of_edit(edit, session.edits.clips, session.edits.objects)
     picked = () if volume is not None else session.selection.counts
     return reach_of(picked, scope, session.edits.clips, is_inverted=is_inverted)
 
@@ -156,7 +160,7 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if place % PER_ROW:
             imgui.same_line(0, ROW_GAP)
         imgui.begin_disabled(reach.is_nowhere or not (words or making.is_for_everything))
-        label = "Crop" if making.name == "isolate" and volume is not None else making.label
+        label = "Crop" if making.name == "isolate" and isinstance(volume, Box | Sphere) else making.label
         if imgui.button(f"{label}##{making.name}", ImVec2(width, 0)):
             make_edit(session, dispatch, ui, making)
         ui.mark(f"edits.make {making.name}")

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from app.document.changes.edit_words import edit_title
 from app.session.session_view import SessionView
+from engine.editing.edit import ObjectTarget
 from engine.text import one_line
 from ui.panels.editing.edit_subject import drawn_volume, invert_selection, meant
 from ui.panels.pieces.history_buttons import draw_history, history_width
@@ -38,6 +39,8 @@ def draw_target(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 def _target_words(session: SessionView, ui: UiState) -> tuple[str, str]:
     """What new edits act on, and a remark on it."""
     status, (volume, words) = session.selection, meant(session, ui)
+    if isinstance(volume, ObjectTarget):
+        return words, "The chosen object"
     if volume is not None:
         return (f"All but {words}" if ui.editing.is_outside else f"In {words}"), ""
     if words:

@@ -1,0 +1,1 @@
+"""Objects of the open project: made, corrected and looked for."""
