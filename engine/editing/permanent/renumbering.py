@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from engine.editing.edit import Edit, Picked, PickedRows
 from engine.editing.picks import pack_rows, unpack_rows
+from engine.editing.scene_object import Objects, SceneObject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,12 +51,40 @@ def with_new_numbers(edits: tuple[Edit, ...], sets: Mapping[tuple[str, str], Ren
 def _renumbered(edit: Edit, sets: Mapping[tuple[str, str], Renumbered]) -> Edit:
     if not isinstance(edit.target, Picked):
         return edit
-    known = {(one.origin, one.role) for one in edit.target.sets}
+    picked = _with_new_sets(edit.target.sets, sets)
+    return edit if picked is edit.target.sets else replace(edit, target=Picked(picked))
+
+
+def objects_with_new_numbers(objects: Objects, sets: Mapping[tuple[str, str], Renumbered]) -> Objects:
+    """Likewise objects: they need not be looked for again in the clips as they are now. Raises ValueError."""
+    origins = {origin: now.origin for (origin, _), now in sets.items()}
+    return tuple(_renumbered_object(one, sets, origins) for one in objects)
+
+
+def _renumbered_object(
+    one: SceneObject, sets: Mapping[tuple[str, str], Renumbered], origins: Mapping[str, str]
+) -> SceneObject:
+    seeds = tuple(
+        replace(seed, added=_with_new_sets(seed.added, sets), removed=_with_new_sets(seed.removed, sets))
+        for seed in one.seeds
+    )
+    clips = tuple(
+        replace(clip, sets=_with_new_sets(clip.sets, sets), origin=origins.get(clip.origin, clip.origin))
+        for clip in one.clips
+    )
+    return replace(one, seeds=seeds, clips=clips)
+
+
+def _with_new_sets(
+    picked: tuple[PickedRows, ...], sets: Mapping[tuple[str, str], Renumbered]
+) -> tuple[PickedRows, ...]:
+    """Picks, and the same under their new numbers; the same object where there are none."""
+    known = {(one.origin, one.role) for one in picked}
     added: list[PickedRows] = []
-    for one in edit.target.sets:
+    for one in picked:
         now = sets.get((one.origin, one.role))
         if now is not None and (now.origin, one.role) not in known:
             added.append(
                 PickedRows(one.clip_index, now.origin, one.role, pack_rows(now.numbers(unpack_rows(one.rows))))
             )
-    return replace(edit, target=Picked((*edit.target.sets, *added))) if added else edit
+    return (*picked, *added) if added else picked
