@@ -25,6 +25,7 @@ from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.rewriting import rewrite_clip
 from engine.editing.actions import Delete
 from engine.editing.edit import Edit
+from engine.editing.scene_object import Objects
 from engine.errors import ProjectError
 
 NAME = "apply deletions permanently"
@@ -36,15 +37,18 @@ class StagedClips:
     """New clips, ready to replace the old ones.
 
     Attributes:
-        before: Edits of the document that they were made for.
+        before, objects_before: Edits and objects of the document that they were made for.
         during: Edits that fit old and new clips.
+        objects: Objects that fit old and new clips.
         after: Edits that are left once the clips are exchanged.
         clip_indices: Of the clips that change.
         n_anchors: Removed anchors, counted in every clip that shows them.
     """
 
     before: tuple[Edit, ...]
+    objects_before: Objects
     during: tuple[Edit, ...]
+    objects: Objects
     after: tuple[Edit, ...]
     clip_indices: tuple[int, ...]
     n_anchors: int
@@ -79,7 +83,7 @@ def apply_permanently(
     """
     project.check_writable()
     staged = stage(project, find_deletions(project, clips, report), report)
-    project.change(replace(project.document, edits=staged.during), NAME)
+    project.change(replace(project.document, edits=staged.during, objects=staged.objects), NAME)
     exchange_staged(project, staged)
     project.change(replace(project.document, edits=staged.after), NAME)
     return staged
@@ -128,7 +132,7 @@ def edits_after(document: ProjectDocument, staged: StagedClips) -> ProjectDocume
 
 
 def _staged(project: Project, folder: Path, deletions: Deletions, report: Report) -> StagedClips:
-    from engine.editing.permanent.renumbering import with_new_numbers
+    from engine.editing.permanent.renumbering import objects_with_new_numbers, with_new_numbers
 
     order = sorted(deletions.clips, key=lambda index: index != deletions.reference_index)  # the reference first
     old_reference = reference_of(project, deletions.reference_index)
@@ -142,25 +146,30 @@ def _staged(project: Project, folder: Path, deletions: Deletions, report: Report
             raise ProjectError(
                 f"Clip {clip_index} has changed in the meantime.", hint="Check again what can be applied."
             )
-        acted |= _deleting(state, old_reference, deletions.edits, acted)
+        acted |= _deleting(state, old_reference, deletions.edits, deletions.objects, acted)
         new = _new_state(state, deletions, clip_index, fingerprints)
         fingerprints[state.header.fingerprint] = new.header.fingerprint
         if clip_index == deletions.reference_index:
             new_reference = new
         if new.header == state.header:
-            left |= _deleting(state, new_reference, deletions.edits, left)
+            left |= _deleting(state, new_reference, deletions.edits, deletions.objects, left)
             continue
         path = project.clip_path(clip_index)
         rewrite_clip(path, folder / path.name, ClipState(new.arrays, _described(new, new_reference)))
         changed.append(clip_index)
         renumbered |= _renumbered(state, new, deletions.own(clip_index))
         written = read_clip_state(folder / path.name)
-        left |= _deleting(written, new_reference, with_new_numbers(deletions.edits, renumbered), left)
+        edits, objects = (
+            with_new_numbers(deletions.edits, renumbered),
+            objects_with_new_numbers(deletions.objects, renumbered),
+        )
+        left |= _deleting(written, new_reference, edits, objects, left)
     report(len(order), len(order))
     during = with_new_numbers(deletions.edits, renumbered)
+    objects = objects_with_new_numbers(deletions.objects, renumbered)
     done = set() if deletions.untrained else acted - left  # clips that come later may still need them
     after = tuple(edit for edit in during if edit.edit_id not in done or _shows_something(edit))
-    return StagedClips(deletions.edits, during, after, tuple(changed), deletions.n_anchors)
+    return StagedClips(deletions.edits, deletions.objects, during, objects, after, tuple(changed), deletions.n_anchors)
 
 
 def _shows_something(edit: Edit) -> bool:
@@ -205,7 +214,9 @@ def _renumbered(before: ClipState, now: ClipState, gone: Rows) -> dict:
     return sets
 
 
-def _deleting(state: ClipState, reference: ClipState | None, edits: tuple[Edit, ...], known: set[int]) -> set[int]:
+def _deleting(
+    state: ClipState, reference: ClipState | None, edits: tuple[Edit, ...], objects: Objects, known: set[int]
+) -> set[int]:
     """Numbers of the edits that delete something of a clip. known: Edits to skip."""
     from engine.editing.permanent.deleted_anchors import deletes_something
 
@@ -220,4 +231,4 @@ def _deleting(state: ClipState, reference: ClipState | None, edits: tuple[Edit, 
     if not asked:
         return set()
     clip = loaded(state, None if state.is_reference else reference)
-    return {edit.edit_id for edit in asked if deletes_something(clip, edits, edit)}
+    return {edit.edit_id for edit in asked if deletes_something(clip, edits, edit, objects)}

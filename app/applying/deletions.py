@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.document.project_document import ProjectDocument
 from app.project.clips.clip_versions import read_finished
 from app.project.project import Project
 from engine.backends.table import process_backend
@@ -15,6 +16,7 @@ from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
 from engine.editing.actions import Delete
 from engine.editing.edit import Edit
+from engine.editing.scene_object import Objects
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
@@ -54,13 +56,14 @@ class Deletions:
     """The anchors that the clips of a project can lose.
 
     Attributes:
-        edits: Of the document.
+        edits, objects: Of the document.
         clips: The finished clips, by index.
         untrained: Indices of the others, whose deletions are unknown.
         reference_index: Of the clip that others inherit from; None where none does.
     """
 
     edits: tuple[Edit, ...]
+    objects: Objects
     clips: dict[int, ClipDeletions]
     untrained: tuple[int, ...]
     reference_index: int | None
@@ -94,18 +97,19 @@ def find_deletions(
     clips: Sequence[Clip],
     report: Report = lambda n_done, n_all: None,
     *,
-    edits: tuple[Edit, ...] | None = None,
+    document: ProjectDocument | None = None,
 ) -> Deletions:
     """Examine all finished clips, one at a time; takes about a second each.
 
     Args:
         clips: All of the capture.
         report: Its exceptions end the work.
-        edits: The stack; None for that of the document.
+        document: Has the edits; None for that of the project.
     Raises:
         ProjectError: A clip is damaged, an edit is, there is nothing to delete, or the clips share one field.
     """
-    edits = project.document.edits if edits is None else edits
+    document = project.document if document is None else document
+    edits, objects = document.edits, document.objects
     if not any(edit.is_on and isinstance(edit.action, Delete) for edit in edits):
         raise ProjectError(
             "Nothing to apply: no active edit deletes anything.",
@@ -124,9 +128,9 @@ def find_deletions(
         if state is None or not _is_current(state, reference):
             untrained.append(clip.clip_index)
             continue
-        found[clip.clip_index] = _of_clip(clip.clip_index, state, reference, edits)
+        found[clip.clip_index] = _of_clip(clip.clip_index, state, reference, document)
     report(len(clips), len(clips))
-    return Deletions(edits, found, tuple(untrained), reference_index)
+    return Deletions(edits, objects, found, tuple(untrained), reference_index)
 
 
 def reference_of(project: Project, reference_index: int | None) -> ClipState | None:
@@ -159,12 +163,14 @@ def _is_current(state: ClipState, reference: ClipState | None) -> bool:
     return reference is not None and state.header.reference_fingerprint == reference.header.fingerprint
 
 
-def _of_clip(clip_index: int, state: ClipState, reference: ClipState | None, edits: tuple[Edit, ...]) -> ClipDeletions:
+def _of_clip(
+    clip_index: int, state: ClipState, reference: ClipState | None, document: ProjectDocument
+) -> ClipDeletions:
     from engine.editing.permanent.deleted_anchors import deleted_anchors
     from engine.model.host_array import host_array
 
     clip = loaded(state, reference)
-    deleted, model = deleted_anchors(clip, edits), clip.model
+    deleted, model = deleted_anchors(clip, document.edits, document.objects), clip.model
     result = ClipDeletions(clip_index, state.header.fingerprint)
     for role, rows in deleted.items():
         anchors = model.anchor_set(role)

@@ -10,7 +10,7 @@ from app.cli.arguments import EXIT_OK, path_argument
 from app.cli.job_arguments import add_job_arguments, check_given, chosen_frames, given_entries
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.evaluation.headless import open_trained
-from app.export.edits_line import included_lines
+from app.export.edits.edits_line import included_lines
 from app.export.export_progress import ExportProgress, ExportResult
 from app.export.jobs.job import ExportJob
 from app.export.jobs.table import KINDS, formats_of, named_job

@@ -8,7 +8,7 @@ from app.cli.arguments import EXIT_OK, parse_range, path_argument
 from app.cli.job_arguments import add_job_arguments, given_entries
 from app.cli.terminal.progress import ProgressLine
 from app.evaluation.headless import TrainedProject, open_trained
-from app.export.edits_line import included_lines
+from app.export.edits.edits_line import included_lines
 from app.export.jobs.video import VideoJob
 from app.export.video.formats import FORMATS, format_of
 from app.project.opening.project_access import open_project

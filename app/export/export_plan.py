@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.export.edits_line import included_lines
+from app.export.edits.edits_line import included_lines
 from app.export.export_choices import ExportChoices, ExportContext
 from app.export.jobs.answers import Answers
 from app.export.staging import check_target

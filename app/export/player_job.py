@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
+from app.export.edits.written_edits import written_edits
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report
 from app.export.jobs.player import PlayerJob
@@ -16,7 +17,6 @@ from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_file, staged_folder
 from app.export.take import TakeFrame, take_frames, timing_of
-from app.export.written_edits import written_edits
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
 from engine.export.player.blocks import Block, Packer

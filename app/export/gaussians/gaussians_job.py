@@ -10,6 +10,7 @@ import numpy as np
 
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
+from app.export.edits.written_edits import written_edits
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.gaussians.gaussian_files import SIDECAR
@@ -18,7 +19,6 @@ from app.export.jobs.gaussians import GaussiansJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
 from app.export.take import take_frames
-from app.export.written_edits import written_edits
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS, FULL_PLY, Format
 from engine.export.world import FileWorld, world

@@ -12,6 +12,7 @@ import av.error
 
 from app.background.jobs import JobCancelled
 from app.evaluation.headless import TrainedProject
+from app.export.edits.written_edits import written_edits
 from app.export.jobs.video import VideoJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import staged_file, staged_folder
@@ -20,7 +21,6 @@ from app.export.video.passes import Painter, PassPicture
 from app.export.video.plan import VideoPlan, plan_video
 from app.export.video.writers.film import FilmWriter
 from app.export.video.writers.sequence import write_depth_png, write_exr_picture, write_png
-from app.export.written_edits import written_edits
 from app.training.rate import SmoothedRate
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress

@@ -46,13 +46,13 @@ class Permanence:
         if self._is_busy:  # a second click
             return
         self._is_busy = True
-        project, clips, edits = opened.project, opened.clips, opened.project.document.edits
+        project, clips, document = opened.project, opened.clips, opened.project.document
 
         def find(context: JobContext) -> Deletions:
             def report(n_done: int, n_all: int) -> None:
                 context.report(n_done / max(n_all, 1))
 
-            return find_deletions(project, clips, report, edits=edits)
+            return find_deletions(project, clips, report, document=document)
 
         if not command.is_confirmed:
             self._jobs.start("Looking for deleted anchors", find, self._found, self._failed)
@@ -92,12 +92,15 @@ class Permanence:
         project, content = opened.project, self._document.content
         try:
             _check_idle(service)
-            if self._document.project is not project or content is None or content.edits != staged.before:
+            if self._document.project is not project or content is None:
+                raise ProjectError("Another project is open.", hint="Open this one again.")
+            if (content.edits, content.objects) != (staged.before, staged.objects_before):
                 raise ProjectError("The edits have changed in the meantime.", hint="Apply them again.")
             self._n_done += 1
             step = (NAME, self._n_done)
-            if staged.during != staged.before:
-                self._document.change(replace(content, edits=staged.during), NAME, merge=step)
+            if (staged.during, staged.objects) != (staged.before, staged.objects_before):
+                during = replace(content, edits=staged.during, objects=staged.objects)
+                self._document.change(during, NAME, merge=step)
                 if not self._document.settle():  # it has to be on disk before the clips are others
                     raise ProjectError("Recent edits are not saved yet.", hint="Apply them again in a moment.")
         except EngineError as error:

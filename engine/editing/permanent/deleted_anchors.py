@@ -12,9 +12,10 @@ from engine.editing.actions import Delete, Hide
 from engine.editing.edit import Edit
 from engine.editing.edited_clip import EditedClip
 from engine.editing.effects import EditStack, Effects
+from engine.editing.scene_object import NO_OBJECTS, Objects
 
 
-def deleted_anchors(clip: EditedClip, edits: tuple[Edit, ...]) -> dict[str, np.ndarray]:
+def deleted_anchors(clip: EditedClip, edits: tuple[Edit, ...], objects: Objects = NO_OBJECTS) -> dict[str, np.ndarray]:
     """Anchors all of whose Gaussians are deleted in all frames of the clip in which they exist, by role.
 
     What is only hidden counts as if it were seen: it is to come back when the edit that hides it is switched off. An
@@ -23,6 +24,7 @@ def deleted_anchors(clip: EditedClip, edits: tuple[Edit, ...]) -> dict[str, np.n
     Args:
         clip: All of it.
         edits: The stack.
+        objects: Of the document.
     Returns:
         By rows of the set. [A] bool
     Raises:
@@ -30,7 +32,7 @@ def deleted_anchors(clip: EditedClip, edits: tuple[Edit, ...]) -> dict[str, np.n
     """
     rows = clip.rows
     is_needed, is_deleted = np.zeros(rows.n, bool), np.zeros(rows.n, bool)
-    stack = EditStack(tuple(edit for edit in edits if not isinstance(edit.action, Hide)))
+    stack = EditStack(tuple(edit for edit in edits if not isinstance(edit.action, Hide)), objects)
     for frame in clip.clip.frame_indices():
         deleted, left = _deleted_and_left(clip, frame, stack.at(frame))
         exists = _flags(clip, frame, Effects())
@@ -44,15 +46,15 @@ def deleted_anchors(clip: EditedClip, edits: tuple[Edit, ...]) -> dict[str, np.n
     return found
 
 
-def deletes_something(clip: EditedClip, edits: tuple[Edit, ...], edit: Edit) -> bool:
+def deletes_something(clip: EditedClip, edits: tuple[Edit, ...], edit: Edit, objects: Objects = NO_OBJECTS) -> bool:
     """Whether an edit of the stack still deletes a Gaussian in some frame of a clip, hidden ones included."""
     rest = tuple(one for one in edits if not isinstance(one.action, Hide))
     before = rest[: rest.index(edit)]
     for frame in clip.clip.frame_indices():
         if not (edit.is_on and edit.scope.holds_at(frame)):
             continue
-        without = EditStack(before).at(frame)
-        then = Effects.made((*without.all, *EditStack((edit,)).at(frame).all))
+        without = EditStack(before, objects).at(frame)
+        then = Effects.made((*without.all, *EditStack((edit,), objects).at(frame).all))
         if (_flags(clip, frame, without) != _flags(clip, frame, then)).any():
             return True
     return False

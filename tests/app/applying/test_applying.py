@@ -22,8 +22,9 @@ from app.project.project import Project
 from engine.clip_files.array_names import LOG_DRIFT
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.editing.actions import Delete, Expose, Hide, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere
+from engine.editing.edit import Box, Edit, Everything, ObjectTarget, Picked, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
+from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from engine.errors import DiskError, ProjectError
 from engine.raster.gaussians import Gaussians
 from tests.app.stored_project import copy_stored
@@ -53,6 +54,42 @@ def assert_same(before: list[Gaussians], after: list[Gaussians]) -> None:
     for one, other in zip(before, after, strict=True):
         for mine, theirs in zip(one.tensors(), other.tensors(), strict=True):
             np.testing.assert_array_equal(mine.numpy(), theirs.numpy())
+
+
+def test_an_object_is_deleted_for_good_and_others_keep_their_gaussians(folder: Path) -> None:
+    with_project = open_project(folder)
+    trained = opened(with_project)
+    header = trained.header(0)
+    clips = trained.clips[:2]
+
+    def rows(first: int, stop: int) -> tuple[PickedRows, ...]:
+        return (PickedRows(0, header.origin, "static", pack_rows(np.arange(first, stop))),)
+
+    k = header.decoder.gaussians_per_anchor
+
+    def made(object_id: int, first: int, stop: int) -> SceneObject:
+        found = tuple(
+            ObjectInClip(clip.start, clip.stop, rows(first, stop), ((clip.start, clip.stop),), origin=header.origin)
+            for clip in clips
+        )
+        return SceneObject(object_id, f"object {object_id}", seeds=(ObjectSeed(0, rows(first, stop)),), clips=found)
+
+    gone, kept = made(1, 0, 4 * k), made(2, 4 * k, 7 * k)
+    edit = Edit(1, "", ObjectTarget(1), Delete())
+    show_kept = Edit(2, "", ObjectTarget(2), Hide(), is_inverted=True)
+    with_project.change(replace(with_project.document, edits=(edit, show_kept), objects=(gone, kept)), "edit")
+    before = seen(with_project)
+    assert len(before[0])
+    staged = applied(with_project)
+    assert staged.n_anchors >= 4
+    assert_same(before, seen(with_project))
+    document = with_project.document
+    assert [one.edit_id for one in document.edits] == [2]
+    now = opened(with_project).header(0).origin
+    assert now != header.origin
+    assert [clip.origin for clip in document.objects[1].clips] == [now, now]
+    assert now in {part.origin for part in document.objects[1].seeds[0].added}
+    with_project.close()
 
 
 def applied(project: Project, n_clips: int = 2) -> applying.StagedClips:

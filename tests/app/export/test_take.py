@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from app.evaluation.headless import TrainedProject, open_trained
-from app.export.edits_line import included_lines
+from app.export.edits.edits_line import included_lines
 from app.export.export_progress import ExportProgress
 from app.export.gaussians import gaussians_job
 from app.export.jobs.gaussians import GaussiansJob

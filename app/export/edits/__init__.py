@@ -1,0 +1,1 @@
+"""The edits that go along with an export."""
