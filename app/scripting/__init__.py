@@ -19,7 +19,19 @@ from app.scripting.functions import apply_edit, change, export, open_project, re
 from app.scripting.scripted_project import ScriptedProject
 from engine.editing import actions
 from engine.editing.actions import *  # noqa: F403 - every action
-from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, Picked, PickedRows, Scope, Sphere
+from engine.editing.edit import (
+    EVERYWHERE,
+    Box,
+    Edit,
+    Everything,
+    KeyedVolume,
+    Picked,
+    PickedRows,
+    Prism,
+    Scope,
+    Sphere,
+    VolumeKey,
+)
 from engine.errors import CaptureError, DiskError, EngineError, PreparationError, ProjectError, TrainingError
 
 __all__ = [
@@ -30,10 +42,12 @@ __all__ = [
     "Edit",
     "EngineError",
     "Everything",
+    "KeyedVolume",
     "Picked",
     "PickedFrames",
     "PickedRows",
     "PreparationError",
+    "Prism",
     "ProjectDocument",
     "ProjectError",
     "Scope",
@@ -41,6 +55,7 @@ __all__ = [
     "Sphere",
     "TrainingError",
     "Turntable",
+    "VolumeKey",
     "apply_edit",
     "change",
     "export",

@@ -10,8 +10,10 @@ from torch import Tensor
 
 from engine.camera.rotations import matrices_of
 from engine.editing.clip_rows import ClipRows
-from engine.editing.edit import Box, Everything, Picked, Sphere
+from engine.editing.edit import Box, Everything, Picked, Prism, Sphere
 from engine.editing.effects import Effect
+from engine.editing.prisms import in_prism
+from engine.model.host_array import host_array
 
 MAX_TABLES = 64
 """Sets of picked Gaussians that are kept unpacked, a byte per Gaussian of the clip."""
@@ -34,7 +36,7 @@ class TargetFinder:
         """Whether an effect acts on each of some Gaussians. [N] bool
 
         The target is inverted, not whether it must come from the reference clip. Picks from before a clip was
-        trained anew stand for nothing, inverted or not. A centre that is not finite lies in no box and no sphere.
+        trained anew stand for nothing, inverted or not. A centre that is not finite lies in no volume.
 
         Args:
             means: Their centres now. [N, 3]
@@ -50,6 +52,8 @@ class TargetFinder:
             case Sphere():
                 away = means.double() - means.new_tensor(effect.target.center, dtype=torch.float64)
                 is_meant = (away * away).sum(1) <= effect.target.radius**2
+            case Prism():
+                is_meant = torch.from_numpy(in_prism(effect.target, host_array(means))).to(self._device)
             case Picked():
                 table = self._table(effect.target)
                 if table is None:
