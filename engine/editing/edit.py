@@ -190,7 +190,7 @@ class KeyedVolume(Struct, frozen=True, forbid_unknown_fields=True, tag="keyed"):
 def is_same_shape(a: Volume, b: Volume) -> bool:
     """Whether two volumes differ only in place, sizes and turn, so that one can become the other."""
     if isinstance(a, Prism) and isinstance(b, Prism):
-        return a.outline == b.outline and a.apex == b.apex
+        return a.outline == b.outline and (a.apex is None) == (b.apex is None)
     return type(a) is type(b)
 
 

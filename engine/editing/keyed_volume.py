@@ -15,7 +15,7 @@ from msgspec import structs
 from engine.camera.key_curves import along_curve, tangents_of
 from engine.camera.rotations import inverse_quats, quat_product, quats_of_turns, turns_of_quats
 from engine.editing.actions import Quat, Vector
-from engine.editing.edit import MIN_SPACING_FRAMES, KeyedVolume, Sphere, Volume, VolumeKey, is_same_shape
+from engine.editing.edit import MIN_SPACING_FRAMES, KeyedVolume, Prism, Sphere, Volume, VolumeKey, is_same_shape
 
 
 def volume_at(keyed: KeyedVolume, frame: float) -> Volume:
@@ -78,10 +78,10 @@ class _Curves:
         self._volumes = volumes
         self._times = np.array([key.frame for key in keyed.keys])
         self._lengths = np.diff(self._times)
-        self._places = np.array([[*volume.center, *np.log(_sizes(volume))] for volume in volumes])
-        steps = np.diff(self._places, axis=0)
-        parts = [tangents_of(part, self._lengths) for part in (steps[:, :3], steps[:, 3:])]  # one slows no other
-        self._rates = np.concatenate(parts, axis=1)
+        self._centers = _Curve(np.array([volume.center for volume in volumes]), self._lengths)
+        self._sizes = _Curve(np.log([_sizes(volume) for volume in volumes]), self._lengths)
+        apexes = [[one.apex] for one in volumes if isinstance(one, Prism) and one.apex is not None]
+        self._apexes = _Curve(np.log(apexes), self._lengths) if apexes else None
         quats = np.array([(1.0, 0.0, 0.0, 0.0) if isinstance(one, Sphere) else one.quat for one in volumes])
         self._quats = quats / np.linalg.norm(quats, axis=1, keepdims=True)
         self._turns = turns_of_quats(quat_product(inverse_quats(self._quats[:-1]), self._quats[1:]))
@@ -89,14 +89,27 @@ class _Curves:
     def at(self, piece: int, frame: float) -> Volume:
         """The volume at a frame of a piece."""
         share = (frame - self._times[piece]) / self._lengths[piece]
-        pieces, shares = np.array([piece]), np.array([share])
-        place = along_curve(self._places, self._rates, self._lengths, pieces, shares)[0]
-        center, sizes = _vector(place[:3]), np.exp(place[3:])
+        center, sizes = _vector(self._centers.at(piece, share)), np.exp(self._sizes.at(piece, share))
         volume = self._volumes[piece]
         if isinstance(volume, Sphere):
             return Sphere(center, float(sizes[0]))
         quat = quat_product(self._quats[piece], quats_of_turns(share * self._turns[piece]))
-        return structs.replace(volume, center=center, half_sizes=_vector(sizes), quat=_quat(quat))
+        changed = structs.replace(volume, center=center, half_sizes=_vector(sizes), quat=_quat(quat))
+        if isinstance(changed, Prism) and self._apexes is not None:
+            return structs.replace(changed, apex=float(np.exp(self._apexes.at(piece, share))[0]))
+        return changed
+
+
+class _Curve:
+    """A curve through values at keys [P + 1, D]; lengths: Of its pieces. [P]"""
+
+    def __init__(self, values: np.ndarray, lengths: np.ndarray) -> None:
+        self._values, self._lengths = values, lengths
+        self._tangents = tangents_of(np.diff(values, axis=0), lengths)
+
+    def at(self, piece: int, share: float) -> np.ndarray:
+        """The values at a share of a piece. [D]"""
+        return along_curve(self._values, self._tangents, self._lengths, np.array([piece]), np.array([share]))[0]
 
 
 @lru_cache(maxsize=64)

@@ -5,10 +5,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from msgspec import structs
 from numba import njit
 
+from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rotations import matrices_of, quats_of
+from engine.editing.actions import Vector
 from engine.editing.edit import MAX_CORNERS, Prism
+from engine.editing.selection.seen_from import SeenFrom
+
+LOW, MARGIN = 0.02, 0.1
+"""What counts of things is without this share at either end, plus this share of the rest as room."""
 
 
 def in_prism(prism: Prism, points: np.ndarray) -> np.ndarray:
@@ -42,10 +49,27 @@ def axes_of_prism(prism: Prism) -> np.ndarray:
     return matrices_of(np.asarray(prism.quat) / np.linalg.norm(prism.quat))
 
 
-def in_outline(points: np.ndarray, outline: tuple[tuple[float, float], ...]) -> np.ndarray:
+def in_outline(points: np.ndarray, outline: tuple[tuple[float, float], ...] | np.ndarray) -> np.ndarray:
     """Points [N, 2] that a closed polygon goes around. [N] bool"""
-    corners = np.array(outline, np.float64)
+    corners = np.ascontiguousarray(outline, np.float64)
     return _in_outline(np.ascontiguousarray(points, np.float64), corners)
+
+
+def with_depth(prism: Prism, center: Vector, half_depth: float) -> Prism:
+    """A prism that ends elsewhere along its own z axis; its sides stay where they are.
+
+    Args:
+        center: Its new middle, on the axis.
+    Raises:
+        ValueError: It would reach beyond the place where its sides meet.
+    """
+    if prism.apex is None:
+        return structs.replace(prism, center=center, half_sizes=(*prism.half_sizes[:2], half_depth))
+    before = prism.apex * prism.half_sizes[2]
+    after = before + float(np.subtract(center, prism.center) @ axes_of_prism(prism)[:, 2])
+    width, height, _ = prism.half_sizes
+    sizes = (width * after / before, height * after / before, half_depth)
+    return structs.replace(prism, center=center, half_sizes=sizes, apex=after / half_depth)
 
 
 def prism_of_lasso(
@@ -86,6 +110,43 @@ def prism_of_lasso(
     scaled = np.clip(outline / [width, height], -1.0, 1.0)
     corners_of = tuple((float(u), float(v)) for u, v in scaled)
     return Prism((x, y, z), (width, height, half_depth), corners_of, (a, b, c, d), distance / half_depth)
+
+
+def depths_under(
+    pixels: np.ndarray, means: np.ndarray, opacities: np.ndarray, view: SeenFrom
+) -> tuple[float, float] | None:
+    """How near and how far the Gaussians under a closed line are, without the few nearest and farthest of them.
+
+    Args:
+        pixels: Corners of the line, px. [P, 2]
+        means: Scene units. [N, 3]
+        opacities: They count by these. [N]
+    Returns:
+        Along the ray through the middle of the line, with some room, scene units; None where nothing is under it.
+    """
+    corners = np.asarray(pixels, np.float64)
+    seen = to_camera(np.asarray(means, np.float64), view.world_to_camera)
+    with np.errstate(invalid="ignore"):
+        seen = seen[rows := np.flatnonzero(seen[:, 2] > view.near)]
+    is_under = in_outline(to_pixels(seen, view.K), corners)
+    if not is_under.any():
+        return None
+    middle = np.array([*(corners.min(axis=0) + corners.max(axis=0)) / 2, 1.0])
+    forward = np.linalg.solve(view.K, middle)
+    away = seen[is_under] @ (forward / np.linalg.norm(forward))
+    near, far = weighted_quantiles(away, np.asarray(opacities, np.float64)[rows[is_under]], (LOW, 1.0 - LOW))
+    room = max(MARGIN * (far - near), 0.01 * far)
+    return max(near - room, view.near, 1e-3 * far), far + room
+
+
+def weighted_quantiles(values: np.ndarray, weights: np.ndarray, shares: tuple[float, ...]) -> list[float]:
+    """Values below which these shares of the weight lie. values, weights: At least one, weights not negative. [N]"""
+    order = np.argsort(values, kind="stable")
+    summed = np.cumsum(weights[order])
+    if not summed[-1] > 0.0:
+        summed = np.arange(1.0, len(values) + 1.0)
+    places = np.searchsorted(summed, np.array(shares) * summed[-1])
+    return values[order[np.minimum(places, len(values) - 1)]].tolist()
 
 
 def _fewer(corners: np.ndarray, most: int) -> np.ndarray:

@@ -28,7 +28,7 @@ _KINDS: Any = st.sampled_from(
     (
         st.builds(Box, _PLACES, _SIZES, _QUATS),
         st.builds(Sphere, _PLACES, st.floats(0.01, 20)),
-        st.builds(Prism, _PLACES, _SIZES, st.just(OUTLINE), _QUATS, st.just(1.5)),
+        st.builds(Prism, _PLACES, _SIZES, st.just(OUTLINE), _QUATS, st.floats(1.01, 50)),
     )
 )
 
@@ -80,6 +80,10 @@ def test_it_stays_between_its_keys(keyed: KeyedVolume, frame: float) -> None:
     else:
         assert not isinstance(found, Sphere)
         assert abs(math.hypot(*found.quat) - 1.0) < 1e-6
+        if isinstance(found, Prism):
+            assert found.outline is OUTLINE
+            assert found.apex is not None
+            assert found.apex > 1.0
 
 
 def test_between_two_keys_places_are_even_sizes_grow_by_factors_and_turns_are_even() -> None:

@@ -11,9 +11,10 @@ from app.session.editing.edit_commands import ChangeEdit
 from app.session.editing.selection_commands import InvertSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
-from engine.editing.edit import Box, Edit, Sphere
+from engine.editing.edit import Edit, Sphere, Volume
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, axes_of, middle_of
+from ui.viewport.editing.select_tool import VOLUME_TOOLS
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +22,7 @@ class Subject:
     """A thing with handles.
 
     Attributes:
-        thing: A box, a sphere or a movement.
+        thing: A volume or a movement.
         edit: The edit it belongs to; None of what the user has drawn to select.
     """
 
@@ -36,14 +37,14 @@ class Subject:
         return ChangeEdit(structs.replace(self.edit, **part), gesture, verb)
 
 
-def drawn_volume(ui: UiState) -> Box | Sphere | None:
-    """The box or sphere that the user has drawn to select, while that tool is in use."""
+def drawn_volume(ui: UiState) -> Volume | None:
+    """The volume that the user has drawn to select, while that tool is in use."""
     tool = ui.selecting
-    return tool.volume if tool.kind in ("box", "sphere") and not tool.is_dragging else None
+    return tool.volume if tool.kind in VOLUME_TOOLS and not tool.is_dragging else None
 
 
 def invert_selection(dispatch: Dispatch, ui: UiState) -> None:
-    """Select all that is not selected; of a box or sphere that was drawn, everything outside of it is meant then."""
+    """Select all that is not selected; of a volume that was drawn, everything outside of it is meant then."""
     dispatch(InvertSelection())
     if drawn_volume(ui) is not None:
         ui.editing.is_outside = not ui.editing.is_outside
@@ -59,16 +60,16 @@ def subject_of(session: SessionView, ui: UiState) -> Subject | None:
     return None if thing is None else Subject(thing, edit)
 
 
-def meant(session: SessionView, ui: UiState) -> tuple[Box | Sphere | None, str]:
-    """Target of a new edit: the box or sphere that was drawn, with its words; None stands for the selection.
+def meant(session: SessionView, ui: UiState) -> tuple[Volume | None, str]:
+    """Target of a new edit: the volume that was drawn, with its words; None stands for the selection.
     No words where there is neither."""
     volume = drawn_volume(ui)
     if volume is not None:
-        return volume, "the box" if isinstance(volume, Box) else "the sphere"
+        return volume, f"the {type(volume).__name__.lower()}"
     return None, "the selection" if session.selection.n_gaussians else ""
 
 
-def pivot_of(session: SessionView, volume: Box | Sphere | None) -> Vector:
+def pivot_of(session: SessionView, volume: Volume | None) -> Vector:
     """Where a movement turns about: the middle of the things it moves, as shown. Scene units"""
     if volume is not None:
         return _vector(middle_of(volume))
@@ -76,7 +77,7 @@ def pivot_of(session: SessionView, volume: Box | Sphere | None) -> Vector:
     return _vector(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
 
 
-def bounds_of(session: SessionView, volume: Box | Sphere | None) -> tuple[Vector, Vector] | None:
+def bounds_of(session: SessionView, volume: Volume | None) -> tuple[Vector, Vector] | None:
     """The box along the axes of the scene around a volume, else around the centres of what is selected and shown; None
     where nothing is, or its box has no room in it. Scene units"""
     if volume is not None:

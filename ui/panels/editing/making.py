@@ -15,7 +15,7 @@ from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_
 from app.session.editing.selection_commands import ClearSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Everything, Scope, Sphere, Target
+from engine.editing.edit import Everything, Scope, Sphere, Target, Volume
 from engine.editing.reach import Reach, reach_of
 from ui.panels.editing.edit_subject import bounds_of, invert_selection, meant, pivot_of
 from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
@@ -25,7 +25,7 @@ FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """First values of new edits."""
 
 
-First = Callable[[SessionView, Box | Sphere | None], Action]
+First = Callable[[SessionView, Volume | None], Action]
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ def mark_moving(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(MarkBox("dynamic", *bounds))
 
 
-def _reach(session: SessionView, volume: Box | Sphere | None, scope: Scope, *, is_inverted: bool = False) -> Reach:
+def _reach(session: SessionView, volume: Volume | None, scope: Scope, *, is_inverted: bool = False) -> Reach:
     """Where a new edit would act."""
     picked = () if volume is not None else session.selection.counts
     return reach_of(picked, scope, session.edits.clips, is_inverted=is_inverted)
@@ -131,7 +131,7 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if session.selection.words and volume is None:
             text_wrapped_dim(session.selection.words)
     else:
-        text_wrapped_dim("Select Gaussians, or draw a box or sphere; colours and light can be changed everywhere.")
+        text_wrapped_dim("Select Gaussians, or draw a volume; colours and light can be changed everywhere.")
     if volume is not None:
         if imgui.checkbox("Everything outside", ui.editing.is_outside)[0]:
             invert_selection(dispatch, ui)

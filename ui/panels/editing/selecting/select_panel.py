@@ -63,7 +63,7 @@ def draw_selection(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
     _draw_changes(session, dispatch, ui)
     imgui.separator_text("By attribute")
     draw_attribute(session, dispatch, ui)
-    imgui.separator_text("Box or sphere by numbers")
+    imgui.separator_text("Volume by numbers")
     draw_volume_numbers(session, dispatch, ui)
     imgui.end_disabled()
 
