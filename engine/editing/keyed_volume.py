@@ -15,7 +15,17 @@ from msgspec import structs
 from engine.camera.key_curves import along_curve, tangents_of
 from engine.camera.rotations import inverse_quats, quat_product, quats_of_turns, turns_of_quats
 from engine.editing.actions import Quat, Vector
-from engine.editing.edit import MIN_SPACING_FRAMES, KeyedVolume, Prism, Sphere, Volume, VolumeKey, is_same_shape
+from engine.editing.edit import (
+    MIN_SPACING_FRAMES,
+    Box,
+    KeyedVolume,
+    Prism,
+    Sphere,
+    Target,
+    Volume,
+    VolumeKey,
+    is_same_shape,
+)
 
 
 def volume_at(keyed: KeyedVolume, frame: float) -> Volume:
@@ -25,6 +35,18 @@ def volume_at(keyed: KeyedVolume, frame: float) -> Volume:
     if place < 0 or place == len(keys) - 1 or frame == keys[place].frame:
         return keys[max(place, 0)].volume
     return _curves(keyed).at(place, frame)
+
+
+def volume_of(target: Target, frame: float) -> Volume | None:
+    """The volume that a target is at a moment; None where it is none."""
+    if isinstance(target, KeyedVolume):
+        return volume_at(target, frame)
+    return target if isinstance(target, Box | Sphere | Prism) else None
+
+
+def with_volume(target: Target, frame: float, volume: Volume) -> Volume | KeyedVolume:
+    """A target that is another volume now: a keyed one at that frame only. Raises ValueError like `with_key`."""
+    return with_key(target, frame, volume) if isinstance(target, KeyedVolume) else volume
 
 
 def key_at(keyed: KeyedVolume, frame: float) -> int | None:

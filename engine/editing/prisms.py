@@ -22,7 +22,7 @@ def in_prism(prism: Prism, points: np.ndarray) -> np.ndarray:
     """Points in a prism; one that is not finite is not. points: Scene units. [N, 3]; returns [N] bool"""
     own = own_points(prism, points)
     with np.errstate(invalid="ignore"):
-        is_in = (np.abs(own) <= 1.0).all(axis=1)
+        is_in = np.all(np.abs(own) <= 1.0, axis=1, keepdims=True)[:, 0]
     is_in[is_in] = in_outline(own[is_in, :2], prism.outline)
     return is_in
 

@@ -130,7 +130,9 @@ def test_keys_are_set_replaced_moved_and_removed() -> None:
     assert timed(keyed, 1, 100.0).keys[1].frame == 8.0
     assert timed(keyed, 1, -100.0).keys[1].frame == 6.0
     assert timed(keyed, 2, 30.0).keys[2].frame == 30.0
-    rest = without_key(without_key(keyed, 0), 1)
+    rest = without_key(keyed, 0)
+    assert isinstance(rest, KeyedVolume)
+    rest = without_key(rest, 1)
     assert isinstance(rest, KeyedVolume)
     assert without_key(rest, 0) == two, "without keys it rests where the last one was"
     with pytest.raises(ValueError, match="not of the shape"):

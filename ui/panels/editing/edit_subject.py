@@ -12,6 +12,7 @@ from app.session.editing.selection_commands import InvertSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
 from engine.editing.edit import Edit, Sphere, Volume
+from engine.editing.keyed_volume import with_volume
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, axes_of, middle_of
 from ui.viewport.editing.select_tool import VOLUME_TOOLS
@@ -24,17 +25,21 @@ class Subject:
     Attributes:
         thing: A volume or a movement.
         edit: The edit it belongs to; None of what the user has drawn to select.
+        frame: The shown frame: a keyed volume that is changed gets a key there.
     """
 
     thing: Thing
     edit: Edit | None = None
+    frame: int = 0
 
     def with_thing(self, thing: Thing, gesture: int, verb: str) -> ChangeEdit | None:
         """The command that gives the edit another one; None without an edit."""
         if self.edit is None:
             return None
-        part = {"action": thing} if isinstance(thing, Transform) else {"target": thing}
-        return ChangeEdit(structs.replace(self.edit, **part), gesture, verb)
+        if isinstance(thing, Transform):
+            return ChangeEdit(structs.replace(self.edit, action=thing), gesture, verb)
+        target = with_volume(self.edit.target, self.frame, thing)
+        return ChangeEdit(structs.replace(self.edit, target=target), gesture, verb)
 
 
 def drawn_volume(ui: UiState) -> Volume | None:
@@ -56,8 +61,9 @@ def subject_of(session: SessionView, ui: UiState) -> Subject | None:
     if volume is not None:
         return Subject(volume)
     edit = session.edits.edit(ui.editing.chosen)
-    thing = ui.editing.shown_thing(edit)
-    return None if thing is None else Subject(thing, edit)
+    frame = session.timeline.frame_index
+    thing = ui.editing.shown_thing(edit, frame)
+    return None if thing is None else Subject(thing, edit, frame)
 
 
 def meant(session: SessionView, ui: UiState) -> tuple[Volume | None, str]:

@@ -1,8 +1,9 @@
 """How the height of the timeline is shared: which rows there are, and which give way where there is not room for all.
 
-Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, camera, markers. Ruler and clips are
-always there, and the keys of the camera where there is a camera path. In a low panel quality gives way first, then
-markers, cache, camera, seams and the overview, last the transport row.
+Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, camera, volumes, markers. Ruler and
+clips are always there, the keys of the camera where there is a camera path, and those of a volume while its edit is
+chosen. In a low panel quality gives way first, then markers, cache, volumes, camera, seams and the overview, last the
+transport row.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS = (
+OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, VOLUMES, MARKERS = (
     "overview",
     "ruler",
     "clips",
@@ -18,14 +19,15 @@ OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS = (
     "quality",
     "cache",
     "camera",
+    "volumes",
     "markers",
 )
-LANES = (SEAMS, QUALITY, CACHE, CAMERA, MARKERS)
+LANES = (SEAMS, QUALITY, CACHE, CAMERA, VOLUMES, MARKERS)
 """Those that can be folded away."""
-ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS)
-KEPT_FIRST = (OVERVIEW, SEAMS, CAMERA, CACHE, MARKERS, QUALITY)
+ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, VOLUMES, MARKERS)
+KEPT_FIRST = (OVERVIEW, SEAMS, CAMERA, VOLUMES, CACHE, MARKERS, QUALITY)
 HEIGHTS = {OVERVIEW: 16.0, RULER: 22.0, CLIPS: 32.0, SEAMS: 18.0, QUALITY: 30.0, CACHE: 12.0}
-HEIGHTS |= {CAMERA: 18.0, MARKERS: 18.0}
+HEIGHTS |= {CAMERA: 18.0, VOLUMES: 18.0, MARKERS: 18.0}
 """Smallest ones, units of the screen."""
 MIN_CLIPS_HEIGHT = 18.0
 LARGEST = {CLIPS: 54.0, QUALITY: 90.0}
