@@ -115,6 +115,12 @@ COMMANDS = {
         "Nothing was changed.",
         has_backend=True,
     ),
+    "object": Command(
+        "make objects of a project, find them in its clips, and correct them",
+        "app.cli.projects.object_command",
+        "Nothing was changed.",
+        has_backend=True,
+    ),
     "gate": Command("show what is static in a project and why, and overrule it", "app.cli.projects.gate_command"),
     "repair": Command("show what is left of a damaged project, and repair it", "app.cli.projects.repair_command"),
     "doctor": Command(

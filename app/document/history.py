@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
+from msgspec import structs
+
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 
 MAX_STEPS = 500
 """Steps that can be taken back; the oldest go."""
@@ -49,7 +52,23 @@ class Placed:
     settings: ProjectSettings
 
 
-Event = Changed | Undone | Redone | Placed
+@dataclass(frozen=True, slots=True)
+class Found:
+    """An object was found in clips. Not a step: it follows from what somebody has selected, so that it belongs to every
+    document of the history that has the object with these seeds. Undoing the step that made the object takes it back.
+
+    Attributes:
+        object_id: Of the object.
+        seeds: For which it was looked for.
+        clips: Where it is.
+    """
+
+    object_id: int
+    seeds: tuple[ObjectSeed, ...]
+    clips: tuple[ObjectInClip, ...]
+
+
+Event = Changed | Undone | Redone | Placed | Found
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +125,8 @@ class DocumentHistory:
                 return self._redone() if self.future else self
             case Placed(settings=settings):
                 return replace(self, present=replace(self.present, settings=settings))
+            case Found():
+                return self.each(_Finding(event).in_document)
 
     def each(self, change: Callable[[ProjectDocument], ProjectDocument]) -> DocumentHistory:
         """The history with every document changed alike."""
@@ -131,6 +152,27 @@ class DocumentHistory:
             return document
         settings = replace(then, capture=now.capture, follow_links=now.follow_links)
         return replace(document, settings=settings)
+
+
+class _Finding:
+    """Puts into documents what was found. Documents of a history share their objects, and do so afterwards."""
+
+    def __init__(self, found: Found) -> None:
+        self._found = found
+        self._known: dict[int, tuple[SceneObject, SceneObject]] = {}
+
+    def in_document(self, document: ProjectDocument) -> ProjectDocument:
+        objects = tuple(self._object(one) for one in document.objects)
+        is_same = all(a is b for a, b in zip(objects, document.objects, strict=True))
+        return document if is_same else replace(document, objects=objects)
+
+    def _object(self, one: SceneObject) -> SceneObject:
+        found = self._found
+        if one.object_id != found.object_id or one.seeds != found.seeds:
+            return one
+        if id(one) not in self._known:
+            self._known[id(one)] = one, structs.replace(one, clips=found.clips)
+        return self._known[id(one)][1]
 
 
 def _closed(steps: tuple[Step, ...]) -> tuple[Step, ...]:

@@ -68,6 +68,7 @@ class ExportContext(msgspec.Struct, frozen=True):
         in_frame, out_frame: Of the timeline, both included.
         cameras: Names.
         paths: Names of the project's camera paths.
+        objects: Names of the project's objects.
         has_edits: Whether the project has edits that are on.
         has_videos: Whether some camera has a video, which may have sound.
         picture_size: Width and height of a capture camera's picture.
@@ -85,6 +86,7 @@ class ExportContext(msgspec.Struct, frozen=True):
     picture_size: tuple[int, int]
     fps: float
     paths: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
     has_videos: bool = False
     has_edits: bool = False
 

@@ -14,8 +14,8 @@ from app.export.jobs.player import PlayerJob
 from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_file, staged_folder
+from app.export.written_edits import written_edits
 from engine.capture.clip import Clip
-from engine.editing.effects import EditStack
 from engine.errors import ProjectError
 from engine.export.player.blocks import Block, Packer
 from engine.export.player.page import page_bytes, page_writer
@@ -147,7 +147,7 @@ def _relative_url(name: str) -> str:
 
 
 def _scene(opened: TrainedProject, job: PlayerJob) -> SceneFrames:
-    return SceneFrames(opened, edits=None if job.has_edits else EditStack())
+    return SceneFrames(opened, edits=written_edits(opened.project.document, job))
 
 
 def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:

@@ -25,6 +25,7 @@ from app.project.opening.opening import open_capture_of
 from app.project.opening.project_access import open_project
 from app.project.project import Project
 from app.scripting.actions import action_called
+from app.scripting.scripted_objects import ScriptedObjects
 from app.session.editing.edit_commands import (
     AddEdit,
     ChangeEdit,
@@ -57,7 +58,7 @@ TellExport = Callable[[ExportProgress], None]
 TellNote = Callable[[str], None]
 
 
-class ScriptedProject:
+class ScriptedProject(ScriptedObjects):
     """An open project; made by `app.scripting.open_project`, and closed by `close` or at the end of a `with` block.
 
     Args:
@@ -246,7 +247,7 @@ class ScriptedProject:
         target = Everything() if target is None else target
         command = AddEdit(chosen, target, scope, is_inverted=is_inverted != inverts, name=name)
         made = changed(self.document, command).document.edits[-1]
-        reach = reach_of_edit(made, self._anchors(), self.document.objects)
+        reach = reach_of_edit(made, self.anchors, self.document.objects)
         check_acts(reach, scope)
         self._tell(reach_note(reach, scope), on_note)
         self._carry_out(command)
@@ -254,16 +255,17 @@ class ScriptedProject:
 
     def replace_edit(self, edit: Edit, *, on_note: TellNote | None = None) -> None:
         """Put an edit in the place of the one with its number. on_note: See `apply_edit`. Raises ProjectError."""
-        self._tell(reach_note(reach_of_edit(edit, self._anchors(), self.document.objects), edit.scope), on_note)
+        self._tell(reach_note(reach_of_edit(edit, self.anchors, self.document.objects), edit.scope), on_note)
         self._carry_out(ChangeEdit(edit))
 
     @property
     def reaches(self) -> dict[int, Reach]:
         """In which frames each edit of the stack acts, by its number."""
-        anchors = self._anchors()
+        anchors = self.anchors
         return {edit.edit_id: reach_of_edit(edit, anchors, self.document.objects) for edit in self.edits}
 
-    def _anchors(self) -> tuple[ClipAnchors, ...]:
+    @property
+    def anchors(self) -> tuple[ClipAnchors, ...]:
         """Which anchors each clip has; none while the capture cannot be opened, which is nothing to an edit."""
         try:
             clips = self.clips

@@ -8,6 +8,7 @@ from app.session.captures.capture_commands import CorrectCapture, SynchroniseCam
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep, Redo, Undo
 from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
+from app.session.editing.object_commands import ObjectCommand
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
@@ -58,6 +59,7 @@ TITLES: dict[type, str] = {
     Redo: "The step cannot be redone",
     GoToStep: "That step of the history cannot be reached",
     **dict.fromkeys(get_args(EditCommand), "The edit cannot be made"),
+    **dict.fromkeys(get_args(ObjectCommand), "The object cannot be changed"),
     **dict.fromkeys(get_args(PathCommand), "The camera path cannot be changed"),
     AskStartOver: "Training cannot start over",
     StartOver: "Training cannot start over",

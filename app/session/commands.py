@@ -12,6 +12,7 @@ from app.session.captures.capture_commands import CalibrationCommand, DoctorComm
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, HistoryCommand
 from app.session.editing.mark_commands import MarkCommand
+from app.session.editing.object_commands import ObjectCommand
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.export_commands import ExportCommand
@@ -55,6 +56,7 @@ Command = (
     | LookCommand
     | SelectionCommand
     | EditCommand
+    | ObjectCommand
     | MarkCommand
     | PathCommand
     | HistoryCommand

@@ -37,6 +37,8 @@ from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.mark_commands import MarkCommand
+from app.session.editing.object_commands import ObjectCommand
+from app.session.editing.objects import Objects
 from app.session.editing.selecting import ProjectSelecting
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.editing.selection_status import SelectionStatus
@@ -167,6 +169,17 @@ class Session(SessionFace):
         self.marking = Marking(self.document)
         lost, reaches = LostEdits(lambda: live.service), EditReaches(lambda: live.service)
         self.editing = Edits(self.document, self.selecting, lost, reaches)
+        self.objects = parts.add(
+            Objects(
+                self.document,
+                self.selecting,
+                lambda: self.timeline,
+                reaches,
+                jobs,
+                self.notices,
+                is_training=self._is_training,
+            )
+        )
         self.command_texts = CommandTexts(lambda: self.project, live.is_finished)
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
@@ -214,6 +227,8 @@ class Session(SessionFace):
                 self.showing.obey(command)
             case _ if isinstance(command, EditCommand):
                 self.editing.apply(command)
+            case _ if isinstance(command, ObjectCommand):
+                self.objects.apply(command)
             case _ if isinstance(command, HistoryCommand):
                 with self.camera_paths.showing_change():
                     self.editing.go(command.n_steps)

@@ -129,6 +129,12 @@ def reach_of(
     )
 
 
+def unsearched(one: SceneObject, clips: Iterable[ClipAnchors]) -> tuple[ClipAnchors, ...]:
+    """The trained clips in which nobody has looked for an object since it was corrected, or they were trained."""
+    known = {(clip.start, clip.stop): clip.origin for clip in one.clips}
+    return tuple(clip for clip in clips if clip.origin and known.get((clip.start, clip.stop)) != clip.origin)
+
+
 def _reach_of_object(found: SceneObject | None, edit: Edit, clips: Sequence[ClipAnchors]) -> Reach:
     """Of an edit of an object: it acts where the object was found, an inverted one everywhere."""
     if found is None:

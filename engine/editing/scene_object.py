@@ -45,6 +45,8 @@ class ObjectInClip(Struct, frozen=True, forbid_unknown_fields=True):
         seen: Runs of frames in which it is there, as first ones and those after the last.
         confidence: How sure that is, 0 to 1.
         doubt: Why it is not sure.
+        origin: Of the clip that was searched, see ClipHeader.origin; where the clip has another one now, and where this
+            is empty, it has to be searched yet.
 
     Raises:
         ValueError: There is no frame in it.
@@ -56,6 +58,7 @@ class ObjectInClip(Struct, frozen=True, forbid_unknown_fields=True):
     seen: tuple[tuple[_Count, _Count], ...] = ()
     confidence: _Share = 1.0
     doubt: Doubt = ""
+    origin: str = ""
 
     def __post_init__(self) -> None:
         if self.stop <= self.start:

@@ -19,7 +19,7 @@ from engine.storage.typed_json import EntryError, to_type
 
 Made = TypeVar("Made")
 
-_TARGET_OPTIONS = ("everything", "box", "turned_box", "sphere", "target", "where", "at", "inverted")
+_TARGET_OPTIONS = ("everything", "box", "turned_box", "sphere", "object", "target", "where", "at", "inverted")
 
 
 class _Given(Struct):
@@ -39,6 +39,22 @@ def add_edit_arguments(command: argparse.ArgumentParser) -> None:
 def _add_targets(group: argparse._ArgumentGroup) -> None:
     one = group.add_mutually_exclusive_group()
     one.add_argument("--everything", action="store_true", help="all Gaussians")
+    one.add_argument("--object", metavar="NAME", help="an object of the project, by name or number")
+    _add_volumes(one)
+    one.add_argument("--target", metavar="JSON", help="in the form that --json prints; - reads standard input")
+    _add_where(group)
+    group.add_argument("--at", type=int, metavar="FRAME", help="frame in which --where looks (default: 0)")
+    group.add_argument("--inverted", action="store_true", help="everything except the target")
+
+
+def add_pick_arguments(group: argparse._ArgumentGroup) -> None:
+    """Arguments that pick Gaussians of one frame, see `chosen_picks`."""
+    _add_volumes(group.add_mutually_exclusive_group())
+    _add_where(group)
+    group.add_argument("--at", type=int, metavar="FRAME", help="the frame in which they are picked")
+
+
+def _add_volumes(one: argparse._MutuallyExclusiveGroup) -> None:
     one.add_argument(
         "--box", nargs=6, type=float, metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"), help="a box by two corners"
     )
@@ -50,15 +66,15 @@ def _add_targets(group: argparse._ArgumentGroup) -> None:
         help="a box by its centre, half its lengths, and the quaternion that turns it",
     )
     one.add_argument("--sphere", nargs=4, type=float, metavar=("X", "Y", "Z", "R"), help="a sphere: centre and radius")
-    one.add_argument("--target", metavar="JSON", help="in the form that --json prints; - reads standard input")
+
+
+def _add_where(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--where",
         metavar="TEXT",
         help="only Gaussians with these attributes, as 'opacity<0.05 and motion=static'; opacity, size, clip, birth, "
         "motion",
     )
-    group.add_argument("--at", type=int, metavar="FRAME", help="frame in which --where looks (default: 0)")
-    group.add_argument("--inverted", action="store_true", help="everything except the target")
 
 
 def _add_actions(group: argparse._ArgumentGroup) -> None:
@@ -120,20 +136,40 @@ def chosen_target(options: argparse.Namespace, project: ScriptedProject, read_te
     Raises:
         ProjectError: It cannot be.
     """
-    target = _shape(options, read_text)
+    if options.object is not None:
+        target: Target = project.object(options.object)
+    else:
+        target = _given_target(options, read_text) if options.target is not None else _volume(options)
     if options.where is None:
         if options.at is not None:
             raise ProjectError("--at is given without --where.", hint="Leave it out.")
         return target
     if isinstance(target, Picked | ObjectTarget):
-        raise ProjectError("--where goes with a box, a sphere, a prism or everything.", hint="Leave --target out.")
+        given = "--target" if options.object is None else "--object"
+        raise ProjectError("--where goes with a box, a sphere, a prism or everything.", hint=f"Leave {given} out.")
     if isinstance(target, KeyedVolume):
         target = volume_at(target, options.at or 0)
     volume = None if isinstance(target, Everything) else target
     return project.select(options.where, frame_index=options.at or 0, volume=volume)
 
 
-def _shape(options: argparse.Namespace, read_text: Callable[[str], str]) -> Target:
+def chosen_picks(options: argparse.Namespace, project: ScriptedProject) -> tuple[int, Picked]:
+    """A frame, and the Gaussians picked in it.
+
+    Raises:
+        ProjectError: Something is missing or not valid, or nothing is picked.
+    """
+    volume = _volume(options)
+    if options.at is None:
+        raise ProjectError("The frame is missing.", hint="Give the frame to select in, as --at 12.")
+    if isinstance(volume, Everything) and options.where is None:
+        raise ProjectError("Nothing is selected.", hint="Give --box, --sphere or --where.")
+    where = options.where or ""
+    volume = None if isinstance(volume, Everything) else volume
+    return options.at, project.select(where, frame_index=options.at, volume=volume)
+
+
+def _volume(options: argparse.Namespace) -> Everything | Box | Sphere:
     if options.box is not None:
         a, b = options.box[:3], options.box[3:]
         center = _vector((x + y) / 2 for x, y in zip(a, b, strict=True))
@@ -145,12 +181,14 @@ def _shape(options: argparse.Namespace, read_text: Callable[[str], str]) -> Targ
         return _made("--turned-box", lambda: Box(_vector(numbers[:3]), _vector(numbers[3:6]), quat))
     if options.sphere is not None:
         return _made("--sphere", lambda: Sphere(_vector(options.sphere[:3]), options.sphere[3]))
-    if options.target is not None:
-        try:
-            return to_type({"target": parse_json(read_text(options.target))}, _Given).target
-        except (JsonError, EntryError) as error:
-            raise ProjectError(f"--target is not valid ({error}).") from error
     return Everything()
+
+
+def _given_target(options: argparse.Namespace, read_text: Callable[[str], str]) -> Target:
+    try:
+        return to_type({"target": parse_json(read_text(options.target))}, _Given).target
+    except (JsonError, EntryError) as error:
+        raise ProjectError(f"--target is not valid ({error}).") from error
 
 
 def chosen_action(options: argparse.Namespace, target: Target) -> tuple[Action, bool]:

@@ -9,6 +9,7 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
+from app.cli.projects import edit_verbs
 from app.cli.projects.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -30,6 +31,8 @@ from engine.storage.json_files import JsonError, json_text, parse_json
 from engine.text import one_line
 
 EDIT_SCHEMA = 1
+VERB_TABLES = (edit_verbs,)
+"""Modules with `VERBS` by name, `add_verb_arguments`, and `take_verb`, which turns a verb into the options it means."""
 MAX_STDIN_CHARACTERS = 1 << 28
 _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo", "apply_permanently")
 
@@ -37,6 +40,16 @@ _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream edit`."""
     command.add_argument("project", type=path_argument, help="project folder")
+    verbs = {name: verb.meaning for table in VERB_TABLES for name, verb in table.VERBS.items()}
+    command.add_argument(
+        "verb",
+        nargs="?",
+        choices=tuple(verbs),
+        metavar="VERB",
+        help=f"what to do; the same as options do: {'; '.join(f'{name}: {words}' for name, words in verbs.items())}",
+    )
+    for table in VERB_TABLES:
+        table.add_verb_arguments(command)
     add_edit_arguments(command)
     stack = command.add_argument_group("the stack and the history")
     one = stack.add_mutually_exclusive_group()
@@ -68,6 +81,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
+    for table in VERB_TABLES:
+        table.take_verb(options)
     chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
     is_new = not chosen and has_action(options)
     _check_options(options, chosen[0] if chosen else "")

@@ -1,11 +1,12 @@
 """A file of the journal: the events since a step of the document, one line each.
 
     {"journal": 2, "step": 123, "document": checksum or null, "after": checksum, "checksum": ...}   its start
-    {"kept": 126             , "checksum": ...}                                                     its last step
+    {"kept": 127             , "checksum": ...}                                                     its last step
     {"step": 124, "do": "change", "name": ..., "merge": ..., "patch": {...}, "after": ..., "checksum": ...}
     {"step": 125, "do": "undo", "name": ..., "patch": {...}, "after": ..., "checksum": ...}     or "redo"
     {"step": 126, "do": "place", "capture": ..., "follow_links": ..., "after": ..., "checksum": ...}
-    {"end": 126, "after": ..., "checksum": ...}
+    {"step": 127, "do": "find", "object": 3, "patch": {...}, "after": ..., "checksum": ...}
+    {"end": 127, "after": ..., "checksum": ...}
 
 Each line holds the checksum of the line before it as "after", and its own checksum over all of it, so that no line can
 be changed, left out or moved without being noticed. The last line says that nothing is missing; the next event is

@@ -17,7 +17,7 @@ from app.export.gaussians.gaussian_sequence import GaussianSequence
 from app.export.jobs.gaussians import GaussiansJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
-from engine.editing.effects import EditStack
+from app.export.written_edits import written_edits
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS, FULL_PLY, Format
 from engine.export.world import FileWorld, world
@@ -71,7 +71,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
 
 
 def _scene(opened: TrainedProject, job: GaussiansJob) -> SceneFrames:
-    return SceneFrames(opened, edits=None if job.has_edits else EditStack())
+    return SceneFrames(opened, edits=written_edits(opened.project.document, job))
 
 
 def _frames(scene: SceneFrames, job: GaussiansJob) -> list[int]:

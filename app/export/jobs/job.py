@@ -50,6 +50,16 @@ EDITS = option(
     flags=(Flag("--without-edits", "Left out: the scene as it was trained", constant=False),),
 )
 
+OBJECT = option(
+    "Only this object, without the rest of the scene",
+    "Object",
+    none="the whole scene",
+    titles={"": "Whole scene", "*": "Only {}"},
+    names="objects",
+    like="NAME",
+    flags=(Flag("--object"),),
+)
+
 
 class JobModule(Protocol):
     """The functions of the module with the work of a job."""

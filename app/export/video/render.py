@@ -20,9 +20,9 @@ from app.export.video.passes import Painter, PassPicture
 from app.export.video.plan import VideoPlan, plan_video
 from app.export.video.writers.film import SOUND_RATE, FilmWriter
 from app.export.video.writers.sequence import write_depth_png, write_exr_picture, write_png
+from app.export.written_edits import written_edits
 from app.training.rate import SmoothedRate
 from engine.capture.files.sound import SoundReader
-from engine.editing.effects import EditStack
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
 from engine.text import duration_text
@@ -75,7 +75,7 @@ def render_video(
         DiskError: The disk refused; nothing is left behind.
         JobCancelled: `is_cancelled` said so; nothing is left behind.
     """
-    edits = None if job.has_edits else EditStack()
+    edits = written_edits(opened.project.document, job)
     scene = SceneFrames(opened, n_threads=n_threads, features=job.features, edits=edits)
     plan = plan_video(job, scene)
     painter = Painter(scene, job, plan.moments, plan.view_of, plan.step)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 
 from app.background.latest import LatestWorker
-from app.document.history import Changed, DocumentHistory, Event, Redone, Undone, coalesced
+from app.document.history import Changed, DocumentHistory, Event, Found, Redone, Undone, coalesced
 from app.document.project_document import ProjectDocument
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
@@ -115,6 +115,10 @@ class KeptDocument(SessionPart):
             ProjectError: Nothing can be changed now, or not to this.
         """
         self._happen(Changed(name, document, merge))
+
+    def found(self, found: Found) -> None:
+        """Take up where an object is, in all documents of the history. Raises ProjectError like `change`."""
+        self._happen(found)
 
     def undo(self) -> None:
         """Take back the last step; nothing happens without one.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
+from app.document.history import Changed, DocumentHistory, Event, Found, Redone, Undone
 from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings
 from app.document.storing.stored_document import plain_document
@@ -20,6 +20,7 @@ from engine.capture.exclusions import Exclusions, PaintedMask, Stroke
 from engine.editing.actions import Delete, Expose, Hide, Recolor, Transform
 from engine.editing.edit import Box, Edit, KeyedVolume, Picked, PickedRows, Prism, Scope, Sphere, VolumeKey
 from engine.editing.picks import pack_rows
+from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from engine.gate.regions import sphere_region
 
 SETTINGS = ProjectSettings(capture="somewhere", fingerprint="abc", holdout=("1",), overrides={"passes": 6.0})
@@ -48,12 +49,15 @@ def random_events(
             event = Undone()
         elif rng.random() < 0.2 and history.future:
             event = Redone()
+        elif rng.random() < 0.5 and history.present.objects:
+            one = rng.choice(history.present.objects)
+            event = Found(one.object_id, one.seeds, _clips(rng))
         history = history.after(event)
         yield event, history
 
 
 def _random_change(document: ProjectDocument, rng: random.Random, number: int) -> tuple[str, ProjectDocument, Any]:
-    kind = rng.randrange(10)
+    kind = rng.randrange(11)
     edits = document.edits
     new_id = max((edit.edit_id for edit in edits), default=-1) + 1
     x, y, z = (rng.uniform(-3, 3) for _ in range(3))
@@ -81,6 +85,10 @@ def _random_change(document: ProjectDocument, rng: random.Random, number: int) -
         mask = PaintedMask("cam01", 0, 30, (Stroke(((0.5, abs(x) / 3), (0.6, 0.5)), 0.02),))
         excluded = Exclusions(("cam03",) if x > 0 else (), (), (*document.exclusions.masks, mask)[-3:])
         return "paint", replace(document, exclusions=excluded), "brush"
+    if kind == 10:
+        seed = ObjectSeed(number, (PickedRows(0, "abc", "moving", pack_rows(np.arange(rng.randrange(1, 9)))),))
+        made = SceneObject(number, f"object {number}", seeds=(seed,))
+        return "make an object", replace(document, objects=(*document.objects, made)[-3:]), None
     if kind == 8:
         world = World((0.0, 0.0, rng.choice((1.0, -1.0))), abs(x) + 0.5) if x > 0 else World()
         return "turn the world", replace(document, world=world), None
@@ -89,6 +97,11 @@ def _random_change(document: ProjectDocument, rng: random.Random, number: int) -
     settings = replace(document.settings, overrides={k: v for k, v in overrides.items() if k == "passes"})
     markers = (*document.markers, *markers)[-4:]
     return "name", replace(document, labels=labels, markers=markers, settings=settings), "type"
+
+
+def _clips(rng: random.Random) -> tuple[ObjectInClip, ...]:
+    sets = (PickedRows(0, "abc", "moving", pack_rows(np.arange(rng.randrange(1, 50)))),)
+    return tuple(ObjectInClip(10 * i, 10 * i + 10, sets, ((10 * i, 10 * i + 7),), rng.random()) for i in range(3))
 
 
 def _edited(edit: Edit, rng: random.Random) -> Edit:

@@ -15,6 +15,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from PIL import Image
 
 from app.document.history import DocumentHistory
 from app.evaluation.headless import TrainedProject, open_trained
@@ -35,6 +36,8 @@ from app.training.service import ShownState
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.edit import Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
 from engine.editing.picks import pack_rows
+from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
+from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS
 from tests.app.stored_project import copy_stored
 
@@ -255,6 +258,30 @@ def test_videos_show_it_in_its_frames_alone(format_name: str, opened: TrainedPro
     with av.open(str(out)) as container:
         brightness = [float(frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)]
     assert in_scope([value < 20.0 for value in brightness])
+
+
+def test_an_object_is_written_alone_whatever_edits_there_are(opened: TrainedProject, tmp_path: Path) -> None:
+    """It exists in frames 1 to 3; before and after there is nothing."""
+    header = opened.header(0)
+    rows = PickedRows(0, header.origin, "static", pack_rows(np.arange(5)))
+    clips = tuple(ObjectInClip(start, start + 3, (rows,), ((start, start + 3),)) for start in (0, 3))
+    one = SceneObject(1, "ball", seeds=(ObjectSeed(0, (rows,)),), clips=clips, first=1, stop=4)
+    project = opened.project
+    project.history = DocumentHistory(replace(project.document, objects=(one,), edits=()))
+    job = GaussiansJob(tmp_path / "alone", "ply", range(6), object="BALL")  # type: ignore[arg-type]
+    export_gaussians(opened, job, ignore)
+    sizes = [len(data) for data in contents(tmp_path / "alone")]
+    assert sizes[1] == sizes[2] == sizes[3] > sizes[0] == sizes[4] == sizes[5]
+    render_video(VideoJob(tmp_path / "film", "png", camera=opened.capture.rig.names[2], object="ball"), opened)
+    there = [np.asarray(Image.open(path)).any() for path in sorted((tmp_path / "film").glob("*.png"))]
+    assert there == [False, True, True, True, False, False]
+    export_player(opened, PlayerJob(tmp_path / "ball.html", PickedFrames.of(range(6)), object="ball"), ignore)
+    page = READER["Page"](tmp_path / "ball.html")
+    assert [len(page.frame(frame)["means"]) > 0 for frame in range(6)] == there
+    with pytest.raises(ProjectError) as caught:
+        export_player(opened, PlayerJob(tmp_path / "cat.html", object="cat"), ignore)
+    assert "There is no object 'cat'" in str(caught.value)
+    project.history = DocumentHistory(replace(project.document, objects=()))
 
 
 def test_a_moment_between_two_frames_belongs_to_the_one_before(opened: TrainedProject, tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""Objects of a project, found in its clips."""
