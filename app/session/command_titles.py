@@ -7,6 +7,7 @@ from typing import get_args
 from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep, Redo, Undo
+from app.session.editing.follow_commands import FollowObject
 from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
 from app.session.editing.object_commands import ObjectCommand
 from app.session.editing.selection_commands import SelectionCommand
@@ -59,6 +60,7 @@ TITLES: dict[type, str] = {
     Redo: "The step cannot be redone",
     GoToStep: "That step of the history cannot be reached",
     **dict.fromkeys(get_args(EditCommand), "The edit cannot be made"),
+    FollowObject: "The volume cannot follow the object",
     **dict.fromkeys(get_args(ObjectCommand), "The object cannot be changed"),
     **dict.fromkeys(get_args(PathCommand), "The camera path cannot be changed"),
     AskStartOver: "Training cannot start over",

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from app.session.captures.capture_commands import CalibrationCommand, DoctorCommand, SynchronisationCommand
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, HistoryCommand
+from app.session.editing.follow_commands import FollowCommand
 from app.session.editing.mark_commands import MarkCommand
 from app.session.editing.object_commands import ObjectCommand
 from app.session.editing.selection_commands import SelectionCommand
@@ -57,6 +58,7 @@ Command = (
     | SelectionCommand
     | EditCommand
     | ObjectCommand
+    | FollowCommand
     | MarkCommand
     | PathCommand
     | HistoryCommand

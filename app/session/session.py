@@ -34,6 +34,8 @@ from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand, HistoryCommand
 from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Edits
+from app.session.editing.follow_commands import FollowCommand
+from app.session.editing.following import Following
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.mark_commands import MarkCommand
@@ -180,6 +182,7 @@ class Session(SessionFace):
                 is_training=self._is_training,
             )
         )
+        self.following = parts.add(Following(self.document, jobs, self.notices))
         self.command_texts = CommandTexts(lambda: self.project, live.is_finished)
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
@@ -229,6 +232,8 @@ class Session(SessionFace):
                 self.editing.apply(command)
             case _ if isinstance(command, ObjectCommand):
                 self.objects.apply(command)
+            case _ if isinstance(command, FollowCommand):
+                self.following.apply(command)
             case _ if isinstance(command, HistoryCommand):
                 with self.camera_paths.showing_change():
                     self.editing.go(command.n_steps)

@@ -9,7 +9,7 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
-from app.cli.projects import edit_verbs
+from app.cli.projects import edit_verbs, follow_verb
 from app.cli.projects.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -19,6 +19,7 @@ from app.cli.projects.edit_arguments import (
     has_scope,
     has_target,
 )
+from app.cli.terminal.progress import ProgressLine
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.edit_words import edit_title
 from app.document.changes.reach_words import acting_text, reach_note
@@ -31,7 +32,7 @@ from engine.storage.json_files import JsonError, json_text, parse_json
 from engine.text import one_line
 
 EDIT_SCHEMA = 1
-VERB_TABLES = (edit_verbs,)
+VERB_TABLES = (edit_verbs, follow_verb)
 """Modules with `VERBS` by name, `add_verb_arguments`, and `take_verb`, which turns a verb into the options it means."""
 MAX_STDIN_CHARACTERS = 1 << 28
 _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo", "apply_permanently")
@@ -83,7 +84,9 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
     for table in VERB_TABLES:
         table.take_verb(options)
-    chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
+    chosen = [name for name in (*_OF_STACK, "follow") if getattr(options, name) is not None]
+    if len(chosen) > 1:
+        raise ProjectError(f"--{chosen[0].replace('_', '-')} is given with follow.", hint="Leave one of them out.")
     is_new = not chosen and has_action(options)
     _check_options(options, chosen[0] if chosen else "")
     with open_scripted(options.project, read_only=not (chosen or is_new), launch=launch) as project:
@@ -143,10 +146,19 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
         project.replace_edit(_replaced(options, project), on_note=_say)
     elif options.put is not None:
         _put(options.put, project)
+    elif options.follow is not None:
+        _follow(options, project)
     elif options.apply_permanently:
         project.apply_permanently()
     else:
         _take_steps(options, project)
+
+
+def _follow(options: argparse.Namespace, project: ScriptedProject) -> None:
+    line = ProgressLine(is_quiet=options.json)
+    name, edit_id = options.follow
+    project.follow_object(name, edit_id, on_progress=lambda done: line.update(f"Following {name}", done))
+    line.finish()
 
 
 def _take_steps(options: argparse.Namespace, project: ScriptedProject) -> None:

@@ -8,10 +8,13 @@ from imgui_bundle import imgui
 from msgspec import structs
 
 from app.session.editing.edit_commands import ChangeEdit
+from app.session.editing.follow_commands import FollowObject
 from app.session.session_view import SessionView
 from app.session.showing.look_commands import SetFrame
-from engine.editing.edit import Edit, KeyedVolume
+from engine.editing.edit import Edit, KeyedVolume, ObjectTarget
 from engine.editing.keyed_volume import key_at, volume_of, with_key, without_key
+from engine.editing.scene_object import SceneObject
+from engine.text import one_line
 from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 from ui.style.theme import Icon
@@ -54,12 +57,25 @@ def go_to_key(session: SessionView, dispatch: Dispatch, keyed: KeyedVolume, step
     dispatch(SetFrame(session.timeline.clamped(wanted)))
 
 
+def object_to_follow(session: SessionView, edit: Edit) -> SceneObject | None:
+    """The object that an edit acts on, else the first one; None without objects."""
+    target = edit.target
+    own = session.edits.object(target.object_id) if isinstance(target, ObjectTarget) else None
+    return own or next(iter(session.edits.objects), None)
+
+
+def follow(session: SessionView, dispatch: Dispatch, edit: Edit, one: SceneObject) -> None:
+    """Let the volume of an edit go along with an object."""
+    dispatch(FollowObject(one.object_id, edit.edit_id))
+
+
 def draw_volume_keys(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     """The keys in words, and a button for each thing that can be done to them."""
     frame_index, keyed = session.timeline.frame_index, edit.target
     if not isinstance(keyed, KeyedVolume):
         _button(dispatch, ui, "Key here", "volume.key", key_here(edit, frame_index))
         imgui.set_item_tooltip("Lets the volume move: it gets a key at this frame (Shift+K)")
+        _draw_follow(session, dispatch, ui, edit)
         return
     n_keys = len(keyed.keys)
     text_wrapped_dim(
@@ -80,6 +96,18 @@ def draw_volume_keys(session: SessionView, dispatch: Dispatch, ui: UiState, edit
     imgui.same_line()
     _button(dispatch, ui, "Unkey", "volume.unkey", unkey(edit, frame_index))
     imgui.set_item_tooltip("Removes all keys: the volume stays as it is in this frame")
+    _draw_follow(session, dispatch, ui, edit)
+
+
+def _draw_follow(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
+    one = object_to_follow(session, edit)
+    if one is None:
+        return
+    imgui.same_line()
+    if imgui.button("Follow"):
+        follow(session, dispatch, edit, one)
+    ui.mark("volume.follow")
+    imgui.set_item_tooltip(f"Sets keys so that the volume goes along with {one_line(one.name)}")
 
 
 def _button(dispatch: Dispatch, ui: UiState, label: str, name: str, command: ChangeEdit | None) -> None:

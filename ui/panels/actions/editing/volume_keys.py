@@ -7,7 +7,7 @@ from typing import Any
 from app.session.session_view import SessionView
 from engine.editing.edit import KeyedVolume
 from ui.panels.actions.action import EDIT, Action, Run
-from ui.panels.editing.volume_keys import KeyChange, go_to_key, key_here, remove_key, unkey
+from ui.panels.editing.volume_keys import KeyChange, follow, go_to_key, key_here, object_to_follow, remove_key, unkey
 from ui.panels.state import Dispatch, UiState
 
 
@@ -34,6 +34,17 @@ def _go(step: int) -> Run:
             session.notices.add("info", NO_KEYS)
 
     return go
+
+
+def _follow(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    edit = session.edits.edit(ui.editing.chosen)
+    one = None if edit is None else object_to_follow(session, edit)
+    if edit is not None and one is not None:
+        follow(session, dispatch, edit, one)
+
+
+def _no_object(session: SessionView) -> str:
+    return _cannot_edit(session) or ("" if session.edits.objects else "There are no objects yet.")
 
 
 def _cannot_edit(session: SessionView) -> str:
@@ -68,6 +79,14 @@ ACTIONS = (
         EDIT,
         _changed(unkey, NO_KEYS),
         lacks=_cannot_edit,
+        **_EDIT,
+    ),
+    Action(
+        "volume.follow",
+        "Let the volume of the chosen edit follow the object",
+        EDIT,
+        _follow,
+        lacks=_no_object,
         **_EDIT,
     ),
     *(
