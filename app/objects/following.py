@@ -12,12 +12,12 @@ from app.objects.searching import edited_clip
 from app.project.project import Project
 from engine.capture.capture import Capture
 from engine.editing.edit import KeyedVolume, Target
-from engine.editing.keyed_volume import volume_of
 from engine.editing.scene_object import SceneObject
+from engine.editing.volumes.keyed_volume import volume_of
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
-    from engine.editing.following import Crowd
+    from engine.editing.volumes.following import Crowd
 
 Report = Callable[[int, int], None]
 """Receives how many frames are done, and of how many; its exceptions end the work."""
@@ -34,12 +34,12 @@ def follow_in_project(
 
     Args:
         capture: Of the project, open.
-        target: What the edit acts on now: a volume gives its kind, see engine.editing.following.
+        target: What the edit acts on now: a volume gives its kind, see engine.editing.volumes.following.
         report: See Report.
     Raises:
         ProjectError: The object was found nowhere, or a clip is damaged.
     """
-    from engine.editing.following import crowd_of, followed, frames_to_follow
+    from engine.editing.volumes.following import crowd_of, followed, frames_to_follow
 
     opened = open_trained(project, capture)
     trained = set(opened.trained)

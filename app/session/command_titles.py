@@ -7,13 +7,13 @@ from typing import get_args
 from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep, Redo, Undo
-from app.session.editing.follow_commands import FollowObject
 from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
 from app.session.editing.object_commands import ObjectCommand
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
+from app.session.objects.follow_commands import FollowObject
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import AskStartOver, StartOver
 from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SetTrainSetting

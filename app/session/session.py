@@ -34,8 +34,6 @@ from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand, HistoryCommand
 from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Edits
-from app.session.editing.follow_commands import FollowCommand
-from app.session.editing.following import Following
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.mark_commands import MarkCommand
@@ -54,6 +52,8 @@ from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import ProjectMending
 from app.session.notices import Notices
+from app.session.objects.follow_commands import FollowCommand
+from app.session.objects.following import Following
 from app.session.part import SessionParts
 from app.session.paths.camera_paths import CameraPaths
 from app.session.paths.path_commands import PathCommand

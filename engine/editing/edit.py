@@ -162,7 +162,7 @@ class VolumeKey(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class KeyedVolume(Struct, frozen=True, forbid_unknown_fields=True, tag="keyed"):
-    """A volume that moves, grows and turns from key to key; see engine.editing.keyed_volume.
+    """A volume that moves, grows and turns from key to key; see engine.editing.volumes.keyed_volume.
 
     Before its first key it rests as it is there, after its last key as there.
 
@@ -228,7 +228,7 @@ class ObjectTarget(Struct, frozen=True, forbid_unknown_fields=True, tag="object"
 
 
 TargetOfMoment = Everything | Box | Sphere | Prism | Picked
-"""Those that can be looked up in one clip at one moment; see engine.editing.moments.at_moment."""
+"""Those that can be looked up in one clip at one moment; see engine.editing.effects.at_moment."""
 Target = TargetOfMoment | ObjectTarget | KeyedVolume
 
 # ---------------------------------------------------------------- the edit

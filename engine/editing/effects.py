@@ -15,12 +15,29 @@ import msgspec
 from msgspec import Struct
 
 from engine.editing.actions import Action
-from engine.editing.edit import Edit, KeyedVolume, ObjectTarget, TargetOfMoment, edits_at
-from engine.editing.moments import at_moment
+from engine.editing.edit import Edit, KeyedVolume, ObjectTarget, Picked, Target, TargetOfMoment, edits_at
 from engine.editing.scene_object import Objects, object_of
+from engine.editing.volumes.keyed_volume import volume_at
 
 MAX_MOMENTS = 4096
 """Moments whose effects an EditStack keeps."""
+
+
+def at_moment(target: Target, frame: float, objects: Objects) -> TargetOfMoment:
+    """A target as something that can be looked up in the clip of a moment: Gaussians, a volume in its place then.
+
+    Args:
+        frame: In frames of the capture, between frames too.
+        objects: Of the document.
+    """
+    match target:
+        case ObjectTarget():
+            found = object_of(target, objects)
+            return Picked(()) if found is None else found.picked(frame)
+        case KeyedVolume():
+            return volume_at(target, frame)
+        case _:
+            return target
 
 
 class Effect(Struct, frozen=True):

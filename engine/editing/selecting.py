@@ -12,7 +12,7 @@ from engine.camera.rotations import matrices_of
 from engine.editing.clip_rows import ClipRows
 from engine.editing.edit import Box, Everything, Picked, Prism, Sphere
 from engine.editing.effects import Effect
-from engine.editing.prisms import in_prism
+from engine.editing.volumes.prisms import in_prism
 from engine.model.host_array import host_array
 
 MAX_TABLES = 64

@@ -12,7 +12,7 @@ from msgspec import Struct
 from app.scripting.scripted_project import ScriptedProject
 from engine.editing.actions import ACTIONS, Action, Quat, Vector
 from engine.editing.edit import Box, Everything, KeyedVolume, ObjectTarget, Picked, Prism, Scope, Sphere, Target
-from engine.editing.keyed_volume import volume_at
+from engine.editing.volumes.keyed_volume import volume_at
 from engine.errors import ProjectError
 from engine.storage.json_files import JsonError, parse_json
 from engine.storage.typed_json import EntryError, to_type

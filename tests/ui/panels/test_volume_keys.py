@@ -9,7 +9,7 @@ from pyglet.window import key
 from app.session.editing.edit_commands import AddEdit, ChangeEdit
 from engine.editing.actions import Delete, Expose
 from engine.editing.edit import Box, KeyedVolume
-from engine.editing.keyed_volume import volume_at
+from engine.editing.volumes.keyed_volume import volume_at
 from tests.ui.pilot import SHIFT, Pilot
 from ui.panels.state import EDITS
 

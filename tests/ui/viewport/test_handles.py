@@ -11,7 +11,7 @@ import pytest
 from engine.camera.rotations import matrices_of
 from engine.editing.actions import Transform
 from engine.editing.edit import Box, Prism, Sphere
-from engine.editing.prisms import widths_at
+from engine.editing.volumes.prisms import widths_at
 from ui.viewport.editing.handles import (
     Handle,
     HandleView,

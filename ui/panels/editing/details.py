@@ -16,7 +16,7 @@ from app.session.session_view import SessionView
 from engine.camera.rotations import quats_of_turns, turns_of_quats
 from engine.editing.actions import Action, Quat, Transform, Vector
 from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Prism, Scope, Sphere, Volume
-from engine.editing.keyed_volume import volume_of, with_volume
+from engine.editing.volumes.keyed_volume import volume_of, with_volume
 from engine.setting import Setting, settings_of
 from engine.text import one_line
 from ui.panels.editing.fields import label_before, numbers, whole_numbers

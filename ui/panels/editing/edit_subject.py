@@ -12,7 +12,7 @@ from app.session.editing.selection_commands import InvertSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
 from engine.editing.edit import Edit, Sphere, Volume
-from engine.editing.keyed_volume import with_volume
+from engine.editing.volumes.keyed_volume import with_volume
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, axes_of, middle_of
 from ui.viewport.editing.select_tool import VOLUME_TOOLS

@@ -8,12 +8,12 @@ from imgui_bundle import imgui
 from msgspec import structs
 
 from app.session.editing.edit_commands import ChangeEdit
-from app.session.editing.follow_commands import FollowObject
+from app.session.objects.follow_commands import FollowObject
 from app.session.session_view import SessionView
 from app.session.showing.look_commands import SetFrame
 from engine.editing.edit import Edit, KeyedVolume, ObjectTarget
-from engine.editing.keyed_volume import key_at, volume_of, with_key, without_key
 from engine.editing.scene_object import SceneObject
+from engine.editing.volumes.keyed_volume import key_at, volume_of, with_key, without_key
 from engine.text import one_line
 from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState

@@ -11,7 +11,7 @@ import numpy as np
 from app.session.editing.scope_choice import ScopeChoice
 from engine.editing.actions import Transform
 from engine.editing.edit import Edit
-from engine.editing.keyed_volume import volume_of
+from engine.editing.volumes.keyed_volume import volume_of
 from ui.viewport.editing.handles import Handle, Thing
 
 TOGETHER_S = 1.0

@@ -17,7 +17,7 @@ from engine.camera.projection import focal_px, to_camera, to_pixels
 from engine.camera.rotations import matrices_of, quat_product, quats_of_turns
 from engine.editing.actions import Quat, Transform, Vector
 from engine.editing.edit import Box, Prism, Sphere, Volume
-from engine.editing.prisms import with_depth
+from engine.editing.volumes.prisms import with_depth
 
 Thing = Volume | Transform
 """A thing with handles: a place that an edit acts on, or the movement that it makes."""

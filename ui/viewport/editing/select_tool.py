@@ -25,9 +25,9 @@ from app.session.editing.selection_commands import (
 from engine.camera.projection import to_camera
 from engine.camera.rotations import quats_of
 from engine.editing.edit import Box, Prism, Sphere, Volume
-from engine.editing.prisms import prism_of_lasso
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
+from engine.editing.volumes.prisms import prism_of_lasso
 
 ToolKind = Literal["rectangle", "lasso", "brush", "box", "sphere", "prism", "flood"]
 TOOLS: tuple[ToolKind, ...] = get_args(ToolKind)

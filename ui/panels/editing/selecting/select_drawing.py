@@ -9,7 +9,7 @@ from app.session.editing.selection_commands import Rectangle
 from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rotations import matrices_of
 from engine.editing.edit import Prism, Sphere, Volume
-from engine.editing.prisms import axes_of_prism, widths_at
+from engine.editing.volumes.prisms import axes_of_prism, widths_at
 from ui.panels.pieces.widgets import chip
 from ui.panels.state import Rect
 from ui.style import theme

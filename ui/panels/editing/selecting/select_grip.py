@@ -13,9 +13,9 @@ from imgui_bundle import imgui
 
 from app.session.editing.selection_commands import SelectAnchor, SelectVolume
 from app.session.session_view import SessionView
-from engine.editing.prisms import depths_under
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
+from engine.editing.volumes.prisms import depths_under
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.viewport.editing.select_tool import SelectTool

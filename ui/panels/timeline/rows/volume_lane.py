@@ -11,7 +11,7 @@ from app.session.editing.edit_commands import ChangeEdit
 from app.session.session_view import SessionView
 from app.session.showing.look_commands import SetFrame
 from engine.editing.edit import Edit, KeyedVolume
-from engine.editing.keyed_volume import key_at, timed
+from engine.editing.volumes.keyed_volume import key_at, timed
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.rows.diamonds import DRAG_FROM, draw_diamonds, nearest_diamond
 from ui.panels.timeline.rows.rows import VOLUMES

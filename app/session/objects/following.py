@@ -15,9 +15,9 @@ from app.objects.following import Report, follow_in_project
 from app.project.opening.opened_project import OpenedProject
 from app.session.editing.edit_commands import ChangeEdit
 from app.session.editing.edits import changed
-from app.session.editing.follow_commands import FollowObject
 from app.session.editing.kept_document import KeptDocument
 from app.session.notices import Notices
+from app.session.objects.follow_commands import FollowObject
 from app.session.part import SessionPart
 from engine.editing.edit import KeyedVolume, Target
 from engine.editing.scene_object import SceneObject

@@ -11,12 +11,12 @@ from app.project.opening.project_access import open_project
 from app.scripting.scripted_project import open_scripted
 from app.session.commands import CancelJob
 from app.session.editing.edit_commands import AddEdit, RemoveEdit, Undo
-from app.session.editing.follow_commands import FollowObject
+from app.session.objects.follow_commands import FollowObject
 from app.session.projects.project_commands import OpenProject
 from app.session.session import Session
 from engine.editing.actions import Delete
 from engine.editing.edit import Box, KeyedVolume, Sphere, VolumeKey
-from engine.editing.keyed_volume import volume_at
+from engine.editing.volumes.keyed_volume import volume_at
 from engine.errors import ProjectError
 from tests.app.conftest import poll_until
 from tests.app.residuals.conftest import make_project

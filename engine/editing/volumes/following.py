@@ -20,9 +20,9 @@ from engine.capture.clip import Clip
 from engine.editing.actions import Quat, Vector
 from engine.editing.edit import Box, KeyedVolume, Prism, Sphere, Volume, VolumeKey
 from engine.editing.edited_clip import EditedClip
-from engine.editing.keyed_volume import volume_at
-from engine.editing.prisms import LOW, MARGIN, weighted_quantiles
 from engine.editing.scene_object import SceneObject
+from engine.editing.volumes.keyed_volume import volume_at
+from engine.editing.volumes.prisms import LOW, MARGIN, weighted_quantiles
 from engine.errors import ProjectError
 from engine.model.host_array import host_array
 

@@ -12,11 +12,11 @@ from engine.capture.clip import Clip
 from engine.editing.actions import Hide
 from engine.editing.edit import Box, KeyedVolume, Picked, PickedRows, Prism, Sphere, VolumeKey
 from engine.editing.effects import Effect, Effects
-from engine.editing.following import TOLERANCE, Crowd, crowd_of, followed, frames_to_follow, thinned
-from engine.editing.keyed_volume import volume_at
 from engine.editing.picks import pack_rows
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from engine.editing.selection.volumes import in_volume
+from engine.editing.volumes.following import TOLERANCE, Crowd, crowd_of, followed, frames_to_follow, thinned
+from engine.editing.volumes.keyed_volume import volume_at
 from engine.errors import ProjectError
 from tests.engine.editing.edited_clips import CLIP, OWN, REFERENCE, edited, make_clip
 

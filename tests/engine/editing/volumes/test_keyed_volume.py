@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.rotations import matrices_of
 from engine.editing.edit import Box, KeyedVolume, Prism, Sphere, Volume, VolumeKey
-from engine.editing.keyed_volume import key_at, timed, volume_at, with_key, without_key
+from engine.editing.volumes.keyed_volume import key_at, timed, volume_at, with_key, without_key
 
 HALF_TURN = (math.cos(0.7), 0.0, math.sin(0.7), 0.0)
 OUTLINE = ((-1.0, -1.0), (1.0, -1.0), (0.0, 1.0))

@@ -10,10 +10,10 @@ import pytest
 from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rotations import matrices_of
 from engine.editing.edit import MAX_CORNERS, Prism
-from engine.editing.prisms import in_prism, prism_of_lasso
 from engine.editing.selection.in_picture import EXTENT_SIGMAS
 from engine.editing.selection.shapes import lasso_mask
 from engine.editing.selection.volumes import in_volume
+from engine.editing.volumes.prisms import in_prism, prism_of_lasso
 from tests.engine.editing.selection.made_views import scattered
 from tests.engine.editing.slow_truth import is_in_prism
 

@@ -1,0 +1,1 @@
+"""Objects of the open project: volumes that follow them."""
