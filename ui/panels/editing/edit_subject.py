@@ -11,8 +11,9 @@ from app.session.editing.edit_commands import ChangeEdit
 from app.session.editing.selection_commands import InvertSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
-from engine.editing.edit import Edit, Sphere, Volume
+from engine.editing.edit import Edit, Prism, Sphere, Volume
 from engine.editing.volumes.keyed_volume import with_volume
+from engine.editing.volumes.prisms import widths_at
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, axes_of, middle_of
 from ui.viewport.editing.select_tool import VOLUME_TOOLS
@@ -87,7 +88,7 @@ def bounds_of(session: SessionView, volume: Volume | None) -> tuple[Vector, Vect
     """The box along the axes of the scene around a volume, else around the centres of what is selected and shown; None
     where nothing is, or its box has no room in it. Scene units"""
     if volume is not None:
-        reach = volume.radius if isinstance(volume, Sphere) else abs(axes_of(volume)) @ volume.half_sizes
+        reach = _reach(volume)
         low, high = middle_of(volume) - reach, middle_of(volume) + reach
     else:
         means = _selected_means(session)
@@ -95,6 +96,16 @@ def bounds_of(session: SessionView, volume: Volume | None) -> tuple[Vector, Vect
             return None
         low, high = means.min(axis=0), means.max(axis=0)
     return (_vector(low), _vector(high)) if (high > low).all() else None
+
+
+def _reach(volume: Volume) -> float | np.ndarray:
+    """How far a volume reaches from its middle along the axes of the scene, to either side. Scene units"""
+    if isinstance(volume, Sphere):
+        return volume.radius
+    sizes = np.array(volume.half_sizes)
+    if isinstance(volume, Prism):
+        sizes[:2] *= widths_at(volume, np.ones(1))  # its far end is the wider one
+    return abs(axes_of(volume)) @ sizes
 
 
 def _selected_means(session: SessionView) -> np.ndarray:
