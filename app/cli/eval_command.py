@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,10 +11,12 @@ from typing import Any
 from app.cli.arguments import EXIT_OK, add_figure_choices, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.cli.terminal.results import write_text
+from app.document.changes.object_changes import object_named
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.speed.frame_rates import DEFINITION, frame_rates
 from app.export.staging import check_target
+from app.objects.object_figures import object_figures
 from app.project.opening.project_access import open_project
 from app.training.service import Launch
 from engine.storage.json_files import json_text
@@ -30,6 +33,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also measure how many pictures are rendered per second, which takes some seconds",
     )
+    command.add_argument("--object", metavar="NAME", help="also measure PSNR over the pixels of an object alone")
     command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
@@ -38,6 +42,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     if options.json != "-":
         check_target(Path(options.json))
     opened = open_trained(open_project(options.project, is_writable=False))
+    one = None if options.object is None else object_named(opened.project.document, options.object)
     chosen = list(parse_range(options.clips, len(opened.clips), option="--clips", what="clips"))
     if options.clips.strip() == ":":
         chosen = opened.trained
@@ -51,6 +56,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         on_progress=progress,
         say=line.say,
     )
+    if one is not None:
+        document["object"] = object_figures(opened, one, chosen, _object_progress(line, one.name))
     line.finish()
     rates = frame_rates(opened) if options.fps else None
     if rates is not None:
@@ -61,6 +68,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         return EXIT_OK
     write_text(Path(options.json), text + "\n")
     _show_evaluation(line, document)
+    if one is not None:
+        _show_object(line, document["object"])
     if rates is not None:
         line.say(f"{rates.words()}.")
     line.say(f"{len(document['rows'])} rows in {options.json}")
@@ -84,6 +93,16 @@ def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
             f"{_figure(seam['ratio_static'], 2)} times that inside the clips on static pixels, "
             f"{_figure(seam['ratio_moving'], 2)} times on moving ones (truth: {_figure(seam['truth_ratio_moving'], 2)})"
         )
+
+
+def _object_progress(line: ProgressLine, name: str) -> Callable[[int, int], None]:
+    return lambda n_done, n_all: line.update(f"Measuring {name}", n_done / max(n_all, 1), f"{n_done}/{n_all}")
+
+
+def _show_object(line: ProgressLine, found: dict[str, Any]) -> None:
+    for clip, groups in found["clips"].items():
+        held_out, trained_on = (_figure(groups[group]["psnr"], 2) for group in ("held_out", "trained_on"))
+        line.say(f"Clip {clip}, {found['object']} alone: PSNR {held_out} dB held out, {trained_on} dB trained on")
 
 
 def _pictures_text(rows: list[dict[str, Any]], clip_index: int, *, is_held_out: bool) -> str:

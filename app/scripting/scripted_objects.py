@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
@@ -144,6 +144,29 @@ class ScriptedObjects:
         self._happen(Found(one.object_id, one.seeds, clips))
         return self._named(one.object_id)
 
+    def measure_object(
+        self,
+        name: str | int,
+        *,
+        clip_indices: Sequence[int] | None = None,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> dict[str, Any]:
+        """PSNR over the pixels of an object alone, by clip; see app.objects.object_figures.
+
+        Args:
+            clip_indices: All that are trained when None.
+            on_progress: Told how many pictures are done, of how many; its exceptions end the work.
+        Raises:
+            ProjectError: There is no such object, or a clip is not trained.
+        """
+        from app.evaluation.headless import open_trained
+        from app.objects.object_figures import object_figures
+
+        one, opened = self._named(name), open_trained(self._project, self.capture)
+        chosen = opened.trained if clip_indices is None else list(clip_indices)
+        tell = (lambda n_done, n_all: None) if on_progress is None else on_progress
+        return object_figures(opened, one, chosen, tell)
+
     def rename_object(self, name: str | int, new_name: str) -> None:
         """Give an object another name. Raises ProjectError."""
         self._change_object(RenameObject(self._named(name).object_id, new_name))
@@ -156,9 +179,26 @@ class ScriptedObjects:
         """Let an object exist in some frames only; `stop` is not one of them. Raises ProjectError."""
         self._change_object(SetObjectSpan(self._named(name).object_id, first, stop))
 
-    def set_object_trained(self, name: str | int, *, is_trained: bool) -> None:
-        """Say whether clips that are trained from now on see an object. Raises ProjectError."""
-        self._change_object(SetObjectTrained(self._named(name).object_id, is_trained))
+    def set_object_trained(self, name: str | int, *, is_trained: bool, on_progress: TellSearch | None = None) -> None:
+        """Say whether clips that are trained from now on see an object. Where they do not, it is masked in the pictures
+        of the clips in which it was found; in others nobody knows where it is.
+
+        Args:
+            on_progress: See `make_object`.
+        Raises:
+            ProjectError: There is no such object, it was found nowhere, or what `change` raises.
+        """
+        from app.evaluation.headless import open_trained
+        from app.objects.object_masks import object_masks
+
+        one = self._named(name)
+        if is_trained:
+            self._change_object(SetObjectTrained(one.object_id, is_trained=True))
+            return
+        self._project.check_writable()
+        masks = object_masks(open_trained(self._project, self.capture), one, _share_told(on_progress))
+        made = object_changes.set_trained(self.document, one.object_id, is_trained=False, masks=masks)
+        self.change(made, f"train without {one.name}")
 
     def remove_object(self, name: str | int) -> None:
         """Remove an object, and the edits that act on it. Raises ProjectError."""
@@ -208,10 +248,14 @@ class ScriptedObjects:
     def _searched(self, document: ProjectDocument, object_id: int, on_progress: TellSearch | None) -> ProjectDocument:
         from app.objects.searching import find_in_project
 
-        def report(done: float, total: float) -> None:
-            if on_progress is not None:
-                on_progress(done / max(total, 1))
-
         one = object_changes.object_with(document, object_id)
-        clips = find_in_project(self._project, self.capture, one, report)
+        clips = find_in_project(self._project, self.capture, one, _share_told(on_progress))
         return object_changes.with_found(document, object_id, clips)
+
+
+def _share_told(on_progress: TellSearch | None) -> Callable[[float, float], None]:
+    def report(done: float, total: float) -> None:
+        if on_progress is not None:
+            on_progress(done / max(total, 1))
+
+    return report

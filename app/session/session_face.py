@@ -49,6 +49,7 @@ from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
+from engine.editing.edit import Picked
 from engine.editing.selection.ranges import ValueSpread
 from engine.editing.selection.seen_from import SeenFrom
 
@@ -225,6 +226,14 @@ class SessionFace:
     def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
         """Where selected Gaussians are seen; see Selecting.share."""
         return self.selecting.share(gaussians, view, self.views.current_index)
+
+    def object_share(self, object_id: int, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
+        """Where an object is seen in the frame at the playhead, as `selected_share` has it; None without it."""
+        content = self.document.content
+        objects = () if content is None else content.objects
+        one = next((one for one in objects if one.object_id == object_id), None)
+        picked = Picked(()) if one is None else one.picked(self.timeline.frame_index)
+        return self.selecting.share_of(picked, gaussians, view, (self.views.current_index, object_id))
 
     def attribute_spread(self, attribute: str) -> ValueSpread | None:
         """How an attribute is spread over the shown frame; see Selecting.spread."""

@@ -5,6 +5,7 @@ uniform sampler2D share; // of each pixel that selected Gaussians make up
 uniform vec2 size_px;
 uniform float unit_px; // pixels per unit of the interface
 uniform vec3 hue;
+uniform float fill; // 1 with stripes inside, 0 for the line alone
 
 out vec4 color;
 
@@ -29,6 +30,6 @@ void main() {
         return;
     }
     bool is_stripe = mod(at.x + at.y, 9.0 * unit_px) < 3.0 * unit_px;
-    float alpha = smoothstep(0.16, HALF, here) * (is_stripe ? 0.6 : 0.22);
+    float alpha = smoothstep(0.16, HALF, here) * (is_stripe ? 0.6 : 0.22) * fill;
     color = vec4(hue * alpha, alpha);
 }

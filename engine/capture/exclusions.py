@@ -47,13 +47,14 @@ class Stroke(Struct, frozen=True, forbid_unknown_fields=True):
     is_erasing: bool = False
 
 
-class PaintedMask(Struct, frozen=True, forbid_unknown_fields=True):
+class PaintedMask(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A part of a camera's pictures that training does not look at.
 
     Attributes:
         camera: Its name.
         first, stop: Frames [first, stop).
         strokes: In the order in which they were painted.
+        object_id: The object of the document that it covers; None of what somebody has painted.
 
     Raises:
         ValueError: There is no frame in it.
@@ -63,6 +64,7 @@ class PaintedMask(Struct, frozen=True, forbid_unknown_fields=True):
     first: _Count
     stop: _Count
     strokes: tuple[Stroke, ...]
+    object_id: _Count | None = None
 
     def __post_init__(self) -> None:
         if self.stop <= self.first:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from app.background.log_reader import LogLine
+from app.document.changes.object_changes import add_object
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.export.export_choices import ExportChoices
@@ -40,9 +41,11 @@ from app.session.captures.synchronisation_page import SynchronisationPage
 from app.session.commands import CloseQuestion, Command, DismissNotice
 from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing import objects
 from app.session.editing.edit_commands import EditCommand
-from app.session.editing.edits import changed, edits_status
+from app.session.editing.edits import Change, changed, edits_status
 from app.session.editing.mark_commands import MarkRegion, RemoveRegion
+from app.session.editing.object_commands import CorrectObject, FindObject, MakeObject, ObjectCommand, SelectObject
 from app.session.editing.selection_status import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
@@ -91,6 +94,9 @@ from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
 from engine.capture.exclusions import NOTHING_EXCLUDED
 from engine.doctor.finding import Finding
+from engine.editing.edit import PickedRows
+from engine.editing.picks import pack_rows
+from engine.editing.scene_object import ObjectSeed
 from engine.editing.selection.ranges import ValueSpread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
 from engine.gate.regions import GateRegion, sphere_region
@@ -342,6 +348,12 @@ class FakeSession:
         """Nothing."""
         return None
 
+    def object_share(self, object_id: int, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
+        """The middle of the picture."""
+        share = np.zeros((48, 64), np.float32)
+        share[16:32, 16:48] = 1.0
+        return share
+
     def attribute_spread(self, attribute: str) -> ValueSpread | None:
         """Rises evenly from 0 to 1; residuals are not known."""
         return None if attribute in ("error", "flicker") else spread_of(np.linspace(0.0, 1.0, 1000))
@@ -434,6 +446,8 @@ class FakeSession:
                 self.content, self.edits = change.document, edits_status(change.document)
                 self.history = HistoryStatus(undo=change.name, past=(*self.history.past, change.name))
                 self.timeline.markers = Markers(change.document.markers)
+            case _ if isinstance(command, ObjectCommand):
+                self._change_object(command)
             case TrainClip(clip_index=clip_index, is_confirmed=False):
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
@@ -444,6 +458,20 @@ class FakeSession:
                 self.opening.page = self.opening.refused = None
             case DismissNotice():
                 self.notices.dismiss(command.index)
+
+    def _change_object(self, command: ObjectCommand) -> None:
+        """Of what is selected, nothing is known here."""
+        if isinstance(command, MakeObject):
+            rows = PickedRows(0, "a", "moving", pack_rows(np.arange(9)))
+            frame_index = self.timeline.frame_index
+            made = add_object(self.content, ObjectSeed(frame_index, (rows,)), name=command.name)
+            change = Change(made, f"make {made.objects[-1].name}")
+        elif isinstance(command, CorrectObject | FindObject | SelectObject):
+            return
+        else:
+            change = objects.changed(self.content, command)
+        self.content, self.edits = change.document, edits_status(change.document)
+        self.history = HistoryStatus(undo=change.name, past=(*self.history.past, change.name))
 
     def _set_regions(self, regions: tuple[GateRegion, ...]) -> None:
         self.regions = replace(self.regions, regions=regions)

@@ -22,6 +22,7 @@ from ui.panels.ui_requests import UiRequests
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.editing.edit_tool import EditTool
+from ui.viewport.editing.object_tool import ObjectTool
 from ui.viewport.editing.select_tool import SelectTool
 from ui.viewport.excluding.mask_tool import MaskTool
 from ui.viewport.path_tool import PathTool
@@ -80,6 +81,7 @@ class UiState:
         regions: The region that is being chosen, and the one that stands out.
         selecting: The tool that selects, and its options.
         editing: Which edit is chosen, and what is being done to it.
+        objects: Which object is chosen, and which are outlined.
         masks: The brush that paints what training does not see.
         paths: Editing of the camera path's keys.
         navigation: Functions of mouse and keys over a picture.
@@ -106,6 +108,7 @@ class UiState:
     regions: RegionTool = field(default_factory=RegionTool)
     selecting: SelectTool = field(default_factory=SelectTool)
     editing: EditTool = field(default_factory=EditTool)
+    objects: ObjectTool = field(default_factory=ObjectTool)
     masks: MaskTool = field(default_factory=MaskTool)
     paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)

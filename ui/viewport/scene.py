@@ -32,6 +32,7 @@ from ui.gl import (
     Target,
     is_software,
 )
+from ui.viewport.editing.object_layer import ObjectLayer
 from ui.viewport.editing.selection_layer import SelectionLayer
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.layers.anchor_heat_layer import AnchorHeatLayer
@@ -133,6 +134,7 @@ class ViewportScene:
         self.regions = RegionLayer(ctx)
         self.path = PathLayer(ctx)
         self.selection = SelectionLayer(ctx)
+        self.objects = ObjectLayer(ctx)
         self._anchor_heat = AnchorHeatLayer(ctx)
         self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
@@ -161,6 +163,7 @@ class ViewportScene:
             self.regions,
             self.path,
             self.selection,
+            self.objects,
             self._anchor_heat,
             self.explaining,
         )
@@ -234,6 +237,7 @@ class ViewportScene:
         heat_key = self._anchor_heat.take(session, view, gaussians)
         explaining_key = self.explaining.take(session, view)
         selection_key = self.selection.take(session, view, gaussians)
+        objects_key = self.objects.take(session, view, gaussians)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
         if self.is_software and is_rendered and self._has_no_marks(session, regions):
@@ -245,6 +249,7 @@ class ViewportScene:
             regions_key,
             explaining_key,
             selection_key,
+            objects_key,
             heat_key,
             self.path.take(session),
             session.overlays.heat_opacity,
@@ -260,7 +265,7 @@ class ViewportScene:
     def _has_no_marks(self, session: SessionView, regions: ShownRegions) -> bool:
         """Is nothing to be drawn over the picture?"""
         are_empty = regions.is_empty and self.explaining.is_empty and self._anchor_heat.is_empty
-        are_empty &= self.selection.is_empty
+        are_empty &= self.selection.is_empty and self.objects.is_empty
         return are_empty and self.marks.is_empty(session) and self.path.is_empty(session)
 
     def captured(self, session: SessionView, width_px: int) -> CapturedPicture | None:
@@ -448,6 +453,7 @@ class ViewportScene:
         self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
         self.explaining.draw(target, view, self.marks.pixels_per_unit)
         self.selection.draw(target, view)
+        self.objects.draw(target)
         self.marks.draw(target, view, session)
         self.regions.draw(target, view.camera)
         self.path.draw(target, view, session)

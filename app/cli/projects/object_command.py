@@ -29,7 +29,7 @@ ACTS = {
     "find": "NAME: look for it in all clips again",
     "rename": "NAME NEW",
     "span": "NAME A:B: the frames in which it exists, B not included",
-    "train": "NAME on|off: whether clips trained from now on see it",
+    "train": "NAME on|off: whether clips trained again see it; it is masked where it was found",
     "remove": "NAME: remove it, and the edits that act on it",
 }
 
@@ -87,7 +87,7 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
     name = options.name
 
     def tell(done: float) -> None:
-        line.update(f"Finding {name}", done)
+        line.update(f"{'Masking' if options.act == 'train' else 'Finding'} {name}", done)
 
     match options.act:
         case "add":
@@ -107,7 +107,7 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
         case "train":
             if options.value not in ("on", "off"):
                 raise ProjectError(f"'{options.value}' is neither on nor off.")
-            project.set_object_trained(name, is_trained=options.value == "on")
+            project.set_object_trained(name, is_trained=options.value == "on", on_progress=tell)
         case _:
             project.remove_object(name)
     line.finish()

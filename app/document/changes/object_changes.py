@@ -10,9 +10,11 @@ from dataclasses import replace
 import numpy as np
 from msgspec import structs, to_builtins
 
+from app.document.changes.exclusion_changes import MAX_POINTS
 from app.document.checked_text import checked_text
 from app.document.project_document import ProjectDocument
 from app.document.storing.stored_document import check_objects
+from engine.capture.exclusions import PaintedMask
 from engine.editing.actions import Vector
 from engine.editing.edit import ObjectTarget, PickedRows
 from engine.editing.picks import pack_rows, unpack_rows
@@ -154,13 +156,29 @@ def set_span(document: ProjectDocument, object_id: int, first: int, stop: int | 
         raise ProjectError(f"The frames are not valid ({error}).") from error
 
 
-def set_trained(document: ProjectDocument, object_id: int, *, is_trained: bool) -> ProjectDocument:
-    """Say whether clips that are trained from now on see an object. Raises ProjectError where there is none."""
-    return _replaced(document, structs.replace(object_with(document, object_id), is_trained=is_trained))
+def set_trained(
+    document: ProjectDocument, object_id: int, *, is_trained: bool, masks: tuple[PaintedMask, ...] = ()
+) -> ProjectDocument:
+    """Say whether clips that are trained from now on see an object.
+
+    Args:
+        masks: What they do not see then, instead of earlier masks of this object; none where they see it.
+    Raises:
+        ProjectError: There is no such object, or the masks are too large.
+    """
+    others = _without_masks(document, object_id).exclusions.masks
+    n_points = sum(len(stroke.points) for mask in (*others, *masks) for stroke in mask.strokes)
+    if n_points > MAX_POINTS:
+        raise ProjectError(
+            f"The masks have {n_points:,} points, more than the {MAX_POINTS:,} that a project can hold.",
+            hint="Let the object exist in fewer frames.",
+        )
+    changed = replace(document, exclusions=structs.replace(document.exclusions, masks=(*others, *masks)))
+    return _replaced(changed, structs.replace(object_with(document, object_id), is_trained=is_trained))
 
 
 def remove_object(document: ProjectDocument, object_id: int) -> tuple[ProjectDocument, int]:
-    """Remove an object, and the edits that act on it.
+    """Remove an object, the edits that act on it, and what is left out of training because of it.
 
     Returns:
         The document, and how many edits went.
@@ -170,7 +188,8 @@ def remove_object(document: ProjectDocument, object_id: int) -> tuple[ProjectDoc
     gone = object_with(document, object_id)
     edits = tuple(edit for edit in document.edits if edit.target != ObjectTarget(object_id))
     objects = tuple(one for one in document.objects if one is not gone)
-    return replace(document, objects=objects, edits=edits), len(document.edits) - len(edits)
+    left = _without_masks(document, object_id)
+    return replace(left, objects=objects, edits=edits), len(document.edits) - len(edits)
 
 
 # ---------------------------------------------------------------- pieces
@@ -179,6 +198,13 @@ def remove_object(document: ProjectDocument, object_id: int) -> tuple[ProjectDoc
 def _with(document: ProjectDocument, objects: tuple[SceneObject, ...]) -> ProjectDocument:
     check_objects(objects)
     return replace(document, objects=objects)
+
+
+def _without_masks(document: ProjectDocument, object_id: int) -> ProjectDocument:
+    masks = tuple(mask for mask in document.exclusions.masks if mask.object_id != object_id)
+    if len(masks) == len(document.exclusions.masks):
+        return document
+    return replace(document, exclusions=structs.replace(document.exclusions, masks=masks))
 
 
 def _replaced(document: ProjectDocument, one: SceneObject) -> ProjectDocument:

@@ -14,8 +14,8 @@ DOUBT_WORDS: dict[Doubt, str] = {
     "resting": "does not move",
     "gone": "nothing of it is there",
 }
-SURE, LIKELY = 0.8, 0.5
-"""Least confidence of what is called sure, and of what is called likely."""
+SURE = 0.5
+"""Least confidence of what nobody need look at."""
 
 
 def doubt_text(clip: ObjectInClip) -> str:

@@ -1,5 +1,5 @@
-"""Commands about objects, as frozen dataclasses in the imperative. They can be taken back, but for FindObject, which
-changes nothing that somebody has decided.
+"""Commands about objects, as frozen dataclasses in the imperative. They can be taken back, but for FindObject and
+SelectObject, which change nothing that somebody has decided.
 """
 
 from __future__ import annotations
@@ -28,6 +28,13 @@ class CorrectObject:
 @dataclass(frozen=True, slots=True)
 class FindObject:
     """Look for an object in all clips again."""
+
+    object_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class SelectObject:
+    """Select the Gaussians that an object consists of in the shown frame."""
 
     object_id: int
 
@@ -67,7 +74,8 @@ class SetObjectSpan:
 
 @dataclass(frozen=True, slots=True)
 class SetObjectTrained:
-    """Let clips that are trained from now on see an object, or not."""
+    """Let clips that are trained from now on see an object, or not: it is masked in the pictures of the clips in which
+    it was found."""
 
     object_id: int
     is_trained: bool
@@ -77,6 +85,7 @@ ObjectCommand = (
     MakeObject
     | CorrectObject
     | FindObject
+    | SelectObject
     | RemoveObject
     | RenameObject
     | RecolourObject

@@ -16,6 +16,8 @@ from app.document.changes import object_changes
 from app.document.changes.object_changes import object_with
 from app.document.history import Found
 from app.document.project_document import ProjectDocument
+from app.evaluation.headless import open_trained
+from app.objects.object_masks import object_masks
 from app.objects.searching import find_in_project
 from app.playback.timeline import Timeline
 from app.project.opening.opened_project import OpenedProject
@@ -30,17 +32,20 @@ from app.session.editing.object_commands import (
     RecolourObject,
     RemoveObject,
     RenameObject,
+    SelectObject,
     SetObjectSpan,
     SetObjectTrained,
 )
 from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.notices import Notices
 from app.session.part import SessionPart
+from engine.capture.exclusions import PaintedMask
 from engine.editing.reach import ClipAnchors, unsearched
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from engine.errors import EngineError, ProjectError
 
 Find = Callable[[OpenedProject, SceneObject, Callable[[float, float], None]], tuple[ObjectInClip, ...]]
+Mask = Callable[[OpenedProject, SceneObject, Callable[[float, float], None]], tuple[PaintedMask, ...]]
 Wanted = tuple[int, tuple[ObjectSeed, ...], object]
 """An object with its seeds, and the clips that have to be searched."""
 
@@ -55,7 +60,7 @@ class Objects(SessionPart):
         reaches: Knows which anchors each clip has.
         jobs, notices: Of the session.
         is_training: Whether cores are for a training now; then nothing is looked for that nobody has asked for.
-        find: Looks for an object.
+        find, mask: Look for an object in clips, and in pictures.
     """
 
     def __init__(
@@ -69,10 +74,12 @@ class Objects(SessionPart):
         *,
         is_training: Callable[[], bool],
         find: Find | None = None,
+        mask: Mask | None = None,
     ) -> None:
         self._document, self._selecting, self._timeline, self._reaches = document, selecting, timeline, reaches
         self._jobs, self._notices, self._is_training = jobs, notices, is_training
         self.find: Find = _find if find is None else find
+        self.mask: Mask = _mask if mask is None else mask
         self._opened: OpenedProject | None = None
         self._asked: list[int] = []
         """Objects that somebody wants to be looked for, the first one next."""
@@ -99,6 +106,9 @@ class Objects(SessionPart):
         Raises:
             ProjectError: It cannot be done now, or is not valid.
         """
+        if isinstance(command, SelectObject):
+            self._select(command.object_id)
+            return
         document = self._document.checked().document
         match command:
             case MakeObject(name=name):
@@ -112,6 +122,8 @@ class Objects(SessionPart):
                 made = object_changes.correct_object(document, object_id, seed, within=(clip.start, clip.stop))
                 self._document.change(made, f"{'add to' if adds else 'remove from'} {one.name}")
                 self._look_for(object_id)
+            case SetObjectTrained(object_id=object_id, is_trained=False):
+                self._leave_out(object_with(document, object_id))
             case FindObject(object_id=object_id):
                 object_with(document, object_id)
                 self._asked.append(object_id)
@@ -119,6 +131,18 @@ class Objects(SessionPart):
                 change = changed(document, command)
                 if change.document != document:
                     self._document.change(change.document, change.name, change.merge)
+
+    def _select(self, object_id: int) -> None:
+        content = self._document.content
+        if content is None:
+            raise ProjectError("No capture is open.")
+        one, frame_index = object_with(content, object_id), self._timeline().frame_index
+        picked = one.picked(frame_index)
+        if not picked.sets:
+            raise ProjectError(
+                f"{one.name} is not in frame {frame_index}.", hint="The timeline shows in which frames it is."
+            )
+        self._selecting.select(Selection.of_target(picked))
 
     def _look_for(self, object_id: int) -> None:
         """The selection is in the object now, which takes its place."""
@@ -141,6 +165,26 @@ class Objects(SessionPart):
             )
         sets = here.target().sets
         return clip, ObjectSeed(frame_index, sets) if adds else ObjectSeed(frame_index, removed=sets)
+
+    def _leave_out(self, one: SceneObject) -> None:
+        """Find out on a thread what training must not see; the step is made then."""
+        opened, name = self._opened, f"Masking {one.name}"
+        if opened is None or any(job.name == name for job in self._jobs.statuses):
+            return
+
+        def work(context: JobContext) -> tuple[PaintedMask, ...]:
+            return self.mask(opened, one, lambda done, total: context.report(done / max(total, 1)))
+
+        def done(masks: tuple[PaintedMask, ...]) -> None:
+            if self._document.project is opened.project:
+                document = self._document.checked().document
+                after = object_changes.set_trained(document, one.object_id, is_trained=False, masks=masks)
+                self._document.change(after, f"train without {one.name}")
+
+        def failed(error: Exception) -> None:
+            self._tell(f"{one.name} cannot be left out of training", error)
+
+        self._jobs.start(name, work, done, failed, can_cancel=True)
 
     # ---------------------------------------------------------------- searching
 
@@ -215,6 +259,9 @@ class Objects(SessionPart):
     def _failed(self, error: Exception) -> None:
         title = f"{'An object' if self._searched is None else self._searched.name} could not be found"
         self._give_up()
+        self._tell(title, error)
+
+    def _tell(self, title: str, error: Exception) -> None:
         if isinstance(error, EngineError):
             self._notices.add_error(title, error)
         else:
@@ -260,13 +307,16 @@ def changed(document: ProjectDocument, command: ObjectCommand) -> Change:
         case SetObjectSpan(object_id=object_id, first=first, stop=stop):
             name = object_with(document, object_id).name
             return Change(object_changes.set_span(document, object_id, first, stop), f"change the frames of {name}")
-        case SetObjectTrained(object_id=object_id, is_trained=is_trained):
+        case SetObjectTrained(object_id=object_id, is_trained=True):
             name = object_with(document, object_id).name
-            after = object_changes.set_trained(document, object_id, is_trained=is_trained)
-            return Change(after, f"train {'with' if is_trained else 'without'} {name}")
+            return Change(object_changes.set_trained(document, object_id, is_trained=True), f"train with {name}")
         case _:
-            raise ProjectError("This needs a selection, or changes nothing.")
+            raise ProjectError("This needs a selection or pictures, or changes nothing.")
 
 
 def _find(opened: OpenedProject, one: SceneObject, report: Any) -> tuple[ObjectInClip, ...]:
     return find_in_project(opened.project, opened.capture, one, report)
+
+
+def _mask(opened: OpenedProject, one: SceneObject, report: Any) -> tuple[PaintedMask, ...]:
+    return object_masks(open_trained(opened.project, opened.capture), one, report)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -30,6 +30,7 @@ from app.session.editing.selection_commands import (
 )
 from app.session.editing.selection_status import SelectionStatus
 from app.session.part import SessionPart
+from engine.editing.edit import Picked
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import ValueSpread, spread_of
@@ -120,7 +121,8 @@ class ProjectSelecting(SessionPart):
         self._numbers = itertools.count(1)
         self._revision = 0
         self._mask: tuple[GaussianRows, int, np.ndarray] | None = None
-        self._share_lanes: dict[object, None] = {}
+        self._share_lanes: dict[Hashable, None] = {}
+        self._masks: dict[Hashable, tuple[GaussianRows, Picked, np.ndarray]] = {}
         self._words: tuple[int, int, str] | None = None
         self._worker: LatestWorker[Any, Any] = LatestWorker(
             "selecting", lambda work: work.answer(), prepare=_prepare, on_done=lambda: self.on_found()
@@ -136,6 +138,7 @@ class ProjectSelecting(SessionPart):
         self._worker.forget()
         self._waiting.clear()
         self._running, self._mask, self._before = None, None, None
+        self._masks.clear()
         self._take(NOTHING_SELECTED)
         self._before = None
 
@@ -294,12 +297,27 @@ class ProjectSelecting(SessionPart):
         Args:
             view_id: Of the place where it is shown: each has one newest request.
         """
-        selected = self.mask(gaussians)
+        return self._share(self.mask(gaussians), self._revision, gaussians, view, (SHARE, view_id))
+
+    def share_of(
+        self, picked: Picked, gaussians: GaussianArrays, view: SeenFrom, place_id: Hashable
+    ) -> np.ndarray | None:
+        """The same of other Gaussians, such as those of an object. place_id: Of what it is asked for, and where."""
+        known = self._masks.get(place_id)
+        if gaussians.rows is None:
+            return None
+        if known is None or known[0] is not gaussians.rows or known[1] != picked:
+            mask = Selection.of_target(picked).mask(gaussians.rows)
+            self._masks[place_id] = known = (gaussians.rows, picked, mask)
+        return self._share(known[2], picked, gaussians, view, (SHARE, place_id))
+
+    def _share(
+        self, selected: np.ndarray, of: Hashable, gaussians: GaussianArrays, view: SeenFrom, lane: Hashable
+    ) -> np.ndarray | None:
         if gaussians.rows is None or not selected.any():
             return None
         matrices = (np.asarray(m, np.float64).tobytes() for m in (view.world_to_camera, view.K))
-        work = _ShareWork((gaussians.key, self._revision, *matrices, *view.size), view, gaussians, selected)
-        lane = (SHARE, view_id)
+        work = _ShareWork((gaussians.key, of, *matrices, *view.size), view, gaussians, selected)
         self._share_lanes[lane] = None
         newest = self._worker.newest_in(lane)
         if newest is not None and newest[0] == work:

@@ -12,9 +12,11 @@ from msgspec import structs
 from app.document.changes import object_changes
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from app.objects.object_masks import strokes_of
 from app.objects.searching import living_seeds
 from app.project.opening.project_access import open_project
 from app.scripting.scripted_project import open_scripted
+from engine.capture.pixels.excluded_pixels import painted_pixels
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.edit import ObjectTarget, PickedRows, Scope, Sphere
 from engine.editing.picks import pack_rows
@@ -50,10 +52,10 @@ def test_the_whole_life_of_an_object(run, folder):
     (one,) = document(folder).objects
     assert [(clip.start, clip.stop, bool(clip.origin)) for clip in one.clips] == [(0, 3, True), (3, 6, True)]
     assert one.seeds[0].frame_index == 1
+    assert run("object", folder, "train", "ball", "off", "--quiet")[0] == 0
     assert run("object", folder, "correct", "BALL", "--at", 4, *BALL, "--remove", "--quiet")[0] == 0
     assert run("object", folder, "rename", 1, "the ball")[0] == 0
     assert run("object", folder, "span", "the ball", "1:5")[0] == 0
-    assert run("object", folder, "train", "the ball", "off")[0] == 0
     assert run("object", folder, "find", "the ball", "--quiet")[0] == 0
     (one,) = document(folder).objects
     assert (one.name, one.first, one.stop, one.is_trained, len(one.seeds)) == ("the ball", 1, 5, False, 2)
@@ -177,6 +179,56 @@ def test_scripts_do_the_same(folder):
         assert project.objects == (one,)
         with pytest.raises(ProjectError, match="read-only"):
             project.find_object("ball")
+
+
+def test_an_object_is_measured_on_its_own(run, folder, tmp_path):
+    with open_scripted(folder) as project:
+        project.make_object("ball", project.select(frame_index=1), 1)
+        found = project.measure_object("ball")
+        assert found["clips"].keys() == {"0", "1"}
+        of_clip = found["clips"]["0"]
+        assert of_clip["held_out"]["pictures"] > 0
+        assert 0.0 < of_clip["trained_on"]["psnr"] < 100.0
+        assert project.measure_object("ball", clip_indices=[1])["clips"] == {"1": found["clips"]["1"]}
+        project.set_object_span("ball", 5, 6)
+        later = project.measure_object("ball")["clips"]
+        assert later["0"]["held_out"] == {"psnr": None, "pictures": 0, "pixels": 0}
+        assert later["1"]["trained_on"]["pictures"] <= 3
+    out = tmp_path / "figures.json"
+    code, _, err = run("eval", folder, "--json", out, "--metrics", "quick", "--object", "ball")
+    assert code == 0
+    assert "ball alone: PSNR" in err
+    assert json.loads(out.read_text())["object"]["clips"] == later
+    code, _, err = run("eval", folder, "--json", tmp_path / "no.json", "--object", "cat")
+    assert (code, err.strip().endswith("Objects are ball.")) == (2, True)
+
+
+def test_an_object_is_left_out_of_training_where_it_was_found(folder):
+    with open_scripted(folder) as project:
+        project.make_object("ball", project.select(frame_index=1), 1)
+        project.set_object_trained("ball", is_trained=False)
+        masks = project.document.exclusions.masks
+        assert {(mask.first, mask.stop) for mask in masks} == {(0, 3), (3, 6)}
+        assert {mask.object_id for mask in masks} == {1}
+        assert project.history.undo_name == "train without ball"
+        measured = project.measure_object("ball")["clips"]["0"]
+        assert measured["trained_on"]["pixels"] == 0, "nothing of it is left to compare with"
+        project.set_object_trained("ball", is_trained=True)
+        assert project.document.exclusions.masks == ()
+        project.set_object_span("ball", 100)
+        with pytest.raises(ProjectError, match="ball was found in no clip"):
+            project.set_object_trained("ball", is_trained=False)
+
+
+def test_strokes_cover_a_mask_and_little_more():
+    mask = np.zeros((60, 80), bool)
+    rows, columns = np.mgrid[:60, :80]
+    mask[(rows - 30) ** 2 + (columns - 40) ** 2 < 200] = True
+    mask[3:5, 70:72] = True
+    painted = painted_pixels(strokes_of(mask), 80, 60)
+    assert painted[mask].all()
+    assert painted.sum() < 2 * mask.sum()
+    assert strokes_of(np.zeros((60, 80), bool)) == ()
 
 
 def _interrupt(done: float) -> None:

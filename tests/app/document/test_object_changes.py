@@ -18,6 +18,7 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.stored_document import document_of, plain_document
+from engine.capture.exclusions import Exclusions, PaintedMask, Stroke
 from engine.editing.actions import Delete, Expose
 from engine.editing.edit import ObjectTarget, PickedRows
 from engine.editing.picks import pack_rows, unpack_rows
@@ -89,7 +90,15 @@ def test_removing_an_object_takes_its_edits_along() -> None:
 def test_other_values() -> None:
     document = change.rename_object(_two(), 1, " right player ")
     document = change.recolour_object(document, 1, (0.0, 0.5, 1.0))
-    document = change.set_trained(change.set_span(document, 1, 5, 9), 1, is_trained=False)
+    mask, painted = (PaintedMask("a", 0, 9, (Stroke(((0.5, 0.5),), 0.1),), owner) for owner in (1, None))
+    document = replace(document, exclusions=Exclusions(masks=(painted,)))
+    document = change.set_trained(change.set_span(document, 1, 5, 9), 1, is_trained=False, masks=(mask,))
+    assert document.exclusions.masks == (painted, mask)
+    assert change.set_trained(document, 1, is_trained=False, masks=(mask,)) == document
+    assert change.set_trained(document, 1, is_trained=True).exclusions.masks == (painted,)
+    assert change.remove_object(document, 1)[0].exclusions.masks == (painted,)
+    with pytest.raises(ProjectError, match="points"):
+        change.set_trained(document, 1, is_trained=False, masks=(mask,) * 500_001)
     one = document.objects[0]
     assert (one.name, one.color, one.first, one.stop, one.is_trained) == (
         "right player",

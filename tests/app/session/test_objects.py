@@ -25,6 +25,7 @@ from app.session.editing.selection import Selection
 from app.session.projects.project_commands import OpenProject
 from app.session.session import Session
 from app.session.showing.look_commands import SetFrame
+from engine.capture.exclusions import PaintedMask, Stroke
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import look_at_clip
 from engine.editing.actions import Expose
@@ -35,6 +36,8 @@ from engine.editing.scene_object import ObjectInClip, SceneObject
 from engine.errors import ProjectError
 from tests.app.conftest import poll_until
 from tests.app.residuals.conftest import make_project
+
+MASK = PaintedMask("cam", 0, 3, (Stroke(((0.5, 0.5),), 0.1),), 1)
 
 
 class Finder:
@@ -229,7 +232,10 @@ def test_other_values_are_named_steps(session):
     session.dispatch(RecolourObject(1, (0.1, 0.2, 0.3), gesture=1))
     session.dispatch(RecolourObject(1, (0.1, 0.2, 0.4), gesture=1))
     session.dispatch(SetObjectSpan(1, 1, 4))
+    session.objects.mask = lambda opened, one, report: (MASK,)
     session.dispatch(SetObjectTrained(1, is_trained=False))
+    settle(session)
+    assert session.exclusions.masks == (MASK,)
     session.dispatch(RenameObject(1, "ball"))
     assert session.history.past == (
         "make object 1",
@@ -238,7 +244,10 @@ def test_other_values_are_named_steps(session):
         "change the frames of ball",
         "train without ball",
     )
-    for _ in range(5):
+    session.dispatch(SetObjectTrained(1, is_trained=True))
+    assert session.exclusions.masks == ()
+    assert session.history.undo == "train with ball"
+    for _ in range(6):
         session.dispatch(Undo())
     assert session.edits.objects == ()
 

@@ -15,6 +15,7 @@ from ui.panels.timeline.rows.rows import (
     MARKERS,
     MIN_CLIPS_HEIGHT,
     MIN_TRACK_HEIGHT,
+    OBJECTS,
     ORDER,
     OVERVIEW,
     QUALITY,
@@ -44,11 +45,11 @@ def test_rows_lie_below_each_other_inside_the_height(height, folded, is_zoomed):
 def test_rows_give_way_one_after_the_other():
     seen = []
     for height in range(300, int(MIN_TRACK_HEIGHT), -1):
-        names = tuple(row.name for row in arrange_rows(height, (), is_zoomed=True))
+        names = tuple(row.name for row in arrange_rows(height, (), is_zoomed=True, n_objects=1))
         if not seen or seen[-1] != names:
             seen.append(names)
     gone = [({*before} - {*after}).pop() for before, after in itertools.pairwise(seen)]
-    assert gone == [*reversed(KEPT_FIRST)] == [QUALITY, MARKERS, CACHE, VOLUMES, CAMERA, SEAMS, OVERVIEW]
+    assert gone == [*reversed(KEPT_FIRST)] == [QUALITY, MARKERS, CACHE, VOLUMES, CAMERA, OBJECTS, SEAMS, OVERVIEW]
 
 
 def test_what_is_left_over_makes_clips_and_quality_larger():

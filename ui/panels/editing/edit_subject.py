@@ -8,12 +8,14 @@ import numpy as np
 from msgspec import structs
 
 from app.session.editing.edit_commands import ChangeEdit
+from app.session.editing.selection import Selection
 from app.session.editing.selection_commands import InvertSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
-from engine.editing.edit import Edit, Prism, Sphere, Volume
+from engine.editing.edit import Edit, ObjectTarget, Prism, Sphere, Volume
 from engine.editing.volumes.keyed_volume import with_volume
 from engine.editing.volumes.prisms import widths_at
+from engine.text import one_line
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, axes_of, middle_of
 from ui.viewport.editing.select_tool import VOLUME_TOOLS
@@ -67,31 +69,38 @@ def subject_of(session: SessionView, ui: UiState) -> Subject | None:
     return None if thing is None else Subject(thing, edit, frame)
 
 
-def meant(session: SessionView, ui: UiState) -> tuple[Volume | None, str]:
-    """Target of a new edit: the volume that was drawn, with its words; None stands for the selection.
-    No words where there is neither."""
+Meant = Volume | ObjectTarget | None
+"""What a new edit acts on; None stands for the selection."""
+
+
+def meant(session: SessionView, ui: UiState) -> tuple[Meant, str]:
+    """Target of a new edit, with its words: the volume that was drawn, else the selection, else the chosen object. No
+    words where there is none of them."""
     volume = drawn_volume(ui)
     if volume is not None:
         return volume, f"the {type(volume).__name__.lower()}"
-    return None, "the selection" if session.selection.n_gaussians else ""
+    one = session.edits.object(ui.objects.chosen)
+    if one is None or session.selection.n_gaussians:
+        return None, "the selection" if session.selection.n_gaussians else ""
+    return ObjectTarget(one.object_id), one_line(one.name)
 
 
-def pivot_of(session: SessionView, volume: Volume | None) -> Vector:
+def pivot_of(session: SessionView, target: Meant) -> Vector:
     """Where a movement turns about: the middle of the things it moves, as shown. Scene units"""
-    if volume is not None:
-        return _vector(middle_of(volume))
-    means = _selected_means(session)
+    if isinstance(target, Volume):
+        return _vector(middle_of(target))
+    means = _means(session, target)
     return _vector(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
 
 
-def bounds_of(session: SessionView, volume: Volume | None) -> tuple[Vector, Vector] | None:
-    """The box along the axes of the scene around a volume, else around the centres of what is selected and shown; None
+def bounds_of(session: SessionView, target: Meant) -> tuple[Vector, Vector] | None:
+    """The box along the axes of the scene around a volume, else around the centres of what is meant and shown; None
     where nothing is, or its box has no room in it. Scene units"""
-    if volume is not None:
-        reach = _reach(volume)
-        low, high = middle_of(volume) - reach, middle_of(volume) + reach
+    if isinstance(target, Volume):
+        reach = _reach(target)
+        low, high = middle_of(target) - reach, middle_of(target) + reach
     else:
-        means = _selected_means(session)
+        means = _means(session, target)
         if not len(means):
             return None
         low, high = means.min(axis=0), means.max(axis=0)
@@ -108,12 +117,17 @@ def _reach(volume: Volume) -> float | np.ndarray:
     return abs(axes_of(volume)) @ sizes
 
 
-def _selected_means(session: SessionView) -> np.ndarray:
-    """Centres of the selection, as far as it is shown. [N, 3]"""
+def _means(session: SessionView, target: ObjectTarget | None) -> np.ndarray:
+    """Centres of the selection or of an object, as far as it is shown. [N, 3]"""
     gaussians = session.shown_gaussians()
-    if gaussians is None or gaussians.rows is None or not session.selection.n_gaussians:
+    if gaussians is None or gaussians.rows is None or (target is None and not session.selection.n_gaussians):
         return np.zeros((0, 3))
-    means = gaussians.means[session.selected(gaussians)]
+    one = None if target is None else session.edits.object(target.object_id)
+    if one is None:
+        is_meant = session.selected(gaussians)
+    else:
+        is_meant = Selection.of_target(one.picked(session.timeline.frame_index)).mask(gaussians.rows)
+    means = gaussians.means[is_meant]
     return means[np.isfinite(means).all(axis=1)]
 
 

@@ -14,6 +14,7 @@ from engine.editing.edit import Edit
 from engine.text import one_line
 from ui.panels.editing.details import draw_details
 from ui.panels.editing.making import draw_making
+from ui.panels.editing.objects_section import draw_objects
 from ui.panels.editing.world_section import draw_world
 from ui.panels.pieces.copying import draw_copy_entries
 from ui.panels.pieces.history_buttons import draw_history
@@ -35,6 +36,7 @@ def draw_edits(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.editing.follow(session.edits.edits)
     if session.edits.why_not:
         text_warning(session.edits.why_not)
+    draw_objects(session, dispatch, ui)
     if imgui.collapsing_header("New edit", imgui.TreeNodeFlags_.default_open):
         draw_making(session, dispatch, ui)
     imgui.separator()

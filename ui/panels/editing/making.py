@@ -15,9 +15,9 @@ from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_
 from app.session.editing.selection_commands import ClearSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Everything, Scope, Sphere, Target, Volume
-from engine.editing.reach import Reach, reach_of
-from ui.panels.editing.edit_subject import bounds_of, invert_selection, meant, pivot_of
+from engine.editing.edit import Edit, Everything, ObjectTarget, Scope, Sphere, Target, Volume
+from engine.editing.reach import Reach, reach_of, reach_of_edit
+from ui.panels.editing.edit_subject import Meant, bounds_of, invert_selection, meant, pivot_of
 from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
 from ui.panels.state import EDITS, Dispatch, UiState
 
@@ -25,7 +25,7 @@ FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """First values of new edits."""
 
 
-First = Callable[[SessionView, Volume | None], Action]
+First = Callable[[SessionView, Meant], Action]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,8 @@ def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Mak
     target: Target | None = volume
     if not words and making.is_for_everything:
         target = Everything()
-    is_outside = volume is not None and ui.editing.is_outside
+    is_drawn = isinstance(volume, Volume)
+    is_outside = is_drawn and ui.editing.is_outside
     before = {edit.edit_id for edit in session.edits.edits}
     scope = chosen_scope(ui.editing.scope, session.timeline)
     dispatch(AddEdit(making.action(session, volume), target, scope, making.is_inverted != is_outside))
@@ -99,7 +100,7 @@ def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Mak
     if added:
         ui.editing.choose(added[-1])
         ui.editing.is_new = True
-        if volume is not None:  # its handles are those of the edit now
+        if is_drawn:  # its handles are those of the edit now
             ui.selecting.leave()
             ui.editing.is_outside = False
             dispatch(ClearSelection())
@@ -116,8 +117,11 @@ def mark_moving(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(MarkBox("dynamic", *bounds))
 
 
-def _reach(session: SessionView, volume: Volume | None, scope: Scope, *, is_inverted: bool = False) -> Reach:
+def _reach(session: SessionView, volume: Meant, scope: Scope, *, is_inverted: bool = False) -> Reach:
     """Where a new edit would act."""
+    if isinstance(volume, ObjectTarget):
+        edit = Edit(0, "", volume, Hide(), scope, is_inverted)
+        return reach_of_edit(edit, session.edits.clips, session.edits.objects)
     picked = () if volume is not None else session.selection.counts
     return reach_of(picked, scope, session.edits.clips, is_inverted=is_inverted)
 
@@ -126,13 +130,13 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The target of new edits, where they are to hold, and a button for each kind."""
     volume, words = meant(session, ui)
     if words:
-        is_outside = volume is not None and ui.editing.is_outside
+        is_outside = isinstance(volume, Volume) and ui.editing.is_outside
         imgui.text(f"Acts on {'all but ' if is_outside else ''}{words}")
         if session.selection.words and volume is None:
             text_wrapped_dim(session.selection.words)
     else:
         text_wrapped_dim("Select Gaussians, or draw a volume; colours and light can be changed everywhere.")
-    if volume is not None:
+    if isinstance(volume, Volume):
         if imgui.checkbox("Everything outside", ui.editing.is_outside)[0]:
             invert_selection(dispatch, ui)
         ui.mark("edits.outside")
@@ -155,7 +159,7 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if place % PER_ROW:
             imgui.same_line()
         imgui.begin_disabled(reach.is_nowhere or not (words or making.is_for_everything))
-        label = "Crop" if making.name == "isolate" and volume is not None else making.label
+        label = "Crop" if making.name == "isolate" and isinstance(volume, Volume) else making.label
         if imgui.button(f"{label}##{making.name}", ImVec2(width, 0)):
             make_edit(session, dispatch, ui, making)
         ui.mark(f"edits.make {making.name}")

@@ -57,11 +57,11 @@ def go_to_key(session: SessionView, dispatch: Dispatch, keyed: KeyedVolume, step
     dispatch(SetFrame(session.timeline.clamped(wanted)))
 
 
-def object_to_follow(session: SessionView, edit: Edit) -> SceneObject | None:
-    """The object that an edit acts on, else the first one; None without objects."""
+def object_to_follow(session: SessionView, ui: UiState, edit: Edit) -> SceneObject | None:
+    """The chosen object, else the one that the edit acts on, else the first one; None without objects."""
     target = edit.target
     own = session.edits.object(target.object_id) if isinstance(target, ObjectTarget) else None
-    return own or next(iter(session.edits.objects), None)
+    return session.edits.object(ui.objects.chosen) or own or next(iter(session.edits.objects), None)
 
 
 def follow(session: SessionView, dispatch: Dispatch, edit: Edit, one: SceneObject) -> None:
@@ -100,7 +100,7 @@ def draw_volume_keys(session: SessionView, dispatch: Dispatch, ui: UiState, edit
 
 
 def _draw_follow(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
-    one = object_to_follow(session, edit)
+    one = object_to_follow(session, ui, edit)
     if one is None:
         return
     imgui.same_line()

@@ -137,7 +137,9 @@ class PicturePane:
         density = imgui.get_io().display_framebuffer_scale.x
         view = self._scene_view(session, pane)
         self.scene.marks.pixels_per_unit = self.scene.path.pixels_per_unit = density
-        self.scene.selection.pixels_per_unit = density
+        self.scene.selection.pixels_per_unit = self.scene.objects.pixels_per_unit = density
+        ui.objects.follow(session.edits.objects)
+        self.scene.objects.outlined = ui.objects.outlined(session.edits.objects)
         self.keys.follow(session, dispatch, ui, self.scene.path, self.pointer, view, pane, density)
         self._point_at_camera(session, ui, view, pane, density)
         if is_active:

@@ -14,6 +14,7 @@ from ui.panels.timeline.pointer import handle_track
 from ui.panels.timeline.rows.clip_lane import draw_clip_lane
 from ui.panels.timeline.rows.gutter import WIDTH as GUTTER_WIDTH
 from ui.panels.timeline.rows.gutter import draw_gutter
+from ui.panels.timeline.rows.object_lane import draw_object_lane
 from ui.panels.timeline.rows.overview import draw_overview
 from ui.panels.timeline.rows.path_lane import draw_path_lane
 from ui.panels.timeline.rows.quality_lane import draw_quality_lane
@@ -22,6 +23,7 @@ from ui.panels.timeline.rows.rows import (
     CAMERA,
     MARKERS,
     MIN_TRACK_HEIGHT,
+    OBJECTS,
     OVERVIEW,
     QUALITY,
     RULER,
@@ -55,9 +57,10 @@ def _draw_rows(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     left, right = origin.x + GUTTER_WIDTH, origin.x + max(size.x, GUTTER_WIDTH + 1.0)
     folded = ui.timeline.folded | (set() if session.paths.paths else {CAMERA})
     folded |= {VOLUMES} if keyed_edit(session, ui) is None else set()
+    is_zoomed, objects = ui.timeline.is_zoomed, session.edits.objects
     rows = {
         row.name: Rect(left, origin.y + row.top, right, origin.y + row.top + row.height)
-        for row in arrange_rows(max(size.y, MIN_TRACK_HEIGHT), folded, is_zoomed=ui.timeline.is_zoomed)
+        for row in arrange_rows(max(size.y, MIN_TRACK_HEIGHT), folded, is_zoomed=is_zoomed, n_objects=len(objects))
     }
     overview = rows.get(OVERVIEW)
     track = Rect(left, rows[RULER].y0, right, max(row.y1 for row in rows.values()))
@@ -103,6 +106,8 @@ def _draw_track(stage: TimelineStage, session: SessionView) -> None:
         draw_cache_lane(stage, session)
     if CAMERA in stage.rows:
         draw_path_lane(stage, session)
+    if OBJECTS in stage.rows:
+        draw_object_lane(stage, session)
     if VOLUMES in stage.rows:
         draw_volume_lane(stage, session)
     if MARKERS in stage.rows:

@@ -12,6 +12,7 @@ from app.session.showing.look_commands import SetFrame
 from ui.panels.state import Dispatch
 from ui.panels.timeline.marker_box import edit_marker
 from ui.panels.timeline.rows.diamonds import DRAG_FROM
+from ui.panels.timeline.rows.object_lane import object_at, scroll_objects
 from ui.panels.timeline.rows.path_lane import handle_keys_of_path
 from ui.panels.timeline.rows.seam_lane import seam_at
 from ui.panels.timeline.rows.small_lanes import marker_at
@@ -37,7 +38,7 @@ def _handle_wheel(stage: TimelineStage, session: SessionView) -> None:
         return
     if io.key_ctrl:
         view.zoom(io.mouse_wheel, stage.scale.position_at(stage.pointer[0]), n_frames)
-    else:
+    elif not scroll_objects(stage, session, io.mouse_wheel):
         view.pan(-io.mouse_wheel - io.mouse_wheel_h, n_frames)
     stage.ui.redraw_within(0.0)
 
@@ -58,6 +59,9 @@ def _handle_left(stage: TimelineStage, session: SessionView, dispatch: Dispatch)
     if _drag_marker(stage, session, dispatch):
         return
     if imgui.is_item_activated():
+        one = object_at(stage, session)
+        if one is not None:
+            stage.ui.objects.choose(one.object_id)
         seam = seam_at(stage, session)
         view.pressed_seam = None if seam is None else session.clips[seam[0]].start
         if view.pressed_seam is not None:

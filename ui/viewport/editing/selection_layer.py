@@ -13,8 +13,8 @@ import numpy as np
 from app.playback.modes.arrays import GaussianArrays
 from app.session.session_view import SessionView
 from ui.gl import PointRenderer, Target
-from ui.gl.shaders import load_program
 from ui.style.colors import YELLOW
+from ui.viewport.editing.share_drawing import ShareDrawing
 
 if TYPE_CHECKING:
     from ui.viewport.scene import SceneView
@@ -37,22 +37,15 @@ class SelectionLayer:
     def __init__(self, ctx: moderngl.Context) -> None:
         self.pixels_per_unit = 1.0
         self.is_share_shown = False
-        self._ctx = ctx
         self._dots, self._few = PointRenderer(ctx), PointRenderer(ctx)
-        self._program: moderngl.Program | None = None
-        self._quad: moderngl.VertexArray | None = None
-        self._share: moderngl.Texture | None = None
-        self._shown: np.ndarray | None = None
+        self._share = ShareDrawing(ctx)
         self._dots_key: Hashable = None
 
     def release(self) -> None:
         """Free every GL object."""
         self._dots.release()
         self._few.release()
-        for thing in (self._quad, self._program, self._share):
-            if thing is not None:
-                thing.release()
-        self._quad = self._program = self._share = None
+        self._share.release()
 
     @property
     def is_empty(self) -> bool:
@@ -80,39 +73,14 @@ class SelectionLayer:
             self._dots_key = dots_key
         share = session.selected_share(gaussians, view.seen_from)
         self.is_share_shown = share is not None
-        if share is not None and share is not self._shown:
-            self._upload(share)
+        if share is not None:
+            self._share.take(share)
         return (*dots_key, id(share), self.pixels_per_unit)
 
     def draw(self, target: Target, view: SceneView) -> None:
         """Draw over the contents of the target."""
         unit = self.pixels_per_unit
-        if self.is_share_shown and self._share is not None:
-            self._draw_share(target, view)
+        if self.is_share_shown:
+            self._share.draw(target, YELLOW, unit, is_filled=True)
         dots = self._few if self.is_share_shown else self._dots
         dots.draw(target, *view.camera, shape="circle", size=DOT_SIZE * unit, outline_px=RIM * unit)
-
-    def _draw_share(self, target: Target, view: SceneView) -> None:
-        assert self._share is not None
-        if self._program is None:
-            self._program = load_program(self._ctx, "selection")
-            self._quad = self._ctx.vertex_array(self._program, [])
-        assert self._quad is not None
-        target.use(moderngl.BLEND)
-        self._share.use(0)
-        self._program["share"] = 0
-        self._program["size_px"] = target.size
-        self._program["unit_px"] = self.pixels_per_unit
-        self._program["hue"] = YELLOW[:3]
-        self._quad.render(moderngl.TRIANGLE_STRIP, vertices=4)
-
-    def _upload(self, share: np.ndarray) -> None:
-        height, width = share.shape
-        if self._share is None or self._share.size != (width, height):
-            if self._share is not None:
-                self._share.release()
-            self._share = self._ctx.texture((width, height), 1, dtype="f4")
-            self._share.filter = (moderngl.LINEAR, moderngl.LINEAR)
-            self._share.repeat_x = self._share.repeat_y = False
-        self._share.write(np.ascontiguousarray(share))
-        self._shown = share

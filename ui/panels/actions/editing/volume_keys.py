@@ -38,7 +38,7 @@ def _go(step: int) -> Run:
 
 def _follow(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     edit = session.edits.edit(ui.editing.chosen)
-    one = None if edit is None else object_to_follow(session, edit)
+    one = None if edit is None else object_to_follow(session, ui, edit)
     if edit is not None and one is not None:
         follow(session, dispatch, edit, one)
 

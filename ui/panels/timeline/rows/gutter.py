@@ -6,7 +6,19 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.session_view import SessionView
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline.rows.rows import CACHE, CAMERA, CLIPS, LANES, MARKERS, OVERVIEW, QUALITY, RULER, SEAMS, VOLUMES
+from ui.panels.timeline.rows.rows import (
+    CACHE,
+    CAMERA,
+    CLIPS,
+    LANES,
+    MARKERS,
+    OBJECTS,
+    OVERVIEW,
+    QUALITY,
+    RULER,
+    SEAMS,
+    VOLUMES,
+)
 from ui.panels.timeline.rows.stage import SMALL_TEXT, small_text, small_width
 from ui.panels.timeline.units import unit_note
 from ui.style import theme
@@ -21,6 +33,7 @@ NOTES = {
     QUALITY: "Held-out PSNR of each clip, and of each frame where it was measured; 20 to 40 dB",
     CACHE: "Frames decoded in memory, shown at once",
     CAMERA: "Keys of the camera path: C at the playhead",
+    OBJECTS: "Objects: in their colours where they are seen, hatched where that is doubtful",
     VOLUMES: "Keys of the volume that the chosen edit acts on: Shift+K at the playhead",
     MARKERS: "Markers: Ctrl+M at the playhead",
 }
