@@ -41,6 +41,8 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
         dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
     frame = session.timeline.frame_index
     volume = volume_of(edit.target, frame)
+    if volume is not None:
+        draw_volume_keys(session, dispatch, ui, edit)
     both = isinstance(edit.action, Transform) and volume is not None
     if both:
         imgui.text_disabled("Handles")
@@ -52,7 +54,6 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
     if volume is None:
         text_wrapped_dim(f"Acts on {target_text(edit.target, session.edits.objects)}.")
     else:
-        draw_volume_keys(session, dispatch, ui, edit)
         changed = _draw_volume(ui, volume)
         if changed is not None:
             target = with_volume(edit.target, frame, changed)

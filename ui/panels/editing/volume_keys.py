@@ -70,9 +70,11 @@ def follow(session: SessionView, dispatch: Dispatch, edit: Edit, one: SceneObjec
 
 
 def draw_volume_keys(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
-    """The keys in words, and a button for each thing that can be done to them."""
+    """The keys in words, and a button for each thing that can be done to them; without keys one to begin with, next to
+    what was drawn before."""
     frame_index, keyed = session.timeline.frame_index, edit.target
     if not isinstance(keyed, KeyedVolume):
+        _same_line_for("Key here")
         _button(dispatch, ui, "Key here", "volume.key", key_here(edit, frame_index))
         imgui.set_item_tooltip("Lets the volume move: it gets a key at this frame (Shift+K)")
         _draw_follow(session, dispatch, ui, edit)
@@ -103,11 +105,18 @@ def _draw_follow(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
     one = object_to_follow(session, ui, edit)
     if one is None:
         return
-    imgui.same_line()
+    _same_line_for("Follow")
     if imgui.button("Follow"):
         follow(session, dispatch, edit, one)
     ui.mark("volume.follow")
     imgui.set_item_tooltip(f"Sets keys so that the volume goes along with {one_line(one.name)}")
+
+
+def _same_line_for(label: str) -> None:
+    """Go on in the same line where a button fits in."""
+    imgui.same_line()
+    if imgui.get_content_region_avail().x < imgui.calc_text_size(label).x + 2 * imgui.get_style().frame_padding.x:
+        imgui.new_line()
 
 
 def _button(dispatch: Dispatch, ui: UiState, label: str, name: str, command: ChangeEdit | None) -> None:
