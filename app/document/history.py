@@ -53,7 +53,7 @@ class Placed:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ObjectFound:
     """An object was found in clips. Not a step: it follows from what somebody has selected, so that it belongs to every
     document of the history that has the object with these seeds. Undoing the step that made the object takes it back.
 
@@ -68,7 +68,7 @@ class Found:
     clips: tuple[ObjectInClip, ...]
 
 
-Event = Changed | Undone | Redone | Placed | Found
+Event = Changed | Undone | Redone | Placed | ObjectFound
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class DocumentHistory:
                 return self._redone() if self.future else self
             case Placed(settings=settings):
                 return replace(self, present=replace(self.present, settings=settings))
-            case Found():
+            case ObjectFound():
                 return self.each(_Finding(event).in_document)
 
     def each(self, change: Callable[[ProjectDocument], ProjectDocument]) -> DocumentHistory:
@@ -157,7 +157,7 @@ class DocumentHistory:
 class _Finding:
     """Puts into documents what was found. Documents of a history share their objects, and do so afterwards."""
 
-    def __init__(self, found: Found) -> None:
+    def __init__(self, found: ObjectFound) -> None:
         self._found = found
         self._known: dict[int, tuple[SceneObject, SceneObject]] = {}
 

@@ -10,11 +10,11 @@ from msgspec import structs
 from app.document.changes import object_changes
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.object_changes import object_named
-from app.document.history import Event, Found
+from app.document.history import Event, ObjectFound
 from app.document.project_document import ProjectDocument
 from app.session.editing.edit_commands import ChangeEdit
 from app.session.editing.edits import changed as edit_change
-from app.session.editing.object_commands import (
+from app.session.objects.object_commands import (
     ObjectCommand,
     RecolourObject,
     RemoveObject,
@@ -22,7 +22,7 @@ from app.session.editing.object_commands import (
     SetObjectSpan,
     SetObjectTrained,
 )
-from app.session.editing.objects import changed
+from app.session.objects.objects import changed
 from engine.editing.actions import Vector
 from engine.editing.edit import Edit, ObjectTarget, Picked
 from engine.editing.scene_object import ObjectSeed, SceneObject
@@ -141,7 +141,7 @@ class ScriptedObjects:
         self._project.check_writable()
         searched = self._searched(self.document, one.object_id, on_progress)
         clips = object_changes.object_with(searched, one.object_id).clips
-        self._happen(Found(one.object_id, one.seeds, clips))
+        self._happen(ObjectFound(one.object_id, one.seeds, clips))
         return self._named(one.object_id)
 
     def measure_object(

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import get_args
 
+from app.document.changes.timing_changes import TIME_EDITS, ChangeSegment
 from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep, Redo, Undo
 from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
-from app.session.editing.object_commands import ObjectCommand
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
 from app.session.objects.follow_commands import FollowObject
+from app.session.objects.object_commands import ObjectCommand
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import AskStartOver, StartOver
 from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SetTrainSetting
@@ -62,6 +63,7 @@ TITLES: dict[type, str] = {
     **dict.fromkeys(get_args(EditCommand), "The edit cannot be made"),
     FollowObject: "The volume cannot follow the object",
     **dict.fromkeys(get_args(ObjectCommand), "The object cannot be changed"),
+    **dict.fromkeys((*TIME_EDITS.values(), ChangeSegment), "The take cannot be changed"),
     **dict.fromkeys(get_args(PathCommand), "The camera path cannot be changed"),
     AskStartOver: "Training cannot start over",
     StartOver: "Training cannot start over",

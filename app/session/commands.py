@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.document.changes.timing_changes import TimeEdit
 from app.session.captures.capture_commands import CalibrationCommand, DoctorCommand, SynchronisationCommand
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, HistoryCommand
 from app.session.editing.mark_commands import MarkCommand
-from app.session.editing.object_commands import ObjectCommand
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.export_commands import ExportCommand
 from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
 from app.session.objects.follow_commands import FollowCommand
+from app.session.objects.object_commands import ObjectCommand
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import ProjectCommand
 from app.session.projects.setting_commands import SettingCommand
@@ -59,6 +60,7 @@ Command = (
     | EditCommand
     | ObjectCommand
     | FollowCommand
+    | TimeEdit
     | MarkCommand
     | PathCommand
     | HistoryCommand

@@ -339,6 +339,7 @@ def _context(
         fps=capture.fps,
         paths=paths,
         objects=tuple(one.name for one in opened.project.document.objects),
+        has_timing=bool(opened.project.document.timing),
         has_edits=any(edit.is_on for edit in opened.project.document.edits),
         has_videos=any(isinstance(entry.source, VideoFrames) for entry in capture.layout.cameras),
     )

@@ -13,6 +13,7 @@ from pathlib import Path
 from app.background.jobs import Jobs
 from app.background.log_reader import LogView
 from app.background.usage import UsageMeter
+from app.document.changes.timing_changes import TimeEdit
 from app.project.opening.opening import Opened, open_for_window
 from app.session.captures.calibrating import Calibrating
 from app.session.captures.capture_commands import (
@@ -37,8 +38,6 @@ from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.lost_edits import LostEdits
 from app.session.editing.mark_commands import MarkCommand
-from app.session.editing.object_commands import ObjectCommand
-from app.session.editing.objects import Objects
 from app.session.editing.selecting import ProjectSelecting
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.editing.selection_status import SelectionStatus
@@ -54,6 +53,8 @@ from app.session.mending.mending import ProjectMending
 from app.session.notices import Notices
 from app.session.objects.follow_commands import FollowCommand
 from app.session.objects.following import Following
+from app.session.objects.object_commands import ObjectCommand
+from app.session.objects.objects import Objects
 from app.session.part import SessionParts
 from app.session.paths.camera_paths import CameraPaths
 from app.session.paths.path_commands import PathCommand
@@ -65,6 +66,7 @@ from app.session.questions import Asked
 from app.session.session_face import SessionFace
 from app.session.showing.look_commands import LookCommand
 from app.session.showing.showing import Showing
+from app.session.timing.time_edits import apply_time_edit
 from app.session.training.clip_versions import Versions
 from app.session.training.live_training import LiveTraining
 from app.session.training.train_commands import HoldCommand, TrainCommand
@@ -183,7 +185,9 @@ class Session(SessionFace):
             )
         )
         self.following = parts.add(Following(self.document, jobs, self.notices))
-        self.command_texts = CommandTexts(lambda: self.project, live.is_finished)
+        self.command_texts = CommandTexts(
+            lambda: self.project, live.is_finished, lambda: None if self.capture is None else self.capture.n_frames
+        )
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
         self.edits: EditsStatus = self.editing.status()
@@ -243,6 +247,8 @@ class Session(SessionFace):
                 self.marking.apply(command)
             case _ if isinstance(command, PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
+            case _ if isinstance(command, TimeEdit):
+                apply_time_edit(command, self.document, 0 if self.capture is None else self.capture.n_frames)
             case _ if isinstance(command, ExclusionCommand):
                 n_frames = 0 if self.capture is None else self.capture.n_frames
                 apply_exclusion(command, self.document, self.rig.names, n_frames)

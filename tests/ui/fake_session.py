@@ -13,6 +13,7 @@ import numpy as np
 
 from app.background.log_reader import LogLine
 from app.document.changes.object_changes import add_object
+from app.document.changes.timing_changes import TimeEdit, timing_changed
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.export.export_choices import ExportChoices
@@ -41,16 +42,16 @@ from app.session.captures.synchronisation_page import SynchronisationPage
 from app.session.commands import CloseQuestion, Command, DismissNotice
 from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
-from app.session.editing import objects
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import Change, changed, edits_status
 from app.session.editing.mark_commands import MarkRegion, RemoveRegion
-from app.session.editing.object_commands import CorrectObject, FindObject, MakeObject, ObjectCommand, SelectObject
 from app.session.editing.selection_status import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.mending.mend_page import MendPage
 from app.session.notices import Notices
+from app.session.objects import objects
+from app.session.objects.object_commands import CorrectObject, FindObject, MakeObject, ObjectCommand, SelectObject
 from app.session.paths import path_commands
 from app.session.paths.path_edits import edited
 from app.session.projects.project_commands import OpenCapture, OpenProject
@@ -100,6 +101,7 @@ from engine.editing.scene_object import ObjectSeed
 from engine.editing.selection.ranges import ValueSpread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
 from engine.gate.regions import GateRegion, sphere_region
+from engine.timing.timing import TakeTiming
 
 
 def make_rig(n_cameras: int = 8, width: int = 320, height: int = 240) -> CameraRig:
@@ -441,6 +443,12 @@ class FakeSession:
                 result = edited(self.paths, command, self.view, self.timeline)
                 self.paths = PathsStatus(result.paths, result.chosen, result.chosen_key, can_edit=True)
                 self.history = HistoryStatus(undo=result.name)
+            case _ if isinstance(command, TimeEdit):
+                self.content = timing_changed(self.content, command, self.timeline.n_frames)
+                self.edits = edits_status(self.content)
+                self.history = HistoryStatus(undo=command.title, past=(*self.history.past, command.title))
+                segments = self.content.timing
+                self.timeline.timing = TakeTiming(segments, self.timeline.n_frames) if segments else None
             case _ if isinstance(command, EditCommand):
                 change = changed(self.content, command)
                 self.content, self.edits = change.document, edits_status(change.document)

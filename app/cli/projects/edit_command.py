@@ -9,7 +9,6 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
-from app.cli.projects import edit_verbs, follow_verb
 from app.cli.projects.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -19,10 +18,14 @@ from app.cli.projects.edit_arguments import (
     has_scope,
     has_target,
 )
+from app.cli.projects.edit_timing import add_time_arguments, change_time, given_time_options, take_lines
+from app.cli.projects.edit_verbs import VERBS, add_verb_arguments, check_words, take_verb
+from app.cli.projects.follow_verb import FOLLOW, MEANING, add_follow_arguments, take_follow
 from app.cli.terminal.progress import ProgressLine
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.edit_words import edit_title
 from app.document.changes.reach_words import acting_text, reach_note
+from app.document.changes.timing_changes import TIME_EDITS
 from app.document.storing.stored_document import ENTRIES
 from app.scripting.scripted_project import ScriptedProject, open_scripted
 from app.training.service import Launch
@@ -32,8 +35,6 @@ from engine.storage.json_files import JsonError, json_text, parse_json
 from engine.text import one_line
 
 EDIT_SCHEMA = 1
-VERB_TABLES = (edit_verbs, follow_verb)
-"""Modules with `VERBS` by name, `add_verb_arguments`, and `take_verb`, which turns a verb into the options it means."""
 MAX_STDIN_CHARACTERS = 1 << 28
 _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo", "apply_permanently")
 
@@ -41,17 +42,18 @@ _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream edit`."""
     command.add_argument("project", type=path_argument, help="project folder")
-    verbs = {name: verb.meaning for table in VERB_TABLES for name, verb in table.VERBS.items()}
+    verbs = {name: verb.meaning for name, verb in VERBS.items()} | {FOLLOW: MEANING}
+    verbs |= {name: "see below" for name in TIME_EDITS}
     command.add_argument(
-        "verb",
-        nargs="?",
-        choices=tuple(verbs),
+        "words",
+        nargs="*",
         metavar="VERB",
-        help=f"what to do; the same as options do: {'; '.join(f'{name}: {words}' for name, words in verbs.items())}",
+        help=f"what to do: {'; '.join(f'{name}: {words}' for name, words in verbs.items())}",
     )
-    for table in VERB_TABLES:
-        table.add_verb_arguments(command)
+    add_verb_arguments(command)
+    add_follow_arguments(command)
     add_edit_arguments(command)
+    add_time_arguments(command)
     stack = command.add_argument_group("the stack and the history")
     one = stack.add_mutually_exclusive_group()
     one.add_argument("--on", type=int, metavar="ID", help="switch an edit on")
@@ -82,8 +84,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
-    for table in VERB_TABLES:
-        table.take_verb(options)
+    verb = options.words[0] if options.words else ""
+    if take_follow(options):
+        check_words(options, FOLLOW, "")
+    elif verb in TIME_EDITS:
+        return _run_verb(options, launch)
+    else:
+        take_verb(options)
     chosen = [name for name in (*_OF_STACK, "follow") if getattr(options, name) is not None]
     if len(chosen) > 1:
         raise ProjectError(f"--{chosen[0].replace('_', '-')} is given with follow.", hint="Leave one of them out.")
@@ -100,8 +107,28 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     return EXIT_OK
 
 
+def _run_verb(options: argparse.Namespace, launch: Launch) -> int:
+    """A verb, such as `clipgstream edit PROJECT trim --frames 10:60`. Returns the exit code."""
+    verb = options.words[0]
+    check_words(options, verb, "by")
+    of_edits = [name for name in _OF_STACK if getattr(options, name) is not None]
+    frames, at = options.frames, options.at
+    options.frames = options.at = None  # the verb's own
+    if of_edits or has_action(options) or has_target(options) or has_scope(options) or options.name is not None:
+        raise ProjectError(f"{verb} is given with options of edits.", hint="Leave them out.")
+    options.frames, options.at = frames, at
+    with open_scripted(options.project, launch=launch) as project:
+        change_time(options, options.words, project)
+        found = describe_edits(project, has_steps=options.history)
+        lines = [] if options.json else edit_lines(project, has_steps=options.history)
+    print(json_text(found, indent=1) if options.json else "\n".join(lines))
+    return EXIT_OK
+
+
 def _check_options(options: argparse.Namespace, chosen: str) -> None:
     """A given option that would be ignored is an error."""
+    for flag in given_time_options(options):
+        raise ProjectError(f"{flag} is given without a verb.", hint=f"Verbs are {', '.join(TIME_EDITS)}.")
     takes_edit = chosen in ("", "replace")
     given = {
         "what an edit does": has_action(options),
@@ -207,8 +234,8 @@ def _text(argument: str) -> str:
 
 
 def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict[str, Any]:
-    """The stack as plain data: schema; path; edits, bottom first; undo and redo, what each would do; with has_steps
-    also past and future, names of steps, the next one last."""
+    """The stack as plain data: schema; path; edits, bottom first; timing, segments of the take; undo and redo, what
+    each would do; with has_steps also past and future, names of steps, the next one last."""
     history, reaches = project.history, project.reaches
     found = {
         "schema": EDIT_SCHEMA,
@@ -222,6 +249,7 @@ def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict
             }
             for edit in project.edits
         ],
+        "timing": [to_builtins(one) for one in project.document.timing],
         "undo": history.undo_name,
         "redo": history.redo_name,
     }
@@ -238,6 +266,7 @@ def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str
         state = "" if edit.is_on else " (off)"
         where = acting_text(edit.scope, reaches[edit.edit_id])
         lines.append(f"{edit.edit_id:>5}  {one_line(edit_title(edit, project.document.objects))}, {where}{state}")
+    lines += take_lines(project)
     if has_steps:
         history = project.history
         lines.append(f"Steps: {len(history.past)}")

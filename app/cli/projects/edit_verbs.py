@@ -8,6 +8,8 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 
+from app.cli.projects.follow_verb import FOLLOW
+from app.document.changes.timing_changes import TIME_EDITS
 from engine.editing.actions import ACTIONS, Action
 from engine.errors import ProjectError
 
@@ -34,7 +36,7 @@ class EditVerb:
         return tuple(self.kind.flags())
 
 
-_WORDS = {"move": "by", "recolour": "to", "exposure": "by", "hold": "as-in", "smooth": "over"}
+_WORDS = {"move": "by", "recolour": "tint", "exposure": "by", "hold": "as-in", "smooth": "over"}
 """The word before the values of an option, when a verb stands for that option."""
 _NAMES = {"exposure": "expose"}
 """Verbs that are not called like the option."""
@@ -60,6 +62,7 @@ def add_verb_arguments(command: argparse.ArgumentParser) -> None:
     group = command.add_argument_group("after a verb")
     for word in dict.fromkeys(verb.word for verb in VERBS.values() if verb.word):
         meant = ", ".join(f"{verb.flag} for {name}" for name, verb in VERBS.items() if verb.word == word)
+        meant += ", or the speed" if word == "by" else ""
         group.add_argument(f"--{word}", nargs="+", type=float, metavar="VALUE", help=f"the values of {meant}")
 
 
@@ -69,12 +72,13 @@ def take_verb(options: argparse.Namespace) -> None:
     Raises:
         ProjectError: Values are missing, too many, or of another verb.
     """
-    words = {verb.word for verb in VERBS.values() if verb.word}
-    verb = VERBS.get(options.verb or "")
-    for word in sorted(words):
-        if getattr(options, _field(word)) is not None and (verb is None or verb.word != word):
-            name = options.verb or "an edit without a verb"
-            raise ProjectError(f"--{word} does not go with {name}.", hint=_hint(word))
+    name, *rest = options.words or [""]
+    verb = VERBS.get(name)
+    if name and verb is None:
+        raise ProjectError(f"'{name}' is not a verb.", hint=f"Verbs are {', '.join((*VERBS, FOLLOW, *TIME_EDITS))}.")
+    if rest:
+        raise ProjectError(f"{name} is followed by '{rest[0]}', which is not an option of it.")
+    check_words(options, name or "an edit without a verb", "" if verb is None else verb.word)
     if verb is None:
         return
     if not verb.word:
@@ -85,13 +89,13 @@ def take_verb(options: argparse.Namespace) -> None:
         if not any(getattr(options, _field(flag[2:])) for flag in verb.flags):
             others = [flag for flag in verb.flags if flag != verb.flag]
             also = f", or {', '.join(others)}" if others else ""
-            raise ProjectError(f"The values of {options.verb} are missing.", hint=f"Give --{verb.word}{also}.")
+            raise ProjectError(f"The values of {name} are missing.", hint=f"Give --{verb.word}{also}.")
         return
     settings = verb.kind.flags()[verb.flag][1]
     n = sum(len(one.like.split()) for one in settings)
     like = " ".join(one.like for one in settings)
     if len(values) != n:
-        raise ProjectError(f"--{verb.word} has {len(values)} values; {options.verb} takes {n}: {like}.")
+        raise ProjectError(f"--{verb.word} has {len(values)} values; {name} takes {n}: {like}.")
     if settings[0].kind is int:
         if not all(value.is_integer() for value in values):
             raise ProjectError(f"--{verb.word} {values[0]:g} is not a whole number.")
@@ -99,6 +103,13 @@ def take_verb(options: argparse.Namespace) -> None:
     if getattr(options, _field(verb.flag[2:])):
         raise ProjectError(f"--{verb.word} and {verb.flag} are given together.", hint="Give one of them.")
     setattr(options, _field(verb.flag[2:]), values)
+
+
+def check_words(options: argparse.Namespace, verb: str, allowed: str) -> None:
+    """Check that no word of another verb is given. allowed: The only one that may be. Raises ProjectError."""
+    for word in sorted({one.word for one in VERBS.values() if one.word} - {allowed}):
+        if getattr(options, _field(word)) is not None:
+            raise ProjectError(f"--{word} does not go with {verb}.", hint=_hint(word))
 
 
 def _field(option: str) -> str:

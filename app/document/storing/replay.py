@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.document.history import Changed, DocumentHistory, Event, Found, Placed, Redone, Step, Undone
+from app.document.history import Changed, DocumentHistory, Event, ObjectFound, Placed, Redone, Step, Undone
 from app.document.project_document import ProjectDocument
 from app.document.storing.document_file import PROJECT_FILE, StoredDocument, read_stored
 from app.document.storing.document_patch import document_difference, document_with
@@ -243,7 +243,7 @@ def row_of(event: Event, before: DocumentHistory, step: int) -> Row:
         case Placed(settings=settings):
             place = {"capture": settings.capture, "follow_links": settings.follow_links}
             return {"step": step, "do": "place", **place}
-        case Found(object_id=object_id):
+        case ObjectFound(object_id=object_id):
             row = {"step": step, "do": "find", "object": object_id}
     return {**row, "patch": document_difference(before.present, after)}
 
@@ -269,7 +269,7 @@ def history_after(history: DocumentHistory, row: Row) -> DocumentHistory:
             found = next((one for one in document_with(before, patch).objects if one.object_id == object_id), None)
             if found is None:
                 raise PatchError("an object was found that is not there")
-            return history.after(Found(object_id, found.seeds, found.clips))
+            return history.after(ObjectFound(object_id, found.seeds, found.clips))
         case "undo" | "redo" as do, {"name": str(name), "patch": patch, **rest} if not rest:
             return _gone_along(history, document_with(before, patch), name, is_undo=do == "undo")
     raise PatchError("it is not an event")

@@ -36,7 +36,7 @@ class Answers:
         return tuple(self.job_type.asked(self._declared(), self).values())
 
     def _declared(self) -> dict[str, Question]:
-        """The questions that the options lead to, those about edits and objects where there are any."""
+        """The questions that the options lead to, those about edits, objects and timing where there are any."""
         declared = self._settings()
         return {
             name: question_about(setting, self.context)
@@ -44,6 +44,7 @@ class Answers:
             if setting.label
             and (name != "has_edits" or self.context.has_edits)
             and (name != "object" or self.context.objects)
+            and (name != "has_timing" or self.context.has_timing)
             and all(
                 question_about(declared[other], self.context).chosen(self.choices) in values
                 for other, values in setting.shown_with.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from app.export.jobs.job import EDITS, FRAMES, OBJECT, ExportJob, option
+from app.export.jobs.job import EDITS, FRAMES, OBJECT, TIMING, ExportJob, option
 from app.export.picked_frames import PickedFrames
 from engine.setting import Flag
 
@@ -35,6 +35,7 @@ class PlayerJob(ExportJob, frozen=True):
     ] = None
     has_edits: Annotated[bool, EDITS] = True
     object: Annotated[str | None, OBJECT] = None
+    has_timing: Annotated[bool, TIMING] = True
 
     @classmethod
     def suffix(cls, format_name: str) -> str:

@@ -112,7 +112,13 @@ def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
     """The edits of a document as a window shows them. why_not: Why nothing can be changed now; empty when it can."""
     labels = {(label.kind, label.name): label.text for label in document.labels}
     return EditsStatus(
-        document.edits, labels, document.world, objects=document.objects, can_edit=not why_not, why_not=why_not
+        document.edits,
+        labels,
+        document.world,
+        document.timing,
+        document.objects,
+        can_edit=not why_not,
+        why_not=why_not,
     )
 
 

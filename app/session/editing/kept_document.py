@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 
 from app.background.latest import LatestWorker
-from app.document.history import Changed, DocumentHistory, Event, Found, Redone, Undone, coalesced
+from app.document.history import Changed, DocumentHistory, Event, ObjectFound, Redone, Undone, coalesced
 from app.document.project_document import ProjectDocument
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
@@ -116,7 +116,7 @@ class KeptDocument(SessionPart):
         """
         self._happen(Changed(name, document, merge))
 
-    def found(self, found: Found) -> None:
+    def found(self, found: ObjectFound) -> None:
         """Take up where an object is, in all documents of the history. Raises ProjectError like `change`."""
         self._happen(found)
 

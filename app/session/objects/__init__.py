@@ -1,1 +1,1 @@
-"""Objects of the open project: volumes that follow them."""
+"""Objects of the open project: made, corrected, looked for, and followed by volumes."""

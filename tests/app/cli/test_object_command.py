@@ -115,7 +115,7 @@ def test_what_cannot_be_is_one_line_and_exit_code_2(run, folder, arguments, word
         (("move", "--by", 0, 0, -1.5), Transform((0, 0, -1.5), pivot=(0, 0, 1)), False),
         (("move", "--by", 0, 0, 1, "--scale", 2), Transform((0, 0, 1), scale=2, pivot=(0, 0, 1)), False),
         (("move", "--scale", 2), Transform(scale=2, pivot=(0, 0, 1)), False),
-        (("recolour", "--to", 1, 0, 0, 0.5), Recolor((1, 0, 0), 0.5), False),
+        (("recolour", "--tint", 1, 0, 0, 0.5), Recolor((1, 0, 0), 0.5), False),
         (("recolour", "--opacity", 0.25), Recolor(opacity=0.25), False),
         (("expose", "--by", -0.5), Expose(-0.5), False),
         (("hold", "--as-in", 12), Hold(12), False),
@@ -142,7 +142,10 @@ def test_a_verb_is_an_option(run, empty, arguments, action, is_inverted):
         (("delete", "--hide"), "are given together"),
         (("delete", "--undo"), "--undo is given with what an edit does."),
         (("delete", "--object", "cat"), "There is no object 'cat'. The project has no objects."),
-        (("paint",), "invalid choice: 'paint'"),
+        (("paint",), "'paint' is not a verb. Verbs are hide, "),
+        (("delete", "it"), "delete is followed by 'it', which is not an option of it."),
+        (("trim", "--over", 2), "--over does not go with trim."),
+        (("speed", "--by", 2, 3), "--by has 2 values; speed takes 1."),
     ],
 )
 def test_verbs_that_cannot_be(run, empty, arguments, words):

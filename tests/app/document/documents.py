@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from app.document.history import Changed, DocumentHistory, Event, Found, Redone, Undone
+from app.document.history import Changed, DocumentHistory, Event, ObjectFound, Redone, Undone
 from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings
 from app.document.storing.stored_document import plain_document
@@ -51,7 +51,7 @@ def random_events(
             event = Redone()
         elif rng.random() < 0.5 and history.present.objects:
             one = rng.choice(history.present.objects)
-            event = Found(one.object_id, one.seeds, _clips(rng))
+            event = ObjectFound(one.object_id, one.seeds, _clips(rng))
         history = history.after(event)
         yield event, history
 

@@ -13,7 +13,7 @@ from msgspec import structs
 
 from app.document.changes import edit_changes
 from app.document.changes import object_changes as change
-from app.document.history import Changed, DocumentHistory, Event, Found, Redone, Undone
+from app.document.history import Changed, DocumentHistory, Event, ObjectFound, Redone, Undone
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.storing.document_store import DocumentStore
@@ -163,9 +163,9 @@ def _history() -> tuple[DocumentHistory, list[Event]]:
 
     happen(Changed("make object", change.add_object(EMPTY, SEED, within=(10, 20))))
     happen(Changed("expose", edit_changes.add_edit(history.present, Expose(1.0))))
-    happen(Found(1, (SEED,), FOUND))
+    happen(ObjectFound(1, (SEED,), FOUND))
     happen(Changed("correct", change.correct_object(history.present, 1, OTHER)))
-    happen(Found(1, (SEED, OTHER), FOUND[:1]))
+    happen(ObjectFound(1, (SEED, OTHER), FOUND[:1]))
     return history, events
 
 
@@ -187,8 +187,8 @@ def test_what_was_found_belongs_to_the_step_that_made_the_object() -> None:
 
 def test_what_was_found_for_other_seeds_is_of_no_account() -> None:
     history, _ = _history()
-    assert history.after(Found(1, (OTHER,), ())).present == history.present
-    assert history.after(Found(2, (SEED, OTHER), ())).present == history.present
+    assert history.after(ObjectFound(1, (OTHER,), ())).present == history.present
+    assert history.after(ObjectFound(2, (SEED, OTHER), ())).present == history.present
 
 
 @pytest.mark.parametrize("is_compacted", [False, True])
@@ -226,6 +226,6 @@ def test_objects_of_another_time_are_not_shared_wrongly() -> None:
     one = change.add_object(EMPTY, SEED).objects[0]
     later = replace(EMPTY, objects=(structs.replace(one, name="b"),))
     history = DocumentHistory(later, DocumentHistory(EMPTY).after(Changed("a", replace(EMPTY, objects=(one,)))).past)
-    found = history.after(Found(1, (SEED,), FOUND))
+    found = history.after(ObjectFound(1, (SEED,), FOUND))
     assert found.present.objects[0].name == "b"
     assert found.present.objects[0].clips == FOUND

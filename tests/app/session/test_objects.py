@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.document.history import Found
+from app.document.history import ObjectFound
 from app.session.commands import CancelJob
 from app.session.editing.edit_commands import AddEdit, Redo, Undo
-from app.session.editing.object_commands import (
+from app.session.editing.selection import Selection
+from app.session.objects.object_commands import (
     CorrectObject,
     FindObject,
     MakeObject,
@@ -21,7 +22,6 @@ from app.session.editing.object_commands import (
     SetObjectSpan,
     SetObjectTrained,
 )
-from app.session.editing.selection import Selection
 from app.session.projects.project_commands import OpenProject
 from app.session.session import Session
 from app.session.showing.look_commands import SetFrame
@@ -202,7 +202,7 @@ def test_a_clip_that_is_another_now_is_looked_at_again_without_a_step(session, f
     settle(session)
     one = one_of(session)
     known = (one.clips[0], ObjectInClip(3, 6, origin="before"))
-    session.document.found(Found(1, one.seeds, known))
+    session.document.found(ObjectFound(1, one.seeds, known))
     settle(session)
     assert len(finder.asked) == 2
     assert one_of(session).clips[1].origin == session.edits.clips[1].origin

@@ -13,7 +13,8 @@ from app.session.commands import CancelJob
 from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import AddEdit
 from app.session.editing.edits import edits_status
-from app.session.editing.object_commands import (
+from app.session.editing.selection_status import SelectionStatus
+from app.session.objects.object_commands import (
     CorrectObject,
     FindObject,
     MakeObject,
@@ -24,7 +25,6 @@ from app.session.editing.object_commands import (
     SetObjectSpan,
     SetObjectTrained,
 )
-from app.session.editing.selection_status import SelectionStatus
 from app.session.showing.look_commands import SetFrame
 from app.status import JobStatus
 from engine.editing.actions import Delete, Hide

@@ -10,7 +10,7 @@ from app.session.editing.edit_commands import AddEdit, ChangeEdit
 from engine.editing.actions import Delete, Expose
 from engine.editing.edit import Box, KeyedVolume
 from engine.editing.volumes.keyed_volume import volume_at
-from tests.ui.pilot import SHIFT, Pilot
+from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.panels.state import EDITS
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -49,7 +49,7 @@ def drag_face(pilot: Pilot) -> None:
 def test_once_keyed_each_drag_of_a_handle_sets_the_key_of_the_shown_frame_in_one_step(panel: Pilot) -> None:
     assert "timeline.volume_key0" not in panel.rects
     show(panel, 5)
-    panel.key(key.K, modifiers=(SHIFT,))
+    panel.key(key.K, modifiers=(CTRL, SHIFT))
     assert [one.frame for one in keyed(panel).keys] == [5.0]
     assert keyed(panel).keys[0].volume == BOX
     show(panel, 15)
@@ -74,11 +74,11 @@ def test_once_keyed_each_drag_of_a_handle_sets_the_key_of_the_shown_frame_in_one
 def test_keys_are_gone_to_dragged_in_time_and_removed(panel: Pilot) -> None:
     for frame_index in (5, 15, 25):
         show(panel, frame_index)
-        panel.key(key.K, modifiers=(SHIFT,))
+        panel.key(key.K, modifiers=(CTRL, SHIFT))
     timeline = panel.session.timeline
     show(panel, 12)
     for symbol, expected in ((key.COMMA, 5), (key.PERIOD, 15), (key.PERIOD, 25), (key.PERIOD, 25)):
-        panel.key(symbol, modifiers=(ALT,))
+        panel.key(symbol, modifiers=(ALT, SHIFT))
         assert timeline.frame_index == expected
     panel.click("volume.previous_key")
     assert timeline.frame_index == 15
@@ -106,7 +106,7 @@ def test_numbers_change_the_key_of_the_shown_frame(panel: Pilot) -> None:
     panel.session.dispatch(ChangeEdit(structs.replace(panel.session.edits.edits[0], action=Expose(1.0))))
     for frame_index in (0, 20):
         show(panel, frame_index)
-        panel.key(key.K, modifiers=(SHIFT,))
+        panel.key(key.K, modifiers=(CTRL, SHIFT))
     show(panel, 10)
     x, y = panel.rects["edits.center"].center
     panel.drag((x, y), (x + 30, y))
@@ -117,8 +117,8 @@ def test_an_edit_without_a_volume_says_so(panel: Pilot) -> None:
     panel.session.dispatch(AddEdit(Expose(1.0)))
     panel.studio.frame.ui.editing.choose(2)
     panel.draw(2)
-    panel.key(key.K, modifiers=(SHIFT,))
-    panel.key(key.COMMA, modifiers=(ALT,))
+    panel.key(key.K, modifiers=(CTRL, SHIFT))
+    panel.key(key.COMMA, modifiers=(ALT, SHIFT))
     assert [notice.title for notice in panel.session.notices] == [
         "The chosen edit does not act on a volume.",
         "The volume of the chosen edit has no keys.",

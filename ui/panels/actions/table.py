@@ -17,6 +17,7 @@ from ui.panels.actions.editing import (
     marking,
     objects,
     selecting,
+    timing,
     volume_keys,
 )
 from ui.panels.actions.viewing import bookmarks, compare, heat, modes, navigation, view
@@ -26,6 +27,7 @@ from ui.panels.state import Dispatch, UiState
 ACTIONS: tuple[Action, ...] = (
     *time.ACTIONS,
     *playing.ACTIONS,
+    *timing.ACTIONS,
     *view.ACTIONS,
     *navigation.ACTIONS,
     *bookmarks.ACTIONS,

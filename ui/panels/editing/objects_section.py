@@ -7,7 +7,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.document.changes.object_words import confidence_text, runs_within, seen_text
 from app.document.changes.reach_words import frames_text
 from app.session.commands import CancelJob
-from app.session.editing.object_commands import (
+from app.session.objects.object_commands import (
     CorrectObject,
     FindObject,
     MakeObject,

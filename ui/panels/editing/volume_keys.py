@@ -76,7 +76,7 @@ def draw_volume_keys(session: SessionView, dispatch: Dispatch, ui: UiState, edit
     if not isinstance(keyed, KeyedVolume):
         _same_line_for("Key here")
         _button(dispatch, ui, "Key here", "volume.key", key_here(edit, frame_index))
-        imgui.set_item_tooltip("Lets the volume move: it gets a key at this frame (Shift+K)")
+        imgui.set_item_tooltip("Lets the volume move: it gets a key at this frame (Ctrl+Shift+K)")
         _draw_follow(session, dispatch, ui, edit)
         return
     n_keys = len(keyed.keys)

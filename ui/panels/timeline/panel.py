@@ -8,6 +8,8 @@ from app.session.session_view import SessionView
 from app.session.showing.look_commands import SetFrame
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.timeline.jump_text import HINT, parse_jump
+from ui.panels.timeline.key_lanes.path_lane import draw_path_lane
+from ui.panels.timeline.key_lanes.volume_lane import draw_volume_lane, keyed_edit
 from ui.panels.timeline.marker_box import draw_marker_box
 from ui.panels.timeline.menu import draw_clip_menu
 from ui.panels.timeline.pointer import handle_track
@@ -16,7 +18,6 @@ from ui.panels.timeline.rows.gutter import WIDTH as GUTTER_WIDTH
 from ui.panels.timeline.rows.gutter import draw_gutter
 from ui.panels.timeline.rows.object_lane import draw_object_lane
 from ui.panels.timeline.rows.overview import draw_overview
-from ui.panels.timeline.rows.path_lane import draw_path_lane
 from ui.panels.timeline.rows.quality_lane import draw_quality_lane
 from ui.panels.timeline.rows.rows import (
     CACHE,
@@ -28,6 +29,7 @@ from ui.panels.timeline.rows.rows import (
     QUALITY,
     RULER,
     SEAMS,
+    TAKE,
     VOLUMES,
     arrange_rows,
 )
@@ -35,7 +37,7 @@ from ui.panels.timeline.rows.ruler import draw_hover, draw_played, draw_playhead
 from ui.panels.timeline.rows.seam_lane import draw_seam_lane
 from ui.panels.timeline.rows.small_lanes import draw_cache_lane, draw_marker_lane
 from ui.panels.timeline.rows.stage import TimelineStage
-from ui.panels.timeline.rows.volume_lane import draw_volume_lane, keyed_edit
+from ui.panels.timeline.rows.take_lane import draw_take_lane
 from ui.panels.timeline.time_range import TimeScale
 from ui.panels.timeline.transport import draw_transport
 from ui.style import theme
@@ -58,6 +60,7 @@ def _draw_rows(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     folded = ui.timeline.folded | (set() if session.paths.paths else {CAMERA})
     folded |= {VOLUMES} if keyed_edit(session, ui) is None else set()
     is_zoomed, objects = ui.timeline.is_zoomed, session.edits.objects
+    folded = folded if session.edits.timing else folded | {TAKE}
     rows = {
         row.name: Rect(left, origin.y + row.top, right, origin.y + row.top + row.height)
         for row in arrange_rows(max(size.y, MIN_TRACK_HEIGHT), folded, is_zoomed=is_zoomed, n_objects=len(objects))
@@ -110,6 +113,8 @@ def _draw_track(stage: TimelineStage, session: SessionView) -> None:
         draw_object_lane(stage, session)
     if VOLUMES in stage.rows:
         draw_volume_lane(stage, session)
+    if TAKE in stage.rows:
+        draw_take_lane(stage, session)
     if MARKERS in stage.rows:
         draw_marker_lane(stage, timeline)
     draw_played(stage, timeline)

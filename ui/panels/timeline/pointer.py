@@ -10,14 +10,15 @@ from app.session.editing.edit_commands import MoveMarker
 from app.session.session_view import SessionView
 from app.session.showing.look_commands import SetFrame
 from ui.panels.state import Dispatch
+from ui.panels.timeline.key_lanes.diamonds import DRAG_FROM
+from ui.panels.timeline.key_lanes.path_lane import handle_keys_of_path
+from ui.panels.timeline.key_lanes.volume_lane import handle_keys_of_volume
 from ui.panels.timeline.marker_box import edit_marker
-from ui.panels.timeline.rows.diamonds import DRAG_FROM
 from ui.panels.timeline.rows.object_lane import object_at, scroll_objects
-from ui.panels.timeline.rows.path_lane import handle_keys_of_path
 from ui.panels.timeline.rows.seam_lane import seam_at
 from ui.panels.timeline.rows.small_lanes import marker_at
 from ui.panels.timeline.rows.stage import TimelineStage
-from ui.panels.timeline.rows.volume_lane import handle_keys_of_volume
+from ui.panels.timeline.rows.take_lane import segment_at
 
 LEFT, MIDDLE = 0, 2
 EDGE_PAN_SHARE = 0.02
@@ -58,6 +59,8 @@ def _handle_left(stage: TimelineStage, session: SessionView, dispatch: Dispatch)
         return
     if _drag_marker(stage, session, dispatch):
         return
+    if _press_segment(stage, session):
+        return
     if imgui.is_item_activated():
         one = object_at(stage, session)
         if one is not None:
@@ -79,6 +82,19 @@ def _handle_left(stage: TimelineStage, session: SessionView, dispatch: Dispatch)
             edit_marker(timeline, dispatch, stage.ui, marker.frame_index)
         elif view.pressed_seam is None:
             view.show_all()
+
+
+def _press_segment(stage: TimelineStage, session: SessionView) -> bool:
+    """Whether a segment of the take was pressed, which chooses it and does nothing else."""
+    view = stage.ui.timeline
+    if imgui.is_item_activated():
+        segment = segment_at(stage, session)
+        view.is_segment_pressed = segment is not None
+        if segment is not None:
+            view.segment = segment
+    is_held = imgui.is_item_active() or imgui.is_item_deactivated()
+    view.is_segment_pressed = view.is_segment_pressed and is_held
+    return view.is_segment_pressed
 
 
 def _drag_marker(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> bool:

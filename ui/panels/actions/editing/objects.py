@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from app.session.editing.object_commands import CorrectObject, FindObject, ObjectCommand, SelectObject
+from app.session.objects.object_commands import CorrectObject, FindObject, ObjectCommand, SelectObject
 from app.session.session_view import SessionView
 from ui.panels.actions.action import EDIT, SELECT, Action, Run
 from ui.panels.editing.objects_section import make_object

@@ -60,7 +60,7 @@ ACTIONS = (
         "Key the volume of the chosen edit at the playhead",
         EDIT,
         _changed(key_here, "The chosen edit does not act on a volume."),
-        keys=("Shift+K",),
+        keys=("Ctrl+Shift+K",),
         lacks=_cannot_edit,
         **_EDIT,
     ),
@@ -91,6 +91,6 @@ ACTIONS = (
     ),
     *(
         Action(f"volume.{name}_key", f"{name.capitalize()} key of the volume", EDIT, _go(step), (key,), **_EDIT)
-        for name, step, key in (("previous", -1, "Alt+,"), ("next", 1, "Alt+."))
+        for name, step, key in (("previous", -1, "Alt+Shift+,"), ("next", 1, "Alt+Shift+."))
     ),
 )

@@ -17,6 +17,7 @@ from ui.panels.timeline.rows.rows import (
     QUALITY,
     RULER,
     SEAMS,
+    TAKE,
     VOLUMES,
 )
 from ui.panels.timeline.rows.stage import SMALL_TEXT, small_text, small_width
@@ -34,7 +35,8 @@ NOTES = {
     CACHE: "Frames decoded in memory, shown at once",
     CAMERA: "Keys of the camera path: C at the playhead",
     OBJECTS: "Objects: in their colours where they are seen, hatched where that is doubtful",
-    VOLUMES: "Keys of the volume that the chosen edit acts on: Shift+K at the playhead",
+    VOLUMES: "Keys of the volume that the chosen edit acts on: Ctrl+Shift+K at the playhead",
+    TAKE: "Segments of the take over the frames that they play, numbered in the order in which they play",
     MARKERS: "Markers: Ctrl+M at the playhead",
 }
 

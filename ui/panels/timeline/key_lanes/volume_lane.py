@@ -13,7 +13,7 @@ from app.session.showing.look_commands import SetFrame
 from engine.editing.edit import Edit, KeyedVolume
 from engine.editing.volumes.keyed_volume import key_at, timed
 from ui.panels.state import Dispatch, UiState
-from ui.panels.timeline.rows.diamonds import DRAG_FROM, draw_diamonds, nearest_diamond
+from ui.panels.timeline.key_lanes.diamonds import DRAG_FROM, draw_diamonds, nearest_diamond
 from ui.panels.timeline.rows.rows import VOLUMES
 from ui.panels.timeline.rows.stage import TimelineStage
 from ui.style import theme

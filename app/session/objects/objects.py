@@ -14,7 +14,7 @@ from msgspec import structs
 from app.background.jobs import BackgroundJob, JobContext, Jobs
 from app.document.changes import object_changes
 from app.document.changes.object_changes import object_with
-from app.document.history import Found
+from app.document.history import ObjectFound
 from app.document.project_document import ProjectDocument
 from app.evaluation.headless import open_trained
 from app.objects.object_masks import object_masks
@@ -24,7 +24,9 @@ from app.project.opening.opened_project import OpenedProject
 from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Change, Selects
 from app.session.editing.kept_document import KeptDocument
-from app.session.editing.object_commands import (
+from app.session.editing.selection import NOTHING_SELECTED, Selection
+from app.session.notices import Notices
+from app.session.objects.object_commands import (
     CorrectObject,
     FindObject,
     MakeObject,
@@ -36,8 +38,6 @@ from app.session.editing.object_commands import (
     SetObjectSpan,
     SetObjectTrained,
 )
-from app.session.editing.selection import NOTHING_SELECTED, Selection
-from app.session.notices import Notices
 from app.session.part import SessionPart
 from engine.capture.exclusions import PaintedMask
 from engine.editing.reach import ClipAnchors, unsearched
@@ -249,7 +249,7 @@ class Objects(SessionPart):
         def done(clips: tuple[ObjectInClip, ...]) -> None:
             self._job = self._searched = None
             if self._document.project is opened.project and self._present(one) is not None:
-                self._document.found(Found(one.object_id, one.seeds, clips))
+                self._document.found(ObjectFound(one.object_id, one.seeds, clips))
                 if (wanted := self._wanted(structs.replace(one, clips=clips))) is not None:
                     self._given_up.add(wanted)  # clips that cannot be searched, or are others by now
 

@@ -10,7 +10,7 @@ from app.session.paths.path_commands import ChooseCameraKey, TimeCameraKey
 from app.session.session_view import SessionView
 from ui.panels.pieces.key_words import key_words
 from ui.panels.state import Dispatch
-from ui.panels.timeline.rows.diamonds import DRAG_FROM, draw_diamonds, nearest_diamond
+from ui.panels.timeline.key_lanes.diamonds import DRAG_FROM, draw_diamonds, nearest_diamond
 from ui.panels.timeline.rows.rows import CAMERA
 from ui.panels.timeline.rows.stage import TimelineStage
 from ui.style import theme
