@@ -12,6 +12,7 @@ from app.document.project_settings import ProjectSettings
 from engine.camera.camera_path import CameraPath
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.actions import Vector
+from engine.editing.copies.object_copy import NO_COPIES, Copies
 from engine.editing.edit import Edit
 from engine.editing.effects import EditStack
 from engine.editing.scene_object import NO_OBJECTS, Objects
@@ -81,6 +82,7 @@ class ProjectDocument:
         exclusions: Cameras, pictures and painted parts that training never sees.
         world: Up and scale.
         objects: People and things that were given a name, in the user's order.
+        copies: Objects that are shown once more, in the user's order.
     """
 
     settings: ProjectSettings
@@ -92,7 +94,8 @@ class ProjectDocument:
     exclusions: Exclusions = NOTHING_EXCLUDED
     world: World = AS_CAPTURED
     objects: Objects = NO_OBJECTS
+    copies: Copies = NO_COPIES
 
     def stack(self) -> EditStack:
-        """Its edits, to be asked moment by moment."""
-        return EditStack(self.edits, self.objects)
+        """Its edits, to be asked moment by moment, and what copies are made of."""
+        return EditStack(self.edits, self.objects, self.copies, self.camera_paths)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from app.document.project_document import AS_CAPTURED, World
 from engine.camera.camera_path import CameraKey, CameraPath
+from engine.editing.copies.object_copy import NO_COPIES, Copies
 from engine.editing.edit import Edit
 from engine.editing.lost_picks import LostPicks
 from engine.editing.reach import UNKNOWN, ClipAnchors, Reach
@@ -38,6 +39,7 @@ class EditsStatus:
         labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
         world: Up and scale.
         objects: Those that have a name, in the user's order.
+        copies: Objects that are shown once more, in the user's order.
         lost: Those that have lost their picks because a clip was trained anew.
         clips: Which anchors each clip has; none while that is not known.
         reaches: Where each edit acts, by its number.
@@ -49,6 +51,7 @@ class EditsStatus:
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     world: World = AS_CAPTURED
     objects: Objects = NO_OBJECTS
+    copies: Copies = NO_COPIES
     lost: tuple[LostPicks, ...] = ()
     clips: tuple[ClipAnchors, ...] = ()
     reaches: Mapping[int, Reach] = field(default_factory=dict)

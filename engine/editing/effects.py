@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import Struct
 
+from engine.camera.camera_path import CameraPath
 from engine.editing.actions import Action
+from engine.editing.copies.object_copy import NO_COPIES, Copies, hiding_edits
 from engine.editing.edit import Edit, ObjectTarget, TargetOfMoment, edits_at
 from engine.editing.scene_object import Objects, at_moment, object_of
 
@@ -75,10 +77,19 @@ class EditStack:
     Args:
         edits: In the order of the stack.
         objects: Of the document, for edits of objects.
+        copies: Of the document; an object whose place one takes is hidden. See engine.editing.copies for what they add.
+        paths: Of the document, which carry copies.
     """
 
-    def __init__(self, edits: tuple[Edit, ...] = (), objects: Objects = ()) -> None:
-        self.edits, self.objects = edits, objects
+    def __init__(
+        self,
+        edits: tuple[Edit, ...] = (),
+        objects: Objects = (),
+        copies: Copies = NO_COPIES,
+        paths: tuple[CameraPath, ...] = (),
+    ) -> None:
+        self.edits, self.objects, self.copies, self.paths = edits, objects, copies, paths
+        self._edits = edits = (*edits, *hiding_edits(copies))
         scopes = [edit.scope for edit in edits if edit.is_on]
         bounds = {scope.first for scope in scopes} | {scope.stop for scope in scopes if scope.stop is not None}
         for edit in edits:
@@ -87,10 +98,15 @@ class EditStack:
         self._bounds = sorted(bounds - {0})
         self._effects: dict[int, Effects] = {}
 
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """Everything of the document that it is made of."""
+        return self.edits, self.objects, self.copies, self.paths
+
     def at(self, frame: float) -> Effects:
         """The effects that hold at a moment, in frames of the capture; between two frames that of the one before."""
         place = bisect_right(self._bounds, math.floor(frame))
         if place not in self._effects:
             first = self._bounds[place - 1] if place else 0
-            self._effects[place] = Effects.of(edits_at(self.edits, first), first, self.objects)
+            self._effects[place] = Effects.of(edits_at(self._edits, first), first, self.objects)
         return self._effects[place]

@@ -13,7 +13,7 @@ from typing import Any
 from app.document.camera_paths import check_paths
 from app.document.project_document import ProjectDocument
 from app.document.storing.plain_patch import Patch, PatchError, difference, patched, pieces_of
-from app.document.storing.stored_document import CODECS, Codec, check_numbers, check_objects
+from app.document.storing.stored_document import CODECS, Codec, check_copies, check_numbers, check_objects
 from engine.storage.typed_json import EntryError
 
 
@@ -105,3 +105,5 @@ def _check(document: ProjectDocument, changed: dict[str, Any]) -> None:
         check_numbers(document.edits)
     if "objects" in changed:
         check_objects(document.objects)
+    if "copies" in changed:
+        check_copies(document.copies)

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from app.playback.modes.view_modes import ALL
 from engine.capture.clip import Clip
-from engine.editing.gaussian_rows import GaussianRows
+from engine.editing.gaussian_rows import COPIED, GaussianRows
 
 if TYPE_CHECKING:
     from engine.clip_files.clip_state import ClipState
@@ -113,6 +113,8 @@ class EditedParts:
         return np.array([self._birth(row_set.role) for row_set in rows.sets], np.uint8)[rows.set_index]
 
     def _birth(self, role: str) -> int:
+        if role == COPIED.role:
+            return BORN_HERE
         if self._reference is None or not self._model.anchor_set(role).is_trainable:
             return OF_REFERENCE
         return LEARNED_ON if role in ("adapted", "replacing") else BORN_HERE
@@ -134,6 +136,8 @@ class EditedParts:
         base, whole = self._base_gaussians(), self.part(ALL).rows
         k, row = self._model.decoder.gaussians_per_anchor, np.full(len(rows), -1, np.int64)
         for place, row_set in enumerate(rows.sets):
+            if row_set == COPIED:
+                continue
             is_of_set = rows.set_index == place
             anchors, among_k = np.divmod(rows.number[is_of_set].astype(np.int64), k)
             found = self._base_rows[row_set.role][whole.rows_of_anchors(row_set.role, anchors)]

@@ -1,4 +1,4 @@
-"""Edits: carries out the commands that change the edits, markers, labels and the world of the open project."""
+"""Edits: carries out the commands that change the edits, markers, labels, copies and the world of the open project."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from app.document.changes import edit_changes, note_changes, world_changes
 from app.document.changes.edit_words import edit_title, what_text
 from app.document.changes.reach_words import check_acts
 from app.document.project_document import ProjectDocument
+from app.session.duplicating.copying import with_copies_changed
 from app.session.edit_status import EditsStatus
 from app.session.editing import edit_commands as c
 from app.session.editing.edit_reaches import EditReaches
@@ -112,7 +113,13 @@ def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
     """The edits of a document as a window shows them. why_not: Why nothing can be changed now; empty when it can."""
     labels = {(label.kind, label.name): label.text for label in document.labels}
     return EditsStatus(
-        document.edits, labels, document.world, objects=document.objects, can_edit=not why_not, why_not=why_not
+        document.edits,
+        labels,
+        document.world,
+        objects=document.objects,
+        copies=document.copies,
+        can_edit=not why_not,
+        why_not=why_not,
     )
 
 
@@ -166,6 +173,8 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
             return Change(world_changes.set_scale(document, meters_per_unit), "set the scale from a length")
         case c.SetScale(meters_per_unit=meters_per_unit):
             return Change(world_changes.set_scale(document, meters_per_unit), "set the scale")
+        case _:
+            return Change(*with_copies_changed(document, command))
 
 
 def _title(document: ProjectDocument, edit_id: int) -> str:
@@ -174,9 +183,5 @@ def _title(document: ProjectDocument, edit_id: int) -> str:
 
 def _is_same(before: ProjectDocument, after: ProjectDocument) -> bool:
     """Is everything the same that these commands change?"""
-    return (before.edits, before.markers, before.labels, before.world) == (
-        after.edits,
-        after.markers,
-        after.labels,
-        after.world,
-    )
+    names = ("edits", "markers", "labels", "world", "copies")
+    return all(getattr(before, name) == getattr(after, name) for name in names)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.editing.edit import Picked, PickedRows
-from engine.editing.gaussian_rows import GaussianRows, RowSet
+from engine.editing.gaussian_rows import COPIED, GaussianRows, RowSet
 from engine.editing.picks import pack_rows, unpack_rows
 
 
@@ -61,7 +61,7 @@ class Selection:
         return mask
 
     def with_mask(self, rows: GaussianRows, mask: np.ndarray, *, keeps_others: bool) -> Selection:
-        """A selection in which, of the Gaussians of a frame, just those of a mask are selected.
+        """A selection in which, of the Gaussians of a frame, just those of a mask are selected; never those of copies.
 
         Args:
             mask: [N] bool
@@ -69,6 +69,8 @@ class Selection:
         """
         parts = dict(self.parts) if keeps_others else {}
         for place, row_set in enumerate(rows.sets):
+            if row_set == COPIED:
+                continue
             is_here, kept = rows.set_index == place, parts.get(row_set, _NONE)
             here = rows.number[is_here]
             table = np.zeros(max(int(kept.max(initial=-1)), int(here.max(initial=-1))) + 1, np.bool_)
