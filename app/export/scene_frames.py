@@ -196,11 +196,18 @@ class SceneFrames:
         copies = self.copies(frame)
         if not copies:
             return edited.gaussians
+        return self._made_copier().with_copies(edited, copies, self._copied_clip).gaussians
+
+    def copied(self, frame: float) -> Gaussians | None:
+        """The copies of a moment alone; None where there are none. Raises as `trained` does."""
+        return self._made_copier().gaussians(self.copies(frame), self._copied_clip)
+
+    def _made_copier(self) -> Copier:
         if self._copier is None:
             from engine.editing.copies.copied import Copier
 
             self._copier = Copier()
-        return self._copier.with_copies(edited, copies, self._copied_clip).gaussians
+        return self._copier
 
     def _copied_clip(self, frame: float) -> CopySource | None:
         from engine.editing.copies.copied import CopySource

@@ -25,6 +25,7 @@ from app.project.opening.opening import open_capture_of
 from app.project.opening.project_access import open_project
 from app.project.project import Project
 from app.scripting.actions import action_called
+from app.scripting.object_copying import ObjectCopying
 from app.session.editing.edit_commands import (
     AddEdit,
     ChangeEdit,
@@ -57,7 +58,7 @@ TellExport = Callable[[ExportProgress], None]
 TellNote = Callable[[str], None]
 
 
-class ScriptedProject:
+class ScriptedProject(ObjectCopying):
     """An open project; made by `app.scripting.open_project`, and closed by `close` or at the end of a `with` block.
 
     Args:

@@ -9,6 +9,7 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
+from app.cli.projects.copy_verbs import add_copy_verbs, run_copy_verb
 from app.cli.projects.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -64,6 +65,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     stack.add_argument("--history", action="store_true", help="list the steps as well")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_copy_verbs(command.add_subparsers(dest="verb", metavar="VERB", title="instead of an edit"))
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
@@ -71,6 +73,11 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
     is_new = not chosen and has_action(options)
     _check_options(options, chosen[0] if chosen else "")
+    if options.verb is not None:
+        if chosen or is_new or options.history:
+            raise ProjectError(f"{options.verb} is given with the options of an edit.", hint="Leave one of them out.")
+        print(run_copy_verb(options, launch))
+        return EXIT_OK
     with open_scripted(options.project, read_only=not (chosen or is_new), launch=launch) as project:
         if is_new:
             _add(options, project)

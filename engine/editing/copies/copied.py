@@ -57,13 +57,19 @@ class Copier:
         Raises:
             ProjectError: A clip is damaged, or an edit.
         """
+        found = self.gaussians(copies, clip_at)
+        if found is None:
+            return edited
+        together = Gaussians.concatenate([edited.gaussians, found])
+        return replace(edited, gaussians=together, rows=with_copied(edited.rows, len(found)))
+
+    @torch.no_grad()
+    def gaussians(self, copies: FrameCopies, clip_at: ClipAt) -> Gaussians | None:
+        """The copies alone, in their order; None where there are none. Arguments and errors as of `with_copies`."""
         found = [self._copy(copy, clip_at) for copy in copies.all]
         parts = [part for part in found if part is not None and len(part)]
         self._whole = None
-        if not parts:
-            return edited
-        gaussians = Gaussians.concatenate([edited.gaussians, *parts])
-        return replace(edited, gaussians=gaussians, rows=with_copied(edited.rows, sum(map(len, parts))))
+        return Gaussians.concatenate(parts) if parts else None
 
     def _copy(self, copy: CopyOfMoment, clip_at: ClipAt) -> Gaussians | None:
         found = self._object(copy.source, clip_at)
