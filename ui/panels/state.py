@@ -21,6 +21,7 @@ from ui.panels.training.curve_view import CurveView
 from ui.panels.ui_requests import UiRequests
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
+from ui.viewport.editing.copy_tool import CopyTool
 from ui.viewport.editing.edit_tool import EditTool
 from ui.viewport.editing.select_tool import SelectTool
 from ui.viewport.excluding.mask_tool import MaskTool
@@ -80,6 +81,7 @@ class UiState:
         regions: The region that is being chosen, and the one that stands out.
         selecting: The tool that selects, and its options.
         editing: Which edit is chosen, and what is being done to it.
+        copies: Which copy of an object is chosen, and what new ones are to be like.
         masks: The brush that paints what training does not see.
         paths: Editing of the camera path's keys.
         navigation: Functions of mouse and keys over a picture.
@@ -106,6 +108,7 @@ class UiState:
     regions: RegionTool = field(default_factory=RegionTool)
     selecting: SelectTool = field(default_factory=SelectTool)
     editing: EditTool = field(default_factory=EditTool)
+    copies: CopyTool = field(default_factory=CopyTool)
     masks: MaskTool = field(default_factory=MaskTool)
     paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)

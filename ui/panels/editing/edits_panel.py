@@ -12,6 +12,7 @@ from app.session.session_view import SessionView
 from engine.editing.actions import Delete
 from engine.editing.edit import Edit
 from engine.text import one_line
+from ui.panels.editing.copies.copies_section import draw_copies
 from ui.panels.editing.details import draw_details
 from ui.panels.editing.making import draw_making
 from ui.panels.editing.world_section import draw_world
@@ -50,6 +51,7 @@ def draw_edits(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.editing.is_new = False
         imgui.pop_id()
     imgui.end_disabled()
+    draw_copies(session, dispatch, ui)
     imgui.separator()
     draw_history(session.history, dispatch, ui, "edits")
     draw_world(session, dispatch, ui)
