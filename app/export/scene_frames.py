@@ -182,10 +182,15 @@ class SceneFrames:
         """A part of the clip that shows a moment, once edited. Raises as `trained` does."""
         return self._load(self.clip_at(frame)).part(part).decode(clip_time, effects, alive_at=alive_at)
 
-    def effects(self, frame: float) -> Effects:
-        """Of the edits that hold at a moment: between two frames those of the frame before, if its clip shows it."""
-        is_of_next = self.clip_at(frame).clip_index != self.clip_at(math.floor(frame)).clip_index
-        return self._edits.at(nearest_frame(frame) if is_of_next else frame)  # objects are others in each clip
+    def effects(self, frame: float, shown_by: int | None = None) -> Effects:
+        """Of the edits that hold at a moment: between two frames those of the frame before.
+
+        Args:
+            shown_by: A frame of the clip that shows the moment; None for the nearest one.
+        """
+        shown = nearest_frame(frame) if shown_by is None else shown_by
+        is_of_next = self.clip_at(shown).clip_index != self.clip_at(math.floor(frame)).clip_index
+        return self._edits.at(frame, shown if is_of_next else None)
 
     def copies(self, frame: float) -> FrameCopies:
         """Copies of objects at a moment."""
@@ -250,7 +255,7 @@ class SceneFrames:
             is_loaded = {at: self.clip_at(at).clip_index in self._loaded for at in known}
             for at in sorted(known, key=lambda at: not is_loaded[at]):  # each clip is loaded once
                 trained, clip_time = self.trained(at), self.clip_time(at)
-                edited = self._edited(at, clip_time, self.effects(at), "all")
+                edited = self._edited(at, clip_time, self.effects(frame, at), "all")
                 yield Share(known[at] / sum(known.values()), trained, clip_time, self._with_copies(edited, frame))
             return
         trained, clip_time = self.trained(frame), self.clip_time(frame)

@@ -103,8 +103,15 @@ class EditStack:
         """Everything of the document that it is made of."""
         return self.edits, self.objects, self.copies, self.paths
 
-    def at(self, frame: float) -> Effects:
-        """The effects that hold at a moment, in frames of the capture; between two frames that of the one before."""
+    def at(self, frame: float, shown_by: int | None = None) -> Effects:
+        """The effects that hold at a moment, in frames of the capture; between two frames that of the one before.
+
+        Args:
+            shown_by: A frame of the clip that shows the moment, where that is not the clip of the frame before: objects
+                are other Gaussians there.
+        """
+        if shown_by is not None:
+            return Effects.of(edits_at(self._edits, frame), shown_by, self.objects)
         place = bisect_right(self._bounds, math.floor(frame))
         if place not in self._effects:
             first = self._bounds[place - 1] if place else 0
