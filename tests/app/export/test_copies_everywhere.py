@@ -1,4 +1,4 @@
-"""A copy of an object is visible in its frames: in the window, in renders and in every export. A small real training."""
+"""A copy of an object is there in its frames: in the window, in renders and in every export. A small real training."""
 
 from __future__ import annotations
 
