@@ -65,7 +65,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     stack.add_argument("--history", action="store_true", help="list the steps as well")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
-    add_copy_verbs(command.add_subparsers(dest="verb", metavar="VERB", title="instead of an edit"))
+    add_copy_verbs(
+        command.add_subparsers(
+            dest="verb", metavar="VERB", title="copies of objects", help="instead of the options above"
+        )
+    )
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:

@@ -16,7 +16,7 @@ LEAST_WIDTH = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class ObjectPlace:
     """Where an object is shown.
 
     Attributes:
@@ -32,7 +32,7 @@ class Place:
 
 def place_of(
     gaussians: GaussianArrays | None, found: SceneObject, frame: float, view: np.ndarray, up: np.ndarray
-) -> Place | None:
+) -> ObjectPlace | None:
     """Where an object stands in a frame; None where it is not shown.
 
     Args:
@@ -51,7 +51,7 @@ def place_of(
     away = _level(view[2], up, otherwise=-view[1])
     axes = np.stack([across, away])
     low, high = np.percentile(means @ axes.T, [EDGE_PERCENT, 100.0 - EDGE_PERCENT], axis=0)
-    return Place(np.median(means, axis=0), axes, np.maximum(high - low, LEAST_WIDTH))
+    return ObjectPlace(np.median(means, axis=0), axes, np.maximum(high - low, LEAST_WIDTH))
 
 
 def _level(direction: np.ndarray, up: np.ndarray, *, otherwise: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from engine.byte_cache import ByteCache
 from engine.editing.actions import FAR, Transform
 from engine.editing.changed_gaussians import transformed
 from engine.editing.copies.copy_moments import CopyOfMoment, FrameCopies, ObjectMoment
+from engine.editing.copies.object_copy import nearest_frame
 from engine.editing.edited_clip import EditedClip, EditedGaussians
 from engine.editing.gaussian_rows import with_copied
 from engine.model.host_array import host_array
@@ -106,12 +107,17 @@ class Copier:
         return known
 
     def _decoded(self, source: CopySource, moment: ObjectMoment) -> tuple[EditedClip, EditedGaussians]:
-        """All of a clip at a moment. The last one is kept: objects are often copied together."""
+        """All of a clip at a moment. The last one is kept: objects are often copied together.
+
+        Between two frames only what exists at the nearer one is decoded: with both, an object is seen twice where its
+        anchors exist for a frame each.
+        """
         key = (source.key, moment.frame, moment.effects.digest)
         if self._whole is None or self._whole[0] != key:
             edited = source.load()
             position = min(max(moment.frame - edited.clip.start, 0.0), edited.clip.n_frames - 1.0)
-            self._whole = key, edited, edited.decode(position / edited.clip.clip_length, moment.effects)
+            clip_time, alive_at = (at / edited.clip.clip_length for at in (position, nearest_frame(position)))
+            self._whole = key, edited, edited.decode(clip_time, moment.effects, alive_at=alive_at)
         return self._whole[1:]
 
 

@@ -34,7 +34,7 @@ from app.session.editing.selection import NOTHING_SELECTED
 from app.training.service import ShownState
 from engine.editing.actions import Hide, Transform
 from engine.editing.changed_gaussians import transformed
-from engine.editing.copies.object_copy import ObjectCopy
+from engine.editing.copies.object_copy import ObjectCopy, nearest_frame
 from engine.editing.edit import Edit, ObjectTarget, PickedRows
 from engine.editing.effects import EditStack
 from engine.editing.gaussian_rows import COPIED, GaussianRows
@@ -91,7 +91,10 @@ def brute(opened: TrainedProject, one: SceneObject, copy: ObjectCopy, frame: int
     moment = copy.source_frame(frame, (0, 6))
     assert moment is not None
     alone = (Edit(1, "", ObjectTarget(1), Hide(), is_inverted=True),)
-    found = SceneFrames(opened, edits=EditStack(alone, (one,))).gaussians(moment)
+    scene, at = SceneFrames(opened, edits=EditStack(alone, (one,))), nearest_frame(moment)
+    found = scene._edited(
+        moment, scene.clip_time(moment), scene.effects(moment), "all", alive_at=scene.clip_time(at)
+    ).gaussians
     everything = torch.ones(len(found), dtype=torch.bool)
     return [tensor.numpy() for tensor in transformed(found, everything, copy.transform).tensors()]
 

@@ -93,7 +93,8 @@ def brute(clips: dict[int, EditedClip], one: SceneObject, edits: EditStack, mome
     source = clip_at(clips)(moment)
     assert source is not None
     clip, at = source.load(), nearest_frame(moment)
-    found = clip.decode((moment - clip.clip.start) / clip.clip.clip_length, edits.at(at))
+    times = [(when - clip.clip.start) / clip.clip.clip_length for when in (moment, at)]
+    found = clip.decode(times[0], edits.at(at), alive_at=times[1])
     names = ("means", "quats", "scales", "opacities", "colors")
     rows = is_of(one, found, at)
     return {name: t.double().numpy()[rows] for name, t in zip(names, found.gaussians.tensors(), strict=True)}

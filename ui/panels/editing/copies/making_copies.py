@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.session.duplicating.copy_commands import DuplicateObject, MakeCrowd
-from app.session.duplicating.placing import Place, place_of
+from app.session.duplicating.placing import ObjectPlace, place_of
 from app.session.session_view import SessionView
 from engine.editing.actions import Transform, Vector
 from engine.editing.copies.object_copy import ObjectCopy, span_of
@@ -53,13 +53,13 @@ def _make(session: SessionView, dispatch: Dispatch, ui: UiState, command: Duplic
     ui.copies.chosen = next((copy.copy_id for copy in session.edits.copies if copy.copy_id not in known), None)
 
 
-def _copy(session: SessionView, found: SceneObject, by: Vector, place: Place | None) -> ObjectCopy:
+def _copy(session: SessionView, found: SceneObject, by: Vector, place: ObjectPlace | None) -> ObjectCopy:
     pivot = (0.0, 0.0, 0.0) if place is None else _vector(place.middle)
     anchor = float(session.timeline.frame_index)
     return ObjectCopy(0, "", found.object_id, Transform(by, pivot=pivot), anchor_frame=anchor)
 
 
-def _place(session: SessionView, found: SceneObject) -> Place | None:
+def _place(session: SessionView, found: SceneObject) -> ObjectPlace | None:
     gaussians, view = session.shown_gaussians(), session.view
     source = None if gaussians is None else gaussians.source.frame_index
     frame = session.timeline.frame_index if source is None else source
