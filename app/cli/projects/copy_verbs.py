@@ -114,8 +114,8 @@ def _add_copy_arguments(command: argparse.ArgumentParser) -> None:
     _add(carried, "--attach-path", metavar="NAME", default="", help="carried by the camera of this path")
     _add(carried, "--attach-object", metavar="NAME", default="", help="carried along by this object")
     _add(command, "--frames", metavar="A:B", help="there from frame A to B, B not included (default: always)")
-    _add(command, "--name", default="", help="a name for the copy")
-    _add(command, "--group", default="", help="a name for copies that belong together")
+    _add(command, "--name", default="", metavar="NAME", help="a name for the copy")
+    _add(command, "--group", default="", metavar="NAME", help="a name for copies that belong together")
 
 
 def _add_duplicate(command: argparse.ArgumentParser) -> None:

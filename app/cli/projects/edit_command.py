@@ -67,7 +67,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="print everything as JSON")
     add_copy_verbs(
         command.add_subparsers(
-            dest="verb", metavar="VERB", title="copies of objects", help="instead of the options above"
+            dest="verb",
+            metavar="VERB",
+            title="copies of objects",
+            help="instead of the options above",
+            prog=f"{command.prog} PROJECT",
         )
     )
 
