@@ -52,11 +52,14 @@ class ClipRows:
     Args:
         model: The clip, or a part of it.
         named: All sets of the clip, of which the part may have some only.
+
+    Attributes:
+        gaussians_per_anchor: K.
     """
 
     def __init__(self, model: ClipModel, named: Mapping[str, NamedSet]) -> None:
         self.sets = tuple(found.row_set for found in named.values())
-        self._k = model.decoder.gaussians_per_anchor
+        self.gaussians_per_anchor = model.decoder.gaussians_per_anchor
         self._anchors: dict[str, np.ndarray] = {}  # number of each row of a set
         self._first: dict[str, int] = {}
         sizes = []
@@ -68,7 +71,7 @@ class ClipRows:
                 is_shown = None if is_hidden is None else ~host_array(is_hidden)
                 size = len(model.anchor_set(role)) if is_shown is None else len(is_shown)
                 self._anchors[role] = np.arange(size) if is_shown is None else np.flatnonzero(is_shown)
-            sizes.append(size * self._k)
+            sizes.append(size * self.gaussians_per_anchor)
         self.n = sum(sizes)
         self.set_of = np.repeat(np.arange(len(sizes), dtype=np.uint8), sizes)
         self.number_of = np.concatenate([np.zeros(0, np.int32), *(np.arange(size, dtype=np.int32) for size in sizes)])
@@ -77,8 +80,8 @@ class ClipRows:
 
     def indices(self, role: str, rows: np.ndarray) -> np.ndarray:
         """Of the Gaussians of some rows of a set, K per row. [n K] int64"""
-        first = self._first[role] + self._anchors[role][rows].astype(np.int64) * self._k
-        return (first[:, None] + np.arange(self._k)).reshape(-1)
+        first = self._first[role] + self._anchors[role][rows].astype(np.int64) * self.gaussians_per_anchor
+        return (first[:, None] + np.arange(self.gaussians_per_anchor)).reshape(-1)
 
     def named(self, indices: np.ndarray) -> GaussianRows:
         """Where Gaussians of these indices come from."""
@@ -97,7 +100,7 @@ class ClipRows:
         place = next(place for place, row_set in enumerate(self.sets) if row_set.role == role)
         size = int(self._anchors[role].max(initial=-1)) + 1
         is_there = np.zeros(size, bool)
-        is_there[rows.number[rows.set_index == place] // self._k] = True
+        is_there[rows.number[rows.set_index == place] // self.gaussians_per_anchor] = True
         return is_there[self._anchors[role]]
 
     def is_lost(self, target: Picked) -> bool:

@@ -1,0 +1,1 @@
+"""Objects: people and things found again in every clip."""
