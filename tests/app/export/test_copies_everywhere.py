@@ -24,7 +24,7 @@ from app.export.player_job import run as export_player
 from app.export.scene_frames import SceneFrames
 from app.export.video.render import render_video
 from app.playback.frame_decoder import ShownFrame
-from app.playback.modes.view_modes import ShownAs
+from app.playback.modes.view_modes import PLAIN, ShownAs
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.project.opening.opened_project import opened_project
@@ -181,15 +181,15 @@ def playback(opened: TrainedProject, states: list[ShownState]) -> Iterator[Playb
     found.close()
 
 
-def shown(playback: Playback, timeline: Timeline, frame: int, shown_as: ShownAs | None = None) -> ShownFrame:
+def shown(playback: Playback, timeline: Timeline, frame: int, shown_as: ShownAs = PLAIN) -> ShownFrame:
     timeline.seek(frame)
-    clip, options = timeline.clip_of(frame), {} if shown_as is None else {"shown_as": shown_as}
+    clip = timeline.clip_of(frame)
     assert clip is not None
     until_s = time.monotonic() + WAIT_S
     while time.monotonic() < until_s:
-        wanted = playback.request(clip, frame, **options)
+        wanted = playback.request(clip, frame, shown_as)
         assert wanted is not None
-        playback.frame(timeline, **options)
+        playback.frame(timeline, shown_as)
         found = playback.decoder.known(wanted.key)
         if found is not None:
             return found
