@@ -4,6 +4,7 @@ is trained, captured pictures, and pictures drawn on the processor.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -322,7 +323,8 @@ class Playback:
         opened = self._opened
         if opened is None or not copies:
             return ()
-        wanted = [clip for clip in opened.clips if any(clip.start <= frame < clip.stop for frame in copies.frames)]
+        places = {bisect_right(opened.clips, frame, key=lambda clip: clip.start) - 1 for frame in copies.frames}
+        wanted = (opened.clips[place] for place in sorted(places) if place >= 0)
         found = ((clip, self._state_of(clip.clip_index)) for clip in wanted)
         return tuple(self._bare(opened, clip, state) for clip, state in found if state is not None)
 

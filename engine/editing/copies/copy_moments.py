@@ -67,10 +67,12 @@ class FrameCopies:
     Attributes:
         all: In the order of the document.
         digest: The same for equal ones; empty where there are none.
+        frames: Frames whose clips are needed, each once.
     """
 
     all: tuple[CopyOfMoment, ...] = ()
     digest: str = ""
+    frames: tuple[int, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.all)
@@ -80,12 +82,6 @@ class FrameCopies:
 
     def __hash__(self) -> int:
         return hash(self.digest)
-
-    @property
-    def frames(self) -> tuple[int, ...]:
-        """Frames whose clips are needed, each once."""
-        moments = (one for copy in self.all for one in (copy.source, *(copy.follows or ())))
-        return tuple(dict.fromkeys(nearest_frame(one.frame) for one in moments))
 
 
 NOTHING_COPIED = FrameCopies()
@@ -169,7 +165,9 @@ def _made(copies: tuple[CopyOfMoment, ...]) -> FrameCopies:
         digest.update(copy.source.digest.encode())
         digest.update(_ENCODER.encode(copy.moves))
         digest.update(repr(None if copy.follows is None else [one.digest for one in copy.follows]).encode())
-    return FrameCopies(copies, digest.hexdigest()[:20])
+    moments = (one for copy in copies for one in (copy.source, *(copy.follows or ())))
+    frames = dict.fromkeys(nearest_frame(one.frame) for one in moments)
+    return FrameCopies(copies, digest.hexdigest()[:20], tuple(frames))
 
 
 _ENCODER = msgspec.msgpack.Encoder()
