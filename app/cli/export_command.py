@@ -10,7 +10,7 @@ from app.cli.arguments import EXIT_OK, path_argument
 from app.cli.job_arguments import add_job_arguments, check_given, chosen_frames, given_entries
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.evaluation.headless import open_trained
-from app.export.edits_line import edits_line
+from app.export.edits_line import included_lines
 from app.export.export_progress import ExportProgress, ExportResult
 from app.export.jobs.job import ExportJob
 from app.export.jobs.table import KINDS, formats_of, named_job
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     opened = open_trained(open_project(options.project, is_writable=False))
     job = job_of(options, opened)
     line = ProgressLine(is_quiet=options.quiet)
-    if said := edits_line(opened.project.document, has_edits=job.applies_edits):
+    for said in included_lines(opened, job):
         line.say(said)
     work = job.load()
     said_before = work.estimate(opened, job).lines

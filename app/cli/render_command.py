@@ -8,7 +8,7 @@ from app.cli.arguments import EXIT_OK, parse_range, path_argument
 from app.cli.job_arguments import add_job_arguments, given_entries
 from app.cli.terminal.progress import ProgressLine
 from app.evaluation.headless import TrainedProject, open_trained
-from app.export.edits_line import edits_line
+from app.export.edits_line import included_lines
 from app.export.jobs.video import VideoJob
 from app.export.video.formats import FORMATS, format_of
 from app.project.opening.project_access import open_project
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     opened = open_trained(open_project(options.project, is_writable=False))
     job = job_of(options, opened)
     line = ProgressLine(is_quiet=options.quiet)
-    if said := edits_line(opened.project.document, has_edits=job.has_edits):
+    for said in included_lines(opened, job):
         line.say(said)
     written = render_video(job, opened, lambda progress: line.update(progress.stage, progress.done, progress.message))
     for note in written.notes:

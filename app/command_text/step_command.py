@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from msgspec import structs, to_builtins
 
 from app.command_text.command_text import CommandText
 from app.command_text.quoting import can_be_argument, number, option
+from app.command_text.time_edit_between import time_edit_between
 from app.document.changes import edit_changes
 from app.document.project_document import ProjectDocument
 from app.document.storing.stored_document import plain_document
@@ -26,14 +28,18 @@ from engine.editing.edit import (
     Sphere,
     Target,
 )
+from engine.setting import settings_of
 from engine.storage.json_files import json_text
 
 
-def step_command(folder: Path, before: ProjectDocument, after: ProjectDocument) -> CommandText | None:
+def step_command(
+    folder: Path, before: ProjectDocument, after: ProjectDocument, n_frames: int | None = None
+) -> CommandText | None:
     """The command that turns a document into another one; None where they are the same.
 
     Args:
         folder: Of the project.
+        n_frames: Of the capture; None where that is not known.
     """
     if before == after:
         return None
@@ -42,6 +48,8 @@ def step_command(folder: Path, before: ProjectDocument, after: ProjectDocument) 
         getattr(before, name) == getattr(after, name) for name in before.__dataclass_fields__ if name != "edits"
     )
     found = _of_edits(folder, before, after) if is_only_edits else None
+    if n_frames is not None and replace(before, timing=after.timing) == after:
+        found = _of_time(folder, before, after, n_frames)
     return found if found is not None and _fits(found) else _put(folder, before, after)
 
 
@@ -67,6 +75,25 @@ def edit_command(folder: Path, edit: Edit) -> CommandText:
         _names(values),
         stdin,
     )
+
+
+def _of_time(folder: Path, before: ProjectDocument, after: ProjectDocument, n_frames: int) -> CommandText | None:
+    """The command for a single change of time; None where it takes more than one."""
+    edit = time_edit_between(before.timing, after.timing, n_frames)
+    if edit is None:
+        return None
+    values = {
+        name: (one, value)
+        for name, one in settings_of(type(edit)).items()
+        if (value := getattr(edit, name)) != one.default
+    }
+    words = [
+        word
+        for name, (one, value) in values.items()
+        for word in ((() if name == "places" else (one.flags[0].name,)) + (one.text(value),))
+    ]
+    said = "".join(f", {name}={value!r}" for name, (_, value) in values.items())
+    return CommandText(("edit", str(folder), edit.verb, *words), f"project.time_edit({edit.verb!r}{said})", folder)
 
 
 def _of_edits(folder: Path, before: ProjectDocument, after: ProjectDocument) -> CommandText | None:

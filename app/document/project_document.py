@@ -17,6 +17,7 @@ from engine.editing.edit import Edit
 from engine.editing.effects import EditStack
 from engine.editing.scene_object import NO_OBJECTS, Objects
 from engine.gate.regions import GateRegion
+from engine.timing.segment import Segment
 
 MAX_TEXT_CHARACTERS = 200
 _Count = Annotated[int, Meta(ge=0, lt=2**31)]
@@ -81,6 +82,7 @@ class ProjectDocument:
         labels: The user's own names.
         exclusions: Cameras, pictures and painted parts that training never sees.
         world: Up and scale.
+        timing: Segments of the take in the order in which they play; none for the take as captured.
         objects: People and things that were given a name, in the user's order.
         copies: Objects that are shown once more, in the user's order.
     """
@@ -93,6 +95,7 @@ class ProjectDocument:
     labels: tuple[Label, ...] = ()
     exclusions: Exclusions = NOTHING_EXCLUDED
     world: World = AS_CAPTURED
+    timing: tuple[Segment, ...] = ()
     objects: Objects = NO_OBJECTS
     copies: Copies = NO_COPIES
 

@@ -69,6 +69,7 @@ class ExportContext(msgspec.Struct, frozen=True):
         cameras: Names.
         paths: Names of the project's camera paths.
         has_edits: Whether the project has edits that are on.
+        has_timing: Whether the take is edited in time.
         has_videos: Whether some camera has a video, which may have sound.
         picture_size: Width and height of a capture camera's picture.
         fps: Frames per second.
@@ -87,6 +88,7 @@ class ExportContext(msgspec.Struct, frozen=True):
     paths: tuple[str, ...] = ()
     has_videos: bool = False
     has_edits: bool = False
+    has_timing: bool = False
 
     def frames(self, choice: FramesChoice, step: int) -> PickedFrames:
         """The frames of a choice; none where there are none. Those of "all" are trained and may have gaps."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.export.edits_line import edits_line
+from app.export.edits_line import included_lines
 from app.export.export_choices import ExportChoices, ExportContext
 from app.export.jobs.answers import Answers
 from app.export.staging import check_target
@@ -69,8 +69,7 @@ def plan_export(
             job = answers.make_job()
             found = job.load().estimate(opened, job)
             n_files, n_bytes, lines = found.n_files, found.n_bytes, found.lines
-            if said := edits_line(opened.project.document, has_edits=job.applies_edits):
-                lines = (said, *lines)
+            lines = (*included_lines(opened, job), *lines)
             _check_place(answers, opened, n_bytes)
             _check_name(answers)
             if any(overlap(answers.out.resolve(), other.resolve()) for other in taken):

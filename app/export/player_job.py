@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -14,6 +15,7 @@ from app.export.jobs.player import PlayerJob
 from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_file, staged_folder
+from app.export.take import TakeFrame, take_frames, timing_of
 from engine.capture.clip import Clip
 from engine.editing.effects import EditStack
 from engine.errors import ProjectError
@@ -44,11 +46,11 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
         raise ProjectError("A player is an HTML page.", hint="Give a name that ends in .html.", path=job.out)
     check_target(job.out, opened=opened)
     scene = _scene(opened, job)
-    clips = _clips(scene, job)
+    clips, played = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
     n_bytes = _expected_bytes(scene, clips)
     has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
-    lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames} frames."]
+    lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames if played is None else len(played)} frames."]
     if has_folder:
         lines.append(f"The clips go into the folder {job.folder.name}, which must stay next to the page.")
         _check_folder(job.folder)
@@ -68,10 +70,11 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     expected = estimate(opened, job)
     has_folder = expected.n_files > 1
     scene = _scene(opened, job)
-    clips = _clips(scene, job)
-    scene.check(wanted[0] for _, wanted in clips)
+    clips, played = _clips(scene, job)
+    scene.check(moment.frame for _, wanted in clips for one in wanted for moment in one.moments)
     n_frames = sum(len(wanted) for _, wanted in clips)
-    header: dict[str, Any] = scene_header(scene, clips[0][1][0], step=job.frames.step if job.frames else 1)
+    header: dict[str, Any] = scene_header(scene, clips[0][1][0].frame, step=job.frames.step if job.frames else 1)
+    header["take"] = played
     header["folder"] = _relative_url(job.folder.name) if has_folder else None
     packer, n_done, n_bytes = Packer(), 0, 0
     with ExitStack() as stack:
@@ -84,7 +87,8 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
                 )
                 n_before = sum(place["clip_index"] == clip.clip_index for place in header["clips"])
                 name = f"clip{clip.clip_index:05d}" + (f"-{n_before + 1}" if n_before else "")
-                place = {"clip_index": clip.clip_index, "name": name, "first": n_done, "frame_index": wanted[0]}
+                place: dict[str, Any] = {"clip_index": clip.clip_index, "name": name, "first": n_done}
+                place["frame_index"] = math.floor(wanted[0].frame)
                 header["clips"].append(place)
                 place.update(block.description)
                 writer.block(name, block)
@@ -98,7 +102,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     return ExportResult(job.out, len(header["clips"]) + 2 if has_folder else 1, n_bytes)
 
 
-def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[int]]]) -> int:
+def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[TakeFrame]]]) -> int:
     """Of page and blocks together, from the headers of the clips."""
     n_packed = 0.0
     for number, (clip, wanted) in enumerate(clips):
@@ -107,7 +111,7 @@ def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[int]]])
         if number == 0:
             n_packed += _SHARED_ROW_BYTES * n_still
     n_bytes = round(n_packed * 4 / 3)  # as base64
-    return n_bytes + page_bytes(scene_header(scene, clips[0][1][0], step=1)) + _DESCRIBED_BYTES * len(clips)
+    return n_bytes + page_bytes(scene_header(scene, clips[0][1][0].frame, step=1)) + _DESCRIBED_BYTES * len(clips)
 
 
 def _check_folder(folder: Path) -> None:
@@ -150,27 +154,34 @@ def _scene(opened: TrainedProject, job: PlayerJob) -> SceneFrames:
     return SceneFrames(opened, edits=None if job.has_edits else EditStack())
 
 
-def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
-    """Clips with the frames of each that are wanted; one comes several times where different edits hold in it, so that
-    still parts are still in each stretch. Raises ProjectError where one is not trained."""
-    frames = scene.trained_frames if job.frames is None else job.frames
-    scene.check_trained(frames)
-    clips: list[tuple[Clip, list[int]]] = []
-    for frame in frames:
-        clip = scene.clip_at(frame)
-        if not clips or clips[-1][0] != clip or scene.effects(clips[-1][1][-1]) != scene.effects(frame):
+def _clips(scene: SceneFrames, job: PlayerJob) -> tuple[list[tuple[Clip, list[TakeFrame]]], list[int] | None]:
+    """Clips with the frames of each that are wanted, and of a take which of all these each of its frames is; None as
+    captured. A clip comes several times where different edits hold in it, so that still parts are still in each
+    stretch. What a take plays several times is there once. Raises ProjectError where one is not trained."""
+    frames = take_frames(scene, job.frames, has_timing=job.has_timing)
+    played: list[int] | None = None
+    if timing_of(scene, has_timing=job.has_timing) is not None:
+        taken = frames
+        once = {one.moments: one for one in reversed(taken)}
+        frames = sorted(once.values(), key=lambda one: (scene.clip_at(one.frame).clip_index, one.frame, one.number))
+        places = {one.moments: place for place, one in enumerate(frames)}
+        played = [places[one.moments] for one in taken]
+    clips: list[tuple[Clip, list[TakeFrame]]] = []
+    for one in frames:
+        clip = scene.clip_at(one.frame)
+        if not clips or clips[-1][0] != clip or scene.effects(clips[-1][1][-1].frame) != scene.effects(one.frame):
             clips.append((clip, []))
-        clips[-1][1].append(frame)
-    return clips
+        clips[-1][1].append(one)
+    return clips, played
 
 
 def _packed(
-    packer: Packer, scene: SceneFrames, wanted: list[int], told: Callable[[int], None] = lambda n_done: None
+    packer: Packer, scene: SceneFrames, wanted: list[TakeFrame], told: Callable[[int], None] = lambda n_done: None
 ) -> Block:
     """A clip's block. told: Called before each frame is made, with the number of frames made."""
 
     def moving(frame: int) -> Splats:
         told(frame)
-        return Splats.of(scene.gaussians(wanted[frame], "moving"))
+        return Splats.of(scene.at_moments(wanted[frame].moments, "moving"))
 
-    return packer.clip(len(wanted), lambda frame: Splats.of(scene.gaussians(wanted[frame], "static")), moving)
+    return packer.clip(len(wanted), lambda frame: Splats.of(scene.gaussians(wanted[frame].frame, "static")), moving)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from engine.camera.rig import CameraRig
 
 
-def scene_header(scene: SceneFrames, frame: int, *, step: int) -> dict[str, Any]:
+def scene_header(scene: SceneFrames, frame: float, *, step: int) -> dict[str, Any]:
     """The page's header without its blocks; see docs/player_format.md. The list of clips is empty.
 
     Args:
@@ -43,6 +43,7 @@ def scene_header(scene: SceneFrames, frame: int, *, step: int) -> dict[str, Any]
             "aspect": width / height,
         },
         "cameras": [_camera(rig, index, view.distance) for index in range(len(rig))],
+        "take": None,
         "clips": [],
     }
 

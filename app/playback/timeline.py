@@ -6,7 +6,9 @@ import math
 from collections.abc import Sequence
 
 from app.playback.markers import Markers
+from app.playback.take_route import TakeRoute
 from engine.capture.clip import Clip, ClipSpans
+from engine.timing.timing import TakeTiming
 
 SPEEDS = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Speeds at which a capture can be played, as multiples of its own speed."""
@@ -32,6 +34,8 @@ class Timeline:
         in_frame, out_frame: Where playing begins and ends; None where the capture does. in_frame <= out_frame.
         around: Frames that are played over and over for the moment, regardless of in_frame and out_frame; else None.
         is_following: Whether the playhead follows the training. Ends when the user moves it.
+        timing: Of the take; None where it plays as captured.
+        is_take: Whether playing follows the timing, so that the playhead goes where the take goes.
         markers: Frames that the user wants to find again; put here by who owns the document.
     """
 
@@ -51,12 +55,16 @@ class Timeline:
         self.out_frame: int | None = None
         self.around: tuple[int, int] | None = None
         self.is_following = False
+        self.timing: TakeTiming | None = None
+        self.is_take = False
+        self._route: TakeRoute | None = None
+        self._route_key: object = None
         self.markers = Markers()
         self._carried = 0.0  # frames that are due and not yet gone: less than one, but for rounding not below zero
 
     def take_over(self, other: Timeline) -> None:
         """Continue where another timeline of the same frames is, as when they are cut into other clips."""
-        for name in ("is_looping", "is_every_frame", "speed", "markers"):
+        for name in ("is_looping", "is_every_frame", "speed", "markers", "timing", "is_take"):
             setattr(self, name, getattr(other, name))
         self.set_range(other.in_frame, other.out_frame)
         self.seek(other.frame_index)
@@ -122,6 +130,21 @@ class Timeline:
     def clear_range(self) -> None:
         """Play all of the capture."""
         self.set_range(None, None)
+
+    @property
+    def route(self) -> TakeRoute | None:
+        """Where the take goes from the playhead on; None where the capture is played, or nothing of the take is between
+        the in and out points."""
+        if not self.is_take or self.timing is None or self.around is not None:
+            return None
+        key = (self.timing, *self.play_range)
+        if self._route is None or self._route_key != key:
+            self._route, self._route_key = TakeRoute(self.timing, *self.play_range, self.frame_index), key
+        if not len(self._route):
+            return None
+        if self._route.frame_index != self.frame_index:
+            self._route.seek(self.frame_index)
+        return self._route
 
     @property
     def nearest_seam(self) -> int | None:
@@ -197,6 +220,12 @@ class Timeline:
         self._carried = 0.0
         first, last = self.play_range
         start, end = (first, last) if direction > 0 else (last, first)
+        route = self.route
+        if self.is_playing and route is not None:
+            if route.at == (len(route) - 1 if direction > 0 else 0) and not self.is_looping:
+                route.at = 0 if direction > 0 else len(route) - 1
+            self.frame_index = route.frame_index
+            return
         is_at_end = self.frame_index == end and not self.is_looping and self.around is None
         if self.is_playing and (is_at_end or not first <= self.frame_index <= last):
             self.frame_index = start
@@ -222,7 +251,12 @@ class Timeline:
             return False
         self._carried -= n_frames
         before = self.frame_index
-        self._advance(n_frames * self.direction)
+        route = self.route
+        if route is None:
+            self._advance(n_frames * self.direction)
+        else:
+            self.is_playing = not route.go(n_frames * self.direction, is_looping=self.is_looping)
+            self.frame_index = route.frame_index
         return self.frame_index != before
 
     def _advance(self, n_frames: int) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.reach_words import check_acts, reach_note
+from app.document.changes.timing_changes import segments_of, time_edit_called, timing_changed
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
 from app.document.project_document import ProjectDocument
 from app.document.storing.stored_document import document_of, plain_document
@@ -47,6 +48,7 @@ from engine.editing.reach import ClipAnchors, Reach, reach_of_edit
 from engine.errors import EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
 from engine.storage.typed_json import EntryError
+from engine.timing.segment import Segment
 
 if TYPE_CHECKING:
     from app.evaluation.headless import ClipOutcome, TrainedProject
@@ -300,6 +302,28 @@ class ScriptedProject(ObjectCopying):
         """Carry out a command as the window does."""
         change = changed(self.document, command)
         self.change(change.document, change.name)
+
+    # ---------------------------------------------------------------- time
+
+    def time_edit(self, verb: str, **entries: Any) -> None:
+        """Change which frames the take plays, when and how fast; videos, pictures, players and exports follow.
+
+        Args:
+            verb: One of app.document.changes.timing_changes.TIME_EDITS: "trim", "split", "speed", "reverse", "freeze",
+                "loop", "order" or "reset-time".
+            entries: Of that, such as frames=(20, 40), by=0.5.
+        Raises:
+            ProjectError: There is no such verb or entry, it is not possible, or what `change` raises.
+        """
+        edit = time_edit_called(verb, entries)
+        self.change(timing_changed(self.document, edit, self.n_frames), edit.title)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """What the take plays, in order; one segment where it is as captured. Raises what `capture` raises."""
+        return segments_of(self.document, self.n_frames)
+
+    # ---------------------------------------------------------------- selecting
 
     def select(
         self,

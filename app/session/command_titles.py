@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
+from app.document.changes.timing_changes import TIME_EDITS, ChangeSegment
 from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep, Redo, Undo
@@ -58,6 +59,7 @@ TITLES: dict[type, str] = {
     Redo: "The step cannot be redone",
     GoToStep: "That step of the history cannot be reached",
     **dict.fromkeys(get_args(EditCommand), "The edit cannot be made"),
+    **dict.fromkeys((*TIME_EDITS.values(), ChangeSegment), "The take cannot be changed"),
     **dict.fromkeys(get_args(PathCommand), "The camera path cannot be changed"),
     AskStartOver: "Training cannot start over",
     StartOver: "Training cannot start over",

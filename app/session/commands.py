@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.document.changes.timing_changes import TimeEdit
 from app.session.captures.capture_commands import CalibrationCommand, DoctorCommand, SynchronisationCommand
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, HistoryCommand
@@ -55,6 +56,7 @@ Command = (
     | LookCommand
     | SelectionCommand
     | EditCommand
+    | TimeEdit
     | MarkCommand
     | PathCommand
     | HistoryCommand

@@ -12,6 +12,7 @@ from engine.editing.edit import Edit
 from engine.editing.lost_picks import LostPicks
 from engine.editing.reach import UNKNOWN, ClipAnchors, Reach
 from engine.editing.scene_object import NO_OBJECTS, Objects, SceneObject
+from engine.timing.segment import Segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,7 @@ class EditsStatus:
         edits: The stack, bottom first.
         labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
         world: Up and scale.
+        timing: Segments of the take; none for the take as captured.
         objects: Those that have a name, in the user's order.
         copies: Objects that are shown once more, in the user's order.
         lost: Those that have lost their picks because a clip was trained anew.
@@ -50,6 +52,7 @@ class EditsStatus:
     edits: tuple[Edit, ...] = ()
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     world: World = AS_CAPTURED
+    timing: tuple[Segment, ...] = ()
     objects: Objects = NO_OBJECTS
     copies: Copies = NO_COPIES
     lost: tuple[LostPicks, ...] = ()

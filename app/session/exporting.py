@@ -338,6 +338,7 @@ def _context(
         picture_size=capture.picture_size,
         fps=capture.fps,
         paths=paths,
+        has_timing=bool(opened.project.document.timing),
         has_edits=any(edit.is_on for edit in opened.project.document.edits),
         has_videos=any(isinstance(entry.source, VideoFrames) for entry in capture.layout.cameras),
     )

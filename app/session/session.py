@@ -13,6 +13,7 @@ from pathlib import Path
 from app.background.jobs import Jobs
 from app.background.log_reader import LogView
 from app.background.usage import UsageMeter
+from app.document.changes.timing_changes import TimeEdit
 from app.project.opening.opening import Opened, open_for_window
 from app.session.captures.calibrating import Calibrating
 from app.session.captures.capture_commands import (
@@ -61,6 +62,7 @@ from app.session.questions import Asked
 from app.session.session_face import SessionFace
 from app.session.showing.look_commands import LookCommand
 from app.session.showing.showing import Showing
+from app.session.timing.time_edits import apply_time_edit
 from app.session.training.clip_versions import Versions
 from app.session.training.live_training import LiveTraining
 from app.session.training.train_commands import HoldCommand, TrainCommand
@@ -167,7 +169,9 @@ class Session(SessionFace):
         self.marking = Marking(self.document)
         lost, reaches = LostEdits(lambda: live.service), EditReaches(lambda: live.service)
         self.editing = Edits(self.document, self.selecting, lost, reaches)
-        self.command_texts = CommandTexts(lambda: self.project, live.is_finished)
+        self.command_texts = CommandTexts(
+            lambda: self.project, live.is_finished, lambda: None if self.capture is None else self.capture.n_frames
+        )
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
         self.edits: EditsStatus = self.editing.status()
@@ -223,6 +227,8 @@ class Session(SessionFace):
                 self.marking.apply(command)
             case _ if isinstance(command, PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
+            case _ if isinstance(command, TimeEdit):
+                apply_time_edit(command, self.document, 0 if self.capture is None else self.capture.n_frames)
             case _ if isinstance(command, ExclusionCommand):
                 n_frames = 0 if self.capture is None else self.capture.n_frames
                 apply_exclusion(command, self.document, self.rig.names, n_frames)

@@ -9,15 +9,15 @@ class Player {
   constructor(header, shaders, workerSource) {
     this.header = header;
     this.canvas = document.getElementById("picture");
-    const nFrames = header.clips.reduce((total, clip) => total + clip.moving.n.length, 0);
+    const nFrames = header.take ? header.take.length : header.clips.reduce((n, clip) => n + clip.moving.n.length, 0);
     const most = (numbers) => Math.max(0, ...numbers);
     const nStill = header.shared.n + most(header.clips.map((clip) => (clip.own ? clip.own.n : 0)));
     const nMoving = most(header.clips.flatMap((clip) => clip.moving.n));
     this.view = new View(header);
     this.clock = new Clock(nFrames, header.fps / header.step);
     this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
-    this.timeline = new Timeline(header, nFrames, (frame) => this.go(frame));
-    this.shown = null; // frame that the renderer holds
+    this.timeline = new Timeline(header, nFrames, (frame) => this.stored(frame), (frame) => this.go(frame));
+    this.shown = null; // frame that the renderer holds, of the take where there is one
     this.onScreen = null; // frame of the picture on the screen
     this.isLost = this.isDrawn = false;
     this.share = 1; // of the screen's pixels, along a side
@@ -80,7 +80,9 @@ class Player {
 
   tick(nowMs) {
     this.scheduled = 0;
-    this.clock.tell(nowMs, this.pictures.isWaitingFor(this.clock.frame));
+    this.clock.tell(nowMs, this.pictures.isWaitingFor(this.stored(this.clock.frame)));
+    for (const name of ["shown", "onScreen"]) // the same picture may come several times
+      if (this[name] !== null && this.stored(this[name]) === this.stored(this.clock.frame)) this[name] = this.clock.frame;
     const isReady = this.renderer.isDone();
     if (isReady) {
       const isMoving = this.clock.isPlaying || performance.now() - this.movedMs < REST_MS;
@@ -88,7 +90,7 @@ class Player {
       this.fit();
     }
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
-    this.pictures.want(this.clock.frame, lens.worldToCamera.slice(8, 12));
+    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12));
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
@@ -104,14 +106,21 @@ class Player {
   take(answer) {
     if (this.isLost) return;
     this.renderer.take(answer);
-    this.shown = answer.frame;
+    const { take } = this.header, now = this.clock.frame;
+    this.shown = take ? (take[now] === answer.frame ? now : take.indexOf(answer.frame)) : answer.frame;
     this.changed();
+  }
+
+  /** The stored frame that one of the take shows. */
+  stored(frame) {
+    return this.header.take ? this.header.take[frame] : frame;
   }
 
   /** Words and marks about what is on the screen. */
   tell() {
     const { onScreen: shown, header, clock } = this;
     const number = (frame) => {
+      if (header.take) return frame * header.step;
       const clip = header.clips[this.pictures.clipOf(frame)];
       return clip.frame_index + (frame - clip.first) * header.step;
     };
@@ -133,7 +142,7 @@ class Player {
   }
 
   goToClip(steps) {
-    const starts = this.header.clips.map((clip) => clip.first), now = this.clock.frame;
+    const starts = this.timeline.starts, now = this.clock.frame;
     const target = steps > 0 ? starts.find((start) => start > now) : starts.filter((start) => start < now).pop();
     if (target !== undefined) this.go(target);
   }

@@ -1,22 +1,28 @@
 // The scrub bar: clips as bands, the frame that is shown, and the frame that is wanted where that is another one.
 
 class Timeline {
-  /** onFrame(frame): the user wants this one. */
-  constructor(header, nFrames, onFrame) {
+  /** stored(frame): the stored frame that is shown then; onFrame(frame): the user wants this one. */
+  constructor(header, nFrames, stored, onFrame) {
     this.bar = document.getElementById("scrub");
     this.nFrames = nFrames;
     this.bar.setAttribute("aria-valuemax", nFrames - 1);
     const bands = document.getElementById("bands");
-    let band = null, first = null;
-    for (const clip of header.clips) {
-      if (first === null || first.clip_index !== clip.clip_index) {
+    this.starts = []; // frames at which a clip begins
+    const clipAt = (frame) => header.clips.findIndex((clip) => stored(frame) < clip.first + clip.moving.n.length);
+    let band = null, first = 0, before = null, place = -1;
+    for (let frame = 0; frame < nFrames; frame++) {
+      const at = clipAt(frame), clip = header.clips[at];
+      if (at !== place) this.starts.push(frame);
+      if (before !== clip.clip_index) {
         band = document.createElement("div");
-        band.style.left = `${(100 * clip.first) / nFrames}%`;
+        band.style.left = `${(100 * frame) / nFrames}%`;
         band.textContent = `Clip ${clip.clip_index}`;
         bands.append(band);
-        first = clip;
+        first = frame;
       }
-      band.style.width = `${(100 * (clip.first + clip.moving.n.length - first.first)) / nFrames}%`;
+      band.style.width = `${(100 * (frame + 1 - first)) / nFrames}%`;
+      before = clip.clip_index;
+      place = at;
     }
     const pick = (event) => {
       const box = this.bar.getBoundingClientRect();

@@ -13,16 +13,11 @@ from ui import main as window
 def command_sections() -> str:
     """The window, the demo, then every command without a window: how it is called, what it does, its options."""
     parser = build_parser(used=COMMANDS)
+    subparsers = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction)).choices
     parsers = [window.build_parser(), window.build_demo_parser()]
-    for subparser in _subparsers(parser):
-        parsers += [subparser, *_subparsers(subparser)]
+    for subparser in subparsers.values():
+        parsers += [subparser, *subparser.verbs.values()]
     return "\n\n".join(map(_section, parsers))
-
-
-def _subparsers(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
-    """Those of the words that it knows, in their order."""
-    found = next((a for a in parser._actions if isinstance(a, argparse._SubParsersAction)), None)
-    return [] if found is None else list(found.choices.values())
 
 
 def _section(parser: argparse.ArgumentParser) -> str:

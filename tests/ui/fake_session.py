@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from app.background.log_reader import LogLine
+from app.document.changes.timing_changes import TimeEdit, timing_changed
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.export.export_choices import ExportChoices
@@ -94,6 +95,7 @@ from engine.doctor.finding import Finding
 from engine.editing.selection.ranges import ValueSpread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
 from engine.gate.regions import GateRegion, sphere_region
+from engine.timing.timing import TakeTiming
 
 
 def make_rig(n_cameras: int = 8, width: int = 320, height: int = 240) -> CameraRig:
@@ -429,6 +431,12 @@ class FakeSession:
                 result = edited(self.paths, command, self.view, self.timeline)
                 self.paths = PathsStatus(result.paths, result.chosen, result.chosen_key, can_edit=True)
                 self.history = HistoryStatus(undo=result.name)
+            case _ if isinstance(command, TimeEdit):
+                self.content = timing_changed(self.content, command, self.timeline.n_frames)
+                self.edits = edits_status(self.content)
+                self.history = HistoryStatus(undo=command.title, past=(*self.history.past, command.title))
+                segments = self.content.timing
+                self.timeline.timing = TakeTiming(segments, self.timeline.n_frames) if segments else None
             case _ if isinstance(command, EditCommand):
                 change = changed(self.content, command)
                 self.content, self.edits = change.document, edits_status(change.document)

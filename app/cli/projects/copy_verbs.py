@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from msgspec import to_builtins
 
-from app.cli.arguments import add_backend, parse_range
+from app.cli.arguments import PlainParser, add_backend, parse_range
 from app.scripting.scripted_project import ScriptedProject, open_scripted
 from app.training.service import Launch
 from engine.editing.actions import Quat, Transform
@@ -39,13 +39,15 @@ class CopyVerb:
     changes: Callable[[argparse.Namespace], bool] = lambda options: True
 
 
-def add_copy_verbs(verbs: argparse._SubParsersAction[Any]) -> None:
-    """Declare the words."""
+def add_copy_verbs(command: argparse.ArgumentParser) -> None:
+    """Declare the words. command: `clipgstream edit`."""
+    assert isinstance(command, PlainParser)
     for name, verb in COPY_VERBS.items():
-        command = verbs.add_parser(name, help=verb.help, description=f"{verb.help[0].upper()}{verb.help[1:]}.")
-        verb.add_arguments(command)
-        command.add_argument("--json", action="store_true", help="print all copies as JSON")
-        add_backend(command)
+        description = f"{verb.help[0].upper()}{verb.help[1:]}."
+        own = command.verbs[name] = PlainParser(prog=f"{command.prog} PROJECT {name}", description=description)
+        verb.add_arguments(own)
+        own.add_argument("--json", action="store_true", help="print all copies as JSON")
+        add_backend(own)
 
 
 def run_copy_verb(options: argparse.Namespace, launch: Launch) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
-from app.cli.projects.copy_verbs import add_copy_verbs, run_copy_verb
+from app.cli.projects.copy_verbs import COPY_VERBS, add_copy_verbs, run_copy_verb
 from app.cli.projects.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -19,9 +19,11 @@ from app.cli.projects.edit_arguments import (
     has_scope,
     has_target,
 )
+from app.cli.projects.edit_timing import add_time_arguments, change_time, given_time_options, take_lines
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.edit_words import edit_title
 from app.document.changes.reach_words import acting_text, reach_note
+from app.document.changes.timing_changes import TIME_EDITS
 from app.document.storing.stored_document import ENTRIES
 from app.scripting.scripted_project import ScriptedProject, open_scripted
 from app.training.service import Launch
@@ -38,7 +40,15 @@ _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream edit`."""
     command.add_argument("project", type=path_argument, help="project folder")
+    command.add_argument(
+        "words",
+        nargs="*",
+        metavar="VERB",
+        help=f"changes the time of the take: {', '.join(TIME_EDITS)}; see below. Copies objects: "
+        f"{', '.join(COPY_VERBS)}; see their --help",
+    )
     add_edit_arguments(command)
+    add_time_arguments(command)
     stack = command.add_argument_group("the stack and the history")
     one = stack.add_mutually_exclusive_group()
     one.add_argument("--on", type=int, metavar="ID", help="switch an edit on")
@@ -65,27 +75,19 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     stack.add_argument("--history", action="store_true", help="list the steps as well")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
-    add_copy_verbs(
-        command.add_subparsers(
-            dest="verb",
-            metavar="VERB",
-            title="copies of objects",
-            help="instead of the options above",
-            prog=f"{command.prog} PROJECT",
-        )
-    )
+    add_copy_verbs(command)
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
+    if options.verb is not None:
+        print(run_copy_verb(options, launch))
+        return EXIT_OK
+    if options.words:
+        return _run_verb(options, launch)
     chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
     is_new = not chosen and has_action(options)
     _check_options(options, chosen[0] if chosen else "")
-    if options.verb is not None:
-        if chosen or is_new or options.history:
-            raise ProjectError(f"{options.verb} is given with the options of an edit.", hint="Leave one of them out.")
-        print(run_copy_verb(options, launch))
-        return EXIT_OK
     with open_scripted(options.project, read_only=not (chosen or is_new), launch=launch) as project:
         if is_new:
             _add(options, project)
@@ -97,8 +99,29 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     return EXIT_OK
 
 
+def _run_verb(options: argparse.Namespace, launch: Launch) -> int:
+    """A verb, such as `clipgstream edit PROJECT trim --frames 10:60`. Returns the exit code."""
+    verb = options.words[0]
+    if verb not in TIME_EDITS:
+        raise ProjectError(f"'{verb}' is not a verb.", hint=f"Verbs are {', '.join((*TIME_EDITS, *COPY_VERBS))}.")
+    of_edits = [name for name in _OF_STACK if getattr(options, name) is not None]
+    frames, at = options.frames, options.at
+    options.frames = options.at = None  # the verb's own
+    if of_edits or has_action(options) or has_target(options) or has_scope(options) or options.name is not None:
+        raise ProjectError(f"{verb} is given with options of edits.", hint="Leave them out.")
+    options.frames, options.at = frames, at
+    with open_scripted(options.project, launch=launch) as project:
+        change_time(options, options.words, project)
+        found = describe_edits(project, has_steps=options.history)
+        lines = [] if options.json else edit_lines(project, has_steps=options.history)
+    print(json_text(found, indent=1) if options.json else "\n".join(lines))
+    return EXIT_OK
+
+
 def _check_options(options: argparse.Namespace, chosen: str) -> None:
     """A given option that would be ignored is an error."""
+    for flag in given_time_options(options):
+        raise ProjectError(f"{flag} is given without a verb.", hint=f"Verbs are {', '.join(TIME_EDITS)}.")
     takes_edit = chosen in ("", "replace")
     given = {
         "what an edit does": has_action(options),
@@ -195,8 +218,8 @@ def _text(argument: str) -> str:
 
 
 def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict[str, Any]:
-    """The stack as plain data: schema; path; edits, bottom first; undo and redo, what each would do; with has_steps
-    also past and future, names of steps, the next one last."""
+    """The stack as plain data: schema; path; edits, bottom first; timing, segments of the take; undo and redo, what
+    each would do; with has_steps also past and future, names of steps, the next one last."""
     history, reaches = project.history, project.reaches
     found = {
         "schema": EDIT_SCHEMA,
@@ -210,6 +233,7 @@ def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict
             }
             for edit in project.edits
         ],
+        "timing": [to_builtins(one) for one in project.document.timing],
         "undo": history.undo_name,
         "redo": history.redo_name,
     }
@@ -226,6 +250,7 @@ def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str
         state = "" if edit.is_on else " (off)"
         where = acting_text(edit.scope, reaches[edit.edit_id])
         lines.append(f"{edit.edit_id:>5}  {one_line(edit_title(edit, project.document.objects))}, {where}{state}")
+    lines += take_lines(project)
     if has_steps:
         history = project.history
         lines.append(f"Steps: {len(history.past)}")

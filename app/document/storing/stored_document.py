@@ -20,6 +20,8 @@ from engine.editing.scene_object import NO_OBJECTS, Objects, SceneObject
 from engine.errors import ProjectError
 from engine.gate.regions import parse_region
 from engine.storage.typed_json import EntryError, to_type
+from engine.timing.segment import Segment
+from engine.timing.timing import check_length
 from engine.training.retired_settings import without_retired
 
 _sound: set[bytes] = set()
@@ -27,7 +29,8 @@ _sound: set[bytes] = set()
 
 
 class _Stored(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The declared entries; regions are parsed by their own reader."""
+    """The declared entries; regions are parsed by their own reader. Earlier versions wrote none of those that have a
+    default."""
 
     settings: ProjectSettings
     regions: tuple[dict[str, Any], ...]
@@ -36,6 +39,7 @@ class _Stored(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     markers: tuple[Marker, ...]
     labels: tuple[Label, ...]
     exclusions: Exclusions
+    timing: tuple[Segment, ...] = ()
     objects: Objects = NO_OBJECTS  # what earlier versions did not write
     copies: Copies = NO_COPIES
     world: World
@@ -53,6 +57,7 @@ def plain_document(document: ProjectDocument) -> dict[str, Any]:
     """
     check_paths(document.camera_paths)
     check_numbers(document.edits)
+    check_timing(document.timing)
     check_objects(document.objects)
     check_copies(document.copies)
     return {name: plain_entry(name, getattr(document, name)) for name in ENTRIES}
@@ -135,6 +140,7 @@ CODECS = {
     "labels": _struct(Label, lambda label: (label.kind, label.name)),
     "exclusions": _struct(Exclusions, is_list=False),
     "world": _struct(World, is_list=False),
+    "timing": _struct(Segment),
     "objects": Codec(True, _checked(SceneObject), _to_object, lambda one: one.object_id),
     "copies": _struct(ObjectCopy, lambda copy: copy.copy_id),
 }
@@ -154,6 +160,7 @@ def document_of(content: Any) -> ProjectDocument:
     paths = tuple(to_path(path) for path in stored.camera_paths)
     check_paths(paths)
     check_numbers(stored.edits)
+    check_timing(stored.timing)
     check_objects(stored.objects)
     check_copies(stored.copies)
     for edit in stored.edits:
@@ -169,6 +176,7 @@ def document_of(content: Any) -> ProjectDocument:
         stored.labels,
         stored.exclusions,
         stored.world,
+        stored.timing,
         stored.objects,
         stored.copies,
     )
@@ -182,6 +190,18 @@ def check_numbers(edits: Sequence[Edit]) -> None:
     """
     if len({edit.edit_id for edit in edits}) != len(edits):
         raise ProjectError("Two edits have the same number.")
+
+
+def check_timing(segments: Sequence[Segment]) -> None:
+    """Check that a take can be as long as its segments are.
+
+    Raises:
+        ProjectError: It cannot.
+    """
+    try:
+        check_length(segments)
+    except ValueError as error:
+        raise ProjectError(f"The timing is not valid: {error}.") from error
 
 
 def check_objects(objects: Sequence[SceneObject]) -> None:

@@ -17,8 +17,8 @@ _MAX_NAME_BYTES = 120
 
 @dataclass(frozen=True, slots=True)
 class GaussianFile:
-    """One file to write: a part of the scene at a frame. What stands still is that of the frame's clip, with the edits
-    that hold then."""
+    """One file to write: a part of the scene at a frame, of the capture or the take. What stands still is that of the
+    frame's clip, with the edits that hold then."""
 
     name: str
     frame: int
@@ -32,10 +32,10 @@ def base_name(name: str) -> str:
 
 
 def moment_files(name: str, suffix: str, frames: Sequence[int], part: WrittenPart, n_frames: int) -> list[GaussianFile]:
-    """A file per frame: numbered as the capture's frames are, without a number where there is only one.
+    """A file per frame: numbered as the frames are, without a number where there is only one.
 
     Args:
-        n_frames: Of the capture; all numbers have as many digits as its last one, at least four.
+        n_frames: Of the capture or the take; all numbers have as many digits as its last one, at least four.
     """
     if part == "static":
         return []

@@ -15,6 +15,7 @@ from app.export.export_progress import ExportProgress, Report
 from app.export.gaussians.gaussian_files import GaussianFile, WrittenPart, base_name, moment_files, static_file
 from app.export.gaussians.read_back import ReadBack
 from app.export.scene_frames import SceneFrames
+from app.export.take import TakeFrame
 from engine.export.formats.table import Format
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
@@ -43,7 +44,7 @@ class GaussianSequence:
 
     Args:
         scene: The source of frames.
-        frames: Of the capture, at least one.
+        frames: At least one.
         part: The part of each frame to write.
         kind: The format.
         placement: The scene's place in the files.
@@ -53,7 +54,7 @@ class GaussianSequence:
     def __init__(
         self,
         scene: SceneFrames,
-        frames: Sequence[int],
+        frames: Sequence[TakeFrame],
         part: WrittenPart,
         kind: Format,
         placement: FileWorld,
@@ -65,7 +66,7 @@ class GaussianSequence:
         self._scene, self._frames, self._kind, self._placement = scene, frames, kind, placement
         self._part: WrittenPart = part
         self._n_writers = min(_MOST_WRITERS, n_threads)
-        self._n_frames = scene.opened.capture.n_frames
+        self._n_frames = max(scene.opened.capture.n_frames, max(one.number for one in frames) + 1)
 
     # ---------------------------------------------------------------- writing
 
@@ -78,17 +79,17 @@ class GaussianSequence:
             OSError: The disk refused.
         """
         check = ReadBack(self._scene, self._kind.read, self._placement)
-        middle_too = {self._frames[0], self._frames[len(self._frames) // 2], self._frames[-1]}
+        middle_too = {self._frames[row].number for row in (0, len(self._frames) // 2, -1)}
         figures: dict[GaussianFile, dict[str, float]] = {}
         pending: deque[Future[WrittenFile]] = deque()
         pool = ThreadPoolExecutor(self._n_writers, thread_name_prefix="export")
         try:
-            for file, live in self._contents(report):
+            for one, file, live in self._contents(report):
                 future = pool.submit(self._write_file, folder, file, self._placement.placed(Splats.of(live)))
                 pending.append(future)
-                if file.part == "static" or file.frame in middle_too:
+                if file.part == "static" or one.number in middle_too:
                     future.result()
-                    figures[file] = check.psnr_db(folder / file.name, file.frame, live)
+                    figures[file] = check.psnr_db(folder / file.name, one.frame, live)
                 while len(pending) > self._n_writers:  # so many scenes are in memory at most
                     self.files.append(pending.popleft().result())
             self.files += [future.result() for future in pending]
@@ -98,23 +99,24 @@ class GaussianSequence:
         self._name_the_only_static(folder)
         report(ExportProgress(len(self._frames), len(self._frames)))
 
-    def _contents(self, report: Report) -> Iterator[tuple[GaussianFile, Gaussians]]:
-        """Each file and its contents. Still parts come again only where they have changed."""
+    def _contents(self, report: Report) -> Iterator[tuple[TakeFrame, GaussianFile, Gaussians]]:
+        """Each frame with a file of it and the contents. Still parts come again only where they have changed."""
         suffix, n_frames = self._kind.suffix, self._n_frames
-        moments = {file.frame: file for file in moment_files(self.name, suffix, self._frames, self._part, n_frames)}
+        files = moment_files(self.name, suffix, [one.number for one in self._frames], self._part, n_frames)
         still: Gaussians | None = None
         stretch: object = None
-        for n_done, frame in enumerate(self._frames):
+        for n_done, one in enumerate(self._frames):
             report(ExportProgress(n_done, len(self._frames)))
+            frame = one.frame
             clip_and_effects = (self._scene.clip_at(frame).clip_index, self._scene.effects(frame))
             if self._part in ("static", "split") and clip_and_effects != stretch:
                 stretch = clip_and_effects
                 found = self._scene.gaussians(frame, "static")
                 if still is None or not _are_same(still, found):
                     still = found
-                    yield static_file(self.name, suffix, frame, n_frames), found
-            if frame in moments:
-                yield moments[frame], self._scene.gaussians(frame, moments[frame].part)
+                    yield one, static_file(self.name, suffix, one.number, n_frames), found
+            if files:
+                yield one, files[n_done], self._scene.at_moments(one.moments, files[n_done].part)
 
     def _write_file(self, folder: Path, file: GaussianFile, splats: Splats) -> WrittenFile:
         path = folder / file.name
@@ -144,8 +146,8 @@ class GaussianSequence:
             "schema": SCHEMA,
             "program": "ClipGStream Studio",
             "project": self._scene.opened.project.folder.resolve().name,
-            "first_frame": min(self._frames),
-            "last_frame": max(self._frames),
+            "first_frame": min(one.number for one in self._frames),
+            "last_frame": max(one.number for one in self._frames),
             "n_frames": len(self._frames),
             "fps": self._scene.opened.capture.fps,
             "axes": self._placement.text,

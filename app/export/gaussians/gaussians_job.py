@@ -17,6 +17,7 @@ from app.export.gaussians.gaussian_sequence import GaussianSequence
 from app.export.jobs.gaussians import GaussiansJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
+from app.export.take import take_frames
 from engine.editing.effects import EditStack
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS, FULL_PLY, Format
@@ -27,8 +28,8 @@ from engine.storage.json_files import json_text
 def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
     """Numbers of files and bytes, from the headers of the clips. Raises ProjectError where a frame is not trained."""
     scene = _scene(opened, job)
-    frames = _frames(scene, job)
-    stretches = Counter((scene.clip_at(frame).clip_index, scene.effects(frame)) for frame in frames)
+    frames = take_frames(scene, job.frames, has_timing=job.has_timing)
+    stretches = Counter((scene.clip_at(one.frame).clip_index, scene.effects(one.frame)) for one in frames)
     n_gaussians = 0
     for (clip_index, _), n_frames in stretches.items():  # as many as there are without edits
         n_static, n_moving = expected_rows(opened.header(clip_index))
@@ -52,12 +53,12 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     """
     started_s = time.monotonic()
     scene = _scene(opened, job)
-    frames = _frames(scene, job)
+    frames = take_frames(scene, job.frames, has_timing=job.has_timing)
     n_threads = use_threads(None)  # of this process: next to a training, a job has but one
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job), n_threads=n_threads)
     check_target(job.out, opened=opened, is_folder=True)
     report(ExportProgress(0, len(frames), message="Checking the clips"))
-    scene.check(frames)
+    scene.check(moment.frame for one in frames for moment in one.moments)
     check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
     with staged_folder(job.out, what="The export") as folder:
         sequence.write(folder, report)
@@ -72,12 +73,6 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
 
 def _scene(opened: TrainedProject, job: GaussiansJob) -> SceneFrames:
     return SceneFrames(opened, edits=None if job.has_edits else EditStack())
-
-
-def _frames(scene: SceneFrames, job: GaussiansJob) -> list[int]:
-    frames = scene.trained_frames if job.frames is None else list(job.frames)
-    scene.check_trained(frames)
-    return frames
 
 
 def _kind(job: GaussiansJob) -> Format:

@@ -37,7 +37,7 @@ class ReadBack:
         rig = scene.opened.rig
         self._rig = _reduced(rig.subset(np.unique(np.linspace(0, len(rig) - 1, N_CAMERAS).round().astype(int))))
 
-    def psnr_db(self, path: Path, frame: int, live: Gaussians) -> dict[str, float]:
+    def psnr_db(self, path: Path, frame: float, live: Gaussians) -> dict[str, float]:
         """PSNR of the file's picture against the live one, by the name of the camera. Nothing but Gaussians: black
         behind them, and no camera's own colours.
 

@@ -36,13 +36,14 @@ class Answers:
         return tuple(self.job_type.asked(self._declared(), self).values())
 
     def _declared(self) -> dict[str, Question]:
-        """The questions that the options lead to, one about edits where there are any."""
+        """The questions that the options lead to, those about edits and timing where there are any."""
         declared = self._settings()
         return {
             name: question_about(setting, self.context)
             for name, setting in declared.items()
             if setting.label
             and (name != "has_edits" or self.context.has_edits)
+            and (name != "has_timing" or self.context.has_timing)
             and all(
                 question_about(declared[other], self.context).chosen(self.choices) in values
                 for other, values in setting.shown_with.items()

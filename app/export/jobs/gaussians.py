@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from app.export.jobs.job import EDITS, FRAMES, ExportJob, option
+from app.export.jobs.job import EDITS, FRAMES, TIMING, ExportJob, option
 from app.export.picked_frames import PickedFrames
 from engine.export.formats.table import FORMATS
 from engine.export.world import AXES
@@ -104,6 +104,7 @@ class GaussiansJob(ExportJob, frozen=True):
         ),
     ] = None
     has_edits: Annotated[bool, EDITS] = True
+    has_timing: Annotated[bool, TIMING] = True
     fields: Annotated[
         Literal["usual", "full"],
         option(

@@ -50,6 +50,13 @@ EDITS = option(
     flags=(Flag("--without-edits", "Left out: the scene as it was trained", constant=False),),
 )
 
+TIMING = option(
+    "Whether the timing of the take is followed",
+    "Time",
+    titles={"true": "As edited", "false": "As captured"},
+    flags=(Flag("--as-captured", "The take as captured, without its timing", constant=False),),
+)
+
 
 class JobModule(Protocol):
     """The functions of the module with the work of a job."""
@@ -98,6 +105,11 @@ class ExportJob(Declared, frozen=True, tag=True):
     def applies_edits(self) -> bool:
         """Whether what is written has the edits of the project in it."""
         return bool(getattr(self, "has_edits", False))
+
+    @property
+    def follows_timing(self) -> bool:
+        """Whether what is written plays as the take is edited."""
+        return bool(getattr(self, "has_timing", False))
 
     @classmethod
     def load(cls) -> JobModule:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from app.export.jobs.job import EDITS, FRAMES, ExportJob, option
+from app.export.jobs.job import EDITS, FRAMES, TIMING, ExportJob, option
 from app.export.picked_frames import PickedFrames
 from engine.setting import Flag
 
@@ -34,6 +34,7 @@ class PlayerJob(ExportJob, frozen=True):
         ),
     ] = None
     has_edits: Annotated[bool, EDITS] = True
+    has_timing: Annotated[bool, TIMING] = True
 
     @classmethod
     def suffix(cls, format_name: str) -> str:

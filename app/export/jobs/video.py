@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from app.export.jobs.job import EDITS, FRAMES, ExportJob, option
+from app.export.jobs.job import EDITS, FRAMES, TIMING, ExportJob, option
 from app.export.jobs.question import Question
 from app.export.picked_frames import PickedFrames
 from app.export.video.formats import FORMATS
@@ -232,6 +232,7 @@ class VideoJob(ExportJob, frozen=True):
         ),
     ] = "both"
     has_edits: Annotated[bool, EDITS] = True
+    has_timing: Annotated[bool, TIMING] = True
 
     @classmethod
     def suffix(cls, format_name: str) -> str:

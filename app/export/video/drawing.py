@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from app.export.scene_frames import SceneFrames
 from app.export.video.views import ViewPoint
 from app.playback.modes.mode_pictures import MIN_OPACITY
+from engine.timing.timing import SourceMoment
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,16 +28,23 @@ class Drawn:
     depth: np.ndarray
 
 
-def draw(scene: SceneFrames, moment: float, view: ViewPoint, *, supersampling: int = 1) -> Drawn:
+def draw(
+    scene: SceneFrames, moment: float | Sequence[SourceMoment], view: ViewPoint, *, supersampling: int = 1
+) -> Drawn:
     """Draw a moment. Looked through a camera of the capture, colours are those of the camera, otherwise the scene's.
 
     Args:
-        moment: In frames of the capture; between frames see `SceneFrames.shares`.
+        moment: In frames of the capture; between frames see `SceneFrames.shares`. Of several, pictures are mixed.
         supersampling: Drawn so many times as large along both sides and reduced by means over squares.
     Raises:
         ProjectError: As `SceneFrames.gaussians`.
     """
-    shares = list(_drawn_shares(scene, moment, view, supersampling))
+    moments = [SourceMoment(moment)] if isinstance(moment, int | float) else moment
+    shares = [
+        tuple(np.float32(one.weight) * values for values in parts)
+        for one in moments
+        for parts in _drawn_shares(scene, one.frame, view, supersampling)
+    ]
     color, alpha, weighted_depth = (np.stack(parts).sum(axis=0) for parts in zip(*shares, strict=True))
     alpha, weighted_depth = np.clip(alpha[..., 0], 0.0, 1.0), weighted_depth[..., 0]
     depth = np.full_like(alpha, np.nan)

@@ -59,11 +59,22 @@ class Painter:
         moments: Of all pictures.
         view_of: From where each is taken.
         step: Frames from one picture to the next.
+        is_take: Whether pictures are those of a take, which may jump from one to the next.
     """
 
-    def __init__(self, scene: SceneFrames, job: VideoJob, moments: list[Moment], view_of: ViewOf, step: float) -> None:
+    def __init__(
+        self,
+        scene: SceneFrames,
+        job: VideoJob,
+        moments: list[Moment],
+        view_of: ViewOf,
+        step: float,
+        *,
+        is_take: bool = False,
+    ) -> None:
         self._scene, self._job, self._moments, self._view_of, self._step = scene, job, moments, view_of, step
-        self._last: tuple[float, ViewPoint, Drawn] | None = None
+        self._is_take = is_take
+        self._last: tuple[Moment, ViewPoint, Drawn] | None = None
 
     def picture(self, number: int) -> PassPicture:
         """One picture.
@@ -75,8 +86,8 @@ class Painter:
         view = self._view_of(number, moment.view)
         shows: PassName = self._job.shows
         if shows == "change":
-            return self._change(moment.scene, view)
-        drawn = self._draw(moment.scene, view)
+            return self._change(moment, self._before(number), view)
+        drawn = self._draw(moment, view)
         match shows:
             case "color":
                 return PassPicture(drawn.color, drawn.alpha, drawn.depth)
@@ -90,31 +101,34 @@ class Painter:
             case "compare":
                 return self._compare(round(moment.scene), view, drawn)
 
-    def _draw(self, moment: float, view: ViewPoint) -> Drawn:
-        return draw(self._scene, moment, view, supersampling=self._job.supersampling)
+    def _draw(self, moment: Moment, view: ViewPoint) -> Drawn:
+        return draw(self._scene, moment.sources, view, supersampling=self._job.supersampling)
 
-    def _change(self, moment: float, view: ViewPoint) -> PassPicture:
+    def _change(self, moment: Moment, before: Moment, view: ViewPoint) -> PassPicture:
         """From the moment before to this one, from the same place, so that what the camera does is not a change. The
         first moment of the scene has none before it, and has not changed."""
         from engine.metrics.clips.seams import change_of
 
-        before = moment if self._job.hold is not None else self._before(moment)
         earlier = self._known(before, view)
-        now = earlier if before == moment else self._draw(moment, view)
+        now = earlier if before.sources == moment.sources else self._draw(moment, view)
         self._last = (moment, view, now)
         values = LEVELS * change_of(now.color, earlier.color)
         return _opaque(mapped(values, HEAT_MAP, *HEAT_KINDS["R"].value_range), values)
 
-    def _before(self, moment: float) -> float:
-        before = moment - self._step
+    def _before(self, number: int) -> Moment:
+        """A step before a picture: of a take what it showed then, else of the capture."""
+        moment = self._moments[number]
+        if self._job.hold is not None or self._is_take:
+            return self._moments[max(number - 1, 0)]
+        before = moment.scene - self._step
         if before < 0 or self._scene.clip_at(before).clip_index not in self._scene.opened.trained:
             return moment
-        return before
+        return Moment(before, moment.view)
 
-    def _known(self, moment: float, view: ViewPoint) -> Drawn:
+    def _known(self, moment: Moment, view: ViewPoint) -> Drawn:
         if self._last is not None:
             known_moment, known_view, drawn = self._last
-            if abs(known_moment - moment) < 1e-6 and known_view.is_same(view):
+            if _is_same(known_moment, moment) and known_view.is_same(view):
                 return drawn
         return self._draw(moment, view)
 
@@ -133,6 +147,10 @@ class Painter:
         heat = mapped(error, HEAT_MAP, *HEAT_KINDS["error"].value_range) / np.float32(255.0)
         beside = np.concatenate([truth, render, heat], axis=1)
         return PassPicture(beside, np.ones(beside.shape[:2], np.float32), None)
+
+
+def _is_same(one: Moment, other: Moment) -> bool:
+    return one.fading == other.fading and abs(one.scene - other.scene) < 1e-6
 
 
 def _opaque(levels: np.ndarray, values: np.ndarray) -> PassPicture:

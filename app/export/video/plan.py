@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 from app.document.camera_paths import camera_path_named
 from app.evaluation.headless import TrainedProject
 from app.export.jobs.video import MAX_PICTURES, MAX_PIXELS, MAX_SIDE_PX, VideoJob
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target
+from app.export.take import taken_outputs, timing_of
 from app.export.video.formats import FORMATS, check_codecs
-from app.export.video.moments import Moment, moments_of
+from app.export.video.moments import Moment, moments_of, timed_moments
+from app.export.video.timed_sound import TimedSound
 from app.export.video.views import ViewOf, camera_view, path_view, turntable_view
+from app.export.video.writers.film import SOUND_RATE
 from app.export.video.writers.sequence import depth_unit
 from app.playback.modes.view_modes import rig_distance
 from engine.camera.camera_path import CameraPath
 from engine.capture.capture import Capture
 from engine.capture.files.frame_runs import runs_of
-from engine.capture.files.sound import sound_source
+from engine.capture.files.sound import SoundReader, sound_source
 from engine.errors import ProjectError
 from engine.text import shown
+from engine.timing.timing import TakeTiming
 
 _DEPTH_REACH = 4.0
 """The reach of 16 bits of depth, in usual distances from a camera to what all of them look at."""
@@ -37,9 +40,10 @@ class VideoPlan:
         fps: Pictures per second.
         view_of: From where each picture is taken.
         picture_size: Width and height of the written pictures, pixels.
-        sound: File with the sound and where in it the first picture is, seconds; None for silence.
+        sound: The sound, to be opened; None for silence.
         depth_unit: Scene units per level of a 16-bit picture of depths; None where none is written.
         notes: Differences from what was asked for, in sentences.
+        timing: Of the take whose pictures these are; None where they are as captured.
     """
 
     moments: list[Moment]
@@ -47,15 +51,16 @@ class VideoPlan:
     fps: float
     view_of: ViewOf
     picture_size: tuple[int, int]
-    sound: tuple[Path, float] | None = None
+    sound: SoundReader | TimedSound | None = None
     depth_unit: float | None = None
     notes: tuple[str, ...] = ()
+    timing: TakeTiming | None = None
 
     @property
     def is_frame_by_frame(self) -> bool:
-        """Whether every picture shows another frame of the capture, so that it can be named after it."""
+        """Whether every picture shows another frame of the capture, in order, so that it can be named after it."""
         scenes = [moment.scene for moment in self.moments]
-        return all(moment.is_whole for moment in self.moments) and len(set(scenes)) == len(scenes)
+        return all(moment.is_whole for moment in self.moments) and scenes == sorted(set(scenes))
 
     def name(self, number: int, suffix: str) -> str:
         """File name of a picture of a sequence: by its frame of the capture, where it has one of its own."""
@@ -83,7 +88,8 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     fps = capture.fps if job.fps is None else job.fps
     step = job.speed * capture.fps / fps
     path = None if job.path is None else _path_named(scene, job.path)
-    runs = _runs(job, scene, path)
+    timing = timing_of(scene, has_timing=job.has_timing and job.hold is None)
+    runs = _runs(job, scene, path) if timing is None else runs_of(taken_outputs(scene, timing, job.frames))
     if not runs:
         raise ProjectError("There are no frames to render.", path=scene.opened.project.folder)
     n_pictures = sum((len(run) - 1) / step + 1 for run in runs)
@@ -92,16 +98,16 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
             f"That makes {n_pictures:,.0f} pictures; at most {MAX_PICTURES:,} are written at once.",
             hint="Choose fewer frames, or a higher speed.",
         )
-    moments = moments_of(runs, step, job.hold)
+    moments = moments_of(runs, step, job.hold) if timing is None else timed_moments(timing, runs, step)
     if job.shows == "compare" and not all(moment.is_whole for moment in moments):
         raise ProjectError(
             "Side by side with the truth is possible at captured frames only, not between them.",
-            hint="Leave speed and rate out.",
+            hint="Leave speed and rate out, and the timing of the take.",
         )
     size = capture.picture_size if job.size is None else job.size
     _check_size(size, job.supersampling)
     view_of = _view_of(job, scene.opened, path, size, len(moments))
-    sound, notes = _sound(job, capture, runs)
+    sound, notes = _sound(job, capture, runs, timing)
     check_codecs(job.format, needs_sound=sound is not None)
     width, height = (3 * size[0], size[1]) if job.shows == "compare" else size
     if job.format == "mp4" and (width % 2 or height % 2):
@@ -113,11 +119,11 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     kind = FORMATS[job.format]
     n_bytes = round(kind.bytes_per_pixel * width * height * len(moments))
     check_target(job.out, opened=scene.opened, n_bytes=n_bytes, is_folder=kind.is_sequence)
-    scene.check([moment.scene for moment in moments])  # last, as it reads every clip
+    scene.check([part.frame for moment in moments for part in moment.sources])  # last, as it reads every clip
     unit = (
         depth_unit(_DEPTH_REACH * rig_distance(capture.rig)) if job.shows == "depth" and job.format == "png" else None
     )
-    return VideoPlan(moments, step, fps, view_of, (width, height), sound, unit, notes)
+    return VideoPlan(moments, step, fps, view_of, (width, height), sound, unit, notes, timing)
 
 
 def _runs(job: VideoJob, scene: SceneFrames, path: CameraPath | None) -> list[range]:
@@ -182,15 +188,19 @@ def _camera(capture: Capture, name: str) -> int:
     return capture.camera_indices([name])[0]
 
 
-def _sound(job: VideoJob, capture: Capture, runs: list[range]) -> tuple[tuple[Path, float] | None, tuple[str, ...]]:
-    """The place of the sound, and a note where it is left out."""
+def _sound(
+    job: VideoJob, capture: Capture, runs: list[range], timing: TakeTiming | None
+) -> tuple[SoundReader | TimedSound | None, tuple[str, ...]]:
+    """The sound, and a note where it is left out."""
     if job.sound is None:
         return None, ()
-    source = sound_source(capture, _camera(capture, job.sound), runs[0].start)
+    path, start_s = sound_source(capture, _camera(capture, job.sound), runs[0].start if timing is None else 0)
     if job.speed != 1.0:
         return None, (f"The sound is left out, because the scene plays at {job.speed:g} times its speed.",)
     if job.hold is not None:
         return None, ("The sound is left out, because time stands still.",)
     if len(runs) > 1:
         return None, ("The sound is left out, because frames are missing in between.",)
-    return source, ()
+    if timing is None:
+        return SoundReader(path, start_s, rate=SOUND_RATE), ()
+    return TimedSound(path, start_s, timing, capture.fps, runs[0].start, rate=SOUND_RATE), ()

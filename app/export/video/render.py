@@ -18,10 +18,9 @@ from app.export.staging import staged_file, staged_folder
 from app.export.video.formats import FORMATS
 from app.export.video.passes import Painter, PassPicture
 from app.export.video.plan import VideoPlan, plan_video
-from app.export.video.writers.film import SOUND_RATE, FilmWriter
+from app.export.video.writers.film import FilmWriter
 from app.export.video.writers.sequence import write_depth_png, write_exr_picture, write_png
 from app.training.rate import SmoothedRate
-from engine.capture.files.sound import SoundReader
 from engine.editing.effects import EditStack
 from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
@@ -78,7 +77,7 @@ def render_video(
     edits = None if job.has_edits else EditStack()
     scene = SceneFrames(opened, n_threads=n_threads, features=job.features, edits=edits)
     plan = plan_video(job, scene)
-    painter = Painter(scene, job, plan.moments, plan.view_of, plan.step)
+    painter = Painter(scene, job, plan.moments, plan.view_of, plan.step, is_take=plan.timing is not None)
     n, rate = len(plan.moments), SmoothedRate()
     rate.update(0, time.monotonic())
     with _writer(job, plan) as write:
@@ -104,9 +103,7 @@ def _writer(job: VideoJob, plan: VideoPlan) -> Iterator[Callable[[int, PassPictu
             yield lambda number, picture: _write_file(folder, job, plan, number, picture)
         return
     with staged_file(out, what="The video") as partial, ExitStack() as stack:
-        sound = None
-        if plan.sound is not None:
-            sound = stack.enter_context(SoundReader(*plan.sound, rate=SOUND_RATE))
+        sound = None if plan.sound is None else stack.enter_context(plan.sound)
         film = FilmWriter(
             partial,
             job.format,

@@ -21,10 +21,16 @@ class CommandTexts:
     Args:
         project: Gives the open project; None where there is none.
         is_finished: Whether training a clip would replace a finished one.
+        n_frames: Gives the number of frames of the open capture; None where that is not known.
     """
 
-    def __init__(self, project: Callable[[], Project | None], is_finished: Callable[[int], bool]) -> None:
-        self._find, self._is_finished = project, is_finished
+    def __init__(
+        self,
+        project: Callable[[], Project | None],
+        is_finished: Callable[[int], bool],
+        n_frames: Callable[[], int | None] = lambda: None,
+    ) -> None:
+        self._find, self._is_finished, self._n_frames = project, is_finished, n_frames
 
     def step(self, n_before: int = 0) -> CommandText:
         """A step of the history that was done.
@@ -40,7 +46,7 @@ class CommandTexts:
             raise ProjectError("There is no step to copy.", hint="Change something first.")
         before = past[len(past) - 1 - n_before].document
         after = past[len(past) - n_before].document if n_before else project.document
-        found = step_command(project.folder, before, after)
+        found = step_command(project.folder, before, after, self._n_frames())
         if found is None:
             raise ProjectError("This step has changed nothing.")
         return found

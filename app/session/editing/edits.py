@@ -116,6 +116,7 @@ def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
         document.edits,
         labels,
         document.world,
+        timing=document.timing,
         objects=document.objects,
         copies=document.copies,
         can_edit=not why_not,

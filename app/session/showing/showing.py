@@ -22,6 +22,7 @@ from app.session.showing.looking import look
 from app.session.showing.recent_input import Attention
 from app.session.training.live_training import LiveTraining
 from app.status import Overlays
+from engine.timing.timing import TakeTiming
 
 
 class Showing(SessionPart):
@@ -104,6 +105,8 @@ class Showing(SessionPart):
 
     def _show_notes(self, document: ProjectDocument) -> None:
         self.timeline.markers = Markers(document.markers)
+        n_frames = self.timeline.n_frames
+        self.timeline.timing = TakeTiming(document.timing, n_frames) if document.timing and n_frames else None
         self.views.set_scene_up(document.world.up)
 
     # ---------------------------------------------------------------- letting finished work in

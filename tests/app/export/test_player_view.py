@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from app.export.player_job import PlayerJob, run
 from app.playback.views.orbit_view import OrbitView
 from app.project.opening.project_access import open_project
 from engine.camera.rig import CameraRig
+from engine.timing.segment import Segment
 from tests.app.residuals.conftest import make_project
 from tests.browser import Browser, chromium
 
@@ -75,3 +78,24 @@ def test_cameras_are_looked_through_and_left_as_in_the_window(shown: tuple[Brows
         assert np.allclose(np.reshape(lens["worldToCamera"], (4, 4)), view.world_to_camera(), atol=1e-6)
     browser.key("f")
     assert_same(browser, OrbitView(rig))
+
+
+def test_a_take_is_played_in_its_order(tmp_path: Path) -> None:
+    project = open_project(make_project(tmp_path))
+    take = (Segment(4, 6, is_reversed=True), Segment(1, 2, n_frozen=3))
+    project.change(replace(project.document, timing=take), "time")
+    project.close()
+    opened = open_trained(open_project(project.folder, is_writable=False))
+    run(opened, PlayerJob(tmp_path / "take.html"), lambda progress: None)
+    with Browser(tmp_path) as browser:
+        browser.open(tmp_path / "take.html")
+        browser.wait("window.clipgstreamPlayer && clipgstreamPlayer.isDrawn")
+        assert browser.value("clipgstreamPlayer.clock.nFrames") == 5
+        assert browser.value("clipgstreamPlayer.header.take") == [2, 1, 0, 0, 0]
+        for frame in (0, 3, 2, 4, 1):
+            browser.value(f"clipgstreamPlayer.go({frame})")
+            browser.wait(f"clipgstreamPlayer.isDrawn && clipgstreamPlayer.onScreen === {frame}")
+            words = browser.value("document.getElementById('time').textContent")
+            assert words.startswith(f"Frame {frame} of 4")
+        assert browser.value("clipgstreamPlayer.timeline.starts") == [0, 2]
+        assert browser.console == []

@@ -20,6 +20,7 @@ from ui.panels.timeline.rows.rows import (
     QUALITY,
     RULER,
     SEAMS,
+    TAKE,
     arrange_rows,
 )
 
@@ -47,7 +48,7 @@ def test_rows_give_way_one_after_the_other():
         if not seen or seen[-1] != names:
             seen.append(names)
     gone = [({*before} - {*after}).pop() for before, after in itertools.pairwise(seen)]
-    assert gone == [*reversed(KEPT_FIRST)] == [QUALITY, MARKERS, CACHE, CAMERA, SEAMS, OVERVIEW]
+    assert gone == [*reversed(KEPT_FIRST)] == [QUALITY, MARKERS, CACHE, TAKE, CAMERA, SEAMS, OVERVIEW]
 
 
 def test_what_is_left_over_makes_clips_and_quality_larger():

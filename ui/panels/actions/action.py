@@ -14,6 +14,7 @@ from ui.panels.state import Dispatch, UiState
 TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
 MARK, PATH, TRAIN, WINDOW = "Mark regions", "Camera path", "Train", "Window"
 SELECT, EDIT = "Select", "Edit"
+TAKE = "Edit time"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 

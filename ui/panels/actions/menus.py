@@ -18,6 +18,7 @@ from ui.panels.actions.action import (
     PATH,
     PLAY,
     SELECT,
+    TAKE,
     TIME,
     TRAIN,
     VIEW,
@@ -54,7 +55,13 @@ _MENU_OF_GROUP = {
     TRAIN: "Train",
     WINDOW: "Window",
 }
-_MENU_OF_GROUP |= {NAVIGATE: "View/Navigate", BOOKMARKS: "View/Bookmarks", MODE: "View/Mode", PLAY: "Time/Play"}
+_MENU_OF_GROUP |= {
+    NAVIGATE: "View/Navigate",
+    BOOKMARKS: "View/Bookmarks",
+    MODE: "View/Mode",
+    PLAY: "Time/Play",
+    TAKE: "Time/Take",
+}
 _MENU_OF_TOPIC = {
     "clips": "Train/Clips",
     "compare": "View/Compare",

@@ -9,7 +9,16 @@ from app.session.session_view import SessionView
 from ui.panels.actions import copying, doctor, exporting, playing, time, window
 from ui.panels.actions.action import Action
 from ui.panels.actions.clips import clips, mending, training
-from ui.panels.actions.editing import camera_path, deleting, duplicating, editing, excluding, marking, selecting
+from ui.panels.actions.editing import (
+    camera_path,
+    deleting,
+    duplicating,
+    editing,
+    excluding,
+    marking,
+    selecting,
+    timing,
+)
 from ui.panels.actions.viewing import bookmarks, compare, heat, modes, navigation, view
 from ui.panels.panel_keys import belongs_to_panel
 from ui.panels.state import Dispatch, UiState
@@ -17,6 +26,7 @@ from ui.panels.state import Dispatch, UiState
 ACTIONS: tuple[Action, ...] = (
     *time.ACTIONS,
     *playing.ACTIONS,
+    *timing.ACTIONS,
     *view.ACTIONS,
     *navigation.ACTIONS,
     *bookmarks.ACTIONS,

@@ -15,6 +15,7 @@ from engine.text import one_line
 from ui.panels.editing.copies.copies_section import draw_copies
 from ui.panels.editing.details import draw_details
 from ui.panels.editing.making import draw_making
+from ui.panels.editing.timing_section import draw_timing
 from ui.panels.editing.world_section import draw_world
 from ui.panels.pieces.copying import draw_copy_entries
 from ui.panels.pieces.history_buttons import draw_history
@@ -55,6 +56,7 @@ def draw_edits(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     imgui.separator()
     draw_history(session.history, dispatch, ui, "edits")
     draw_world(session, dispatch, ui)
+    draw_timing(session, dispatch, ui)
 
 
 def _draw_stack(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:

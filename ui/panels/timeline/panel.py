@@ -26,12 +26,14 @@ from ui.panels.timeline.rows.rows import (
     QUALITY,
     RULER,
     SEAMS,
+    TAKE,
     arrange_rows,
 )
 from ui.panels.timeline.rows.ruler import draw_hover, draw_played, draw_playhead, draw_ruler
 from ui.panels.timeline.rows.seam_lane import draw_seam_lane
 from ui.panels.timeline.rows.small_lanes import draw_cache_lane, draw_marker_lane
 from ui.panels.timeline.rows.stage import TimelineStage
+from ui.panels.timeline.rows.take_lane import draw_take_lane
 from ui.panels.timeline.time_range import TimeScale
 from ui.panels.timeline.transport import draw_transport
 from ui.style import theme
@@ -52,6 +54,7 @@ def _draw_rows(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     left, right = origin.x + GUTTER_WIDTH, origin.x + max(size.x, GUTTER_WIDTH + 1.0)
     folded = ui.timeline.folded if session.paths.paths else ui.timeline.folded | {CAMERA}
+    folded = folded if session.edits.timing else folded | {TAKE}
     rows = {
         row.name: Rect(left, origin.y + row.top, right, origin.y + row.top + row.height)
         for row in arrange_rows(max(size.y, MIN_TRACK_HEIGHT), folded, is_zoomed=ui.timeline.is_zoomed)
@@ -100,6 +103,8 @@ def _draw_track(stage: TimelineStage, session: SessionView) -> None:
         draw_cache_lane(stage, session)
     if CAMERA in stage.rows:
         draw_path_lane(stage, session)
+    if TAKE in stage.rows:
+        draw_take_lane(stage, session)
     if MARKERS in stage.rows:
         draw_marker_lane(stage, timeline)
     draw_played(stage, timeline)

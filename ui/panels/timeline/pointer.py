@@ -15,6 +15,7 @@ from ui.panels.timeline.rows.path_lane import DRAG_FROM, handle_keys_of_path
 from ui.panels.timeline.rows.seam_lane import seam_at
 from ui.panels.timeline.rows.small_lanes import marker_at
 from ui.panels.timeline.rows.stage import TimelineStage
+from ui.panels.timeline.rows.take_lane import segment_at
 
 LEFT, MIDDLE = 0, 2
 EDGE_PAN_SHARE = 0.02
@@ -53,6 +54,8 @@ def _handle_left(stage: TimelineStage, session: SessionView, dispatch: Dispatch)
     view, timeline = stage.ui.timeline, session.timeline
     if handle_keys_of_path(stage, session, dispatch) or _drag_marker(stage, session, dispatch):
         return
+    if _press_segment(stage, session):
+        return
     if imgui.is_item_activated():
         seam = seam_at(stage, session)
         view.pressed_seam = None if seam is None else session.clips[seam[0]].start
@@ -71,6 +74,19 @@ def _handle_left(stage: TimelineStage, session: SessionView, dispatch: Dispatch)
             edit_marker(timeline, dispatch, stage.ui, marker.frame_index)
         elif view.pressed_seam is None:
             view.show_all()
+
+
+def _press_segment(stage: TimelineStage, session: SessionView) -> bool:
+    """Whether a segment of the take was pressed, which chooses it and does nothing else."""
+    view = stage.ui.timeline
+    if imgui.is_item_activated():
+        segment = segment_at(stage, session)
+        view.is_segment_pressed = segment is not None
+        if segment is not None:
+            view.segment = segment
+    is_held = imgui.is_item_active() or imgui.is_item_deactivated()
+    view.is_segment_pressed = view.is_segment_pressed and is_held
+    return view.is_segment_pressed
 
 
 def _drag_marker(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> bool:

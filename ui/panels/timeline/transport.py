@@ -65,6 +65,9 @@ def draw_transport(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
 
 def played_words(timeline: Timeline) -> str:
     """The played range, unless it is the whole capture."""
+    route = timeline.route
+    if route is not None and timeline.timing is not None:
+        return f"take {route.output} of {timeline.timing.n_output}"
     if timeline.around is not None:
         return f"around frames {timeline.around[0]} to {timeline.around[1]}"
     ends = (("in", timeline.in_frame), ("out", timeline.out_frame))
@@ -88,6 +91,10 @@ def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
         go_to_frame(timeline, dispatch, timeline.n_frames - 1)
     if _icon_button(ui, "loop", Icon.LOOP, "Loop (Ctrl+/)", is_on=timeline.is_looping):
         timeline.is_looping = not timeline.is_looping
+    if timeline.timing is not None:
+        take_note = "Play the take as it is edited in time (Alt+P)"
+        if _icon_button(ui, "take", Icon.FILM, take_note, is_on=timeline.is_take):
+            timeline.is_take = not timeline.is_take
     follow_note = "Follow training: stay in the clip with the newest state (End twice)"
     if _icon_button(ui, "follow", Icon.FOLLOW, follow_note, is_on=timeline.is_following):
         dispatch(FollowTraining(not timeline.is_following))

@@ -38,6 +38,8 @@ class TimelineView:
         marker_frame, marker_name: The marker whose name is being written.
         pressed_marker: Frame of the marker that is held with the pointer; None while none is.
         marker_from: Where it was pressed, units of the screen; None once that has become a drag.
+        segment: Number of the chosen segment of the take; None without one.
+        is_segment_pressed: Whether the pointer was pressed on a segment.
         gesture: Number of what is done to markers; see app.session.editing.edit_commands.
     """
 
@@ -57,6 +59,8 @@ class TimelineView:
     marker_name: str = ""
     pressed_marker: int | None = None
     marker_from: float | None = None
+    segment: int | None = None
+    is_segment_pressed: bool = False
     gesture: int = 0
     _of: object = None
     _seen_frame: int = 0

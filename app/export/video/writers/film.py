@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from app.export.video.formats import FORMATS
 from app.export.video.passes import PassPicture
+from app.export.video.timed_sound import TimedSound
 from engine.capture.files.sound import SoundReader
 
 SOUND_RATE = 48_000
@@ -52,7 +53,7 @@ class FilmWriter:
         fps: float,
         background: tuple[int, int, int] = (0, 0, 0),
         is_transparent: bool = False,
-        sound: SoundReader | None = None,
+        sound: SoundReader | TimedSound | None = None,
     ) -> None:
         self._path, self._format, self._background, self._is_transparent = path, format_name, background, is_transparent
         self._rate = Fraction(fps).limit_denominator(1001)

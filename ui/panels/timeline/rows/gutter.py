@@ -6,7 +6,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.session_view import SessionView
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline.rows.rows import CACHE, CAMERA, CLIPS, LANES, MARKERS, OVERVIEW, QUALITY, RULER, SEAMS
+from ui.panels.timeline.rows.rows import CACHE, CAMERA, CLIPS, LANES, MARKERS, OVERVIEW, QUALITY, RULER, SEAMS, TAKE
 from ui.panels.timeline.rows.stage import SMALL_TEXT, small_text, small_width
 from ui.panels.timeline.units import unit_note
 from ui.style import theme
@@ -21,6 +21,7 @@ NOTES = {
     QUALITY: "Held-out PSNR of each clip, and of each frame where it was measured; 20 to 40 dB",
     CACHE: "Frames decoded in memory, shown at once",
     CAMERA: "Keys of the camera path: C at the playhead",
+    TAKE: "Segments of the take over the frames that they play, numbered in the order in which they play",
     MARKERS: "Markers: Ctrl+M at the playhead",
 }
 

@@ -1,8 +1,8 @@
 """How the height of the timeline is shared: which rows there are, and which give way where there is not room for all.
 
-Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, camera, markers. Ruler and clips are
-always there, and the keys of the camera where there is a camera path. In a low panel quality gives way first, then
-markers, cache, camera, seams and the overview, last the transport row.
+Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, camera, take, markers. Ruler and
+clips are always there, the keys of the camera where there is a camera path, and the take where it is edited in time. In
+a low panel quality gives way first, then markers, cache, take, camera, seams and the overview, last the transport row.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS = (
+OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, TAKE, MARKERS = (
     "overview",
     "ruler",
     "clips",
@@ -18,17 +18,18 @@ OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS = (
     "quality",
     "cache",
     "camera",
+    "take",
     "markers",
 )
-LANES = (SEAMS, QUALITY, CACHE, CAMERA, MARKERS)
+LANES = (SEAMS, QUALITY, CACHE, CAMERA, TAKE, MARKERS)
 """Those that can be folded away."""
-ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS)
-KEPT_FIRST = (OVERVIEW, SEAMS, CAMERA, CACHE, MARKERS, QUALITY)
+ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, TAKE, MARKERS)
+KEPT_FIRST = (OVERVIEW, SEAMS, CAMERA, TAKE, CACHE, MARKERS, QUALITY)
 HEIGHTS = {OVERVIEW: 16.0, RULER: 22.0, CLIPS: 32.0, SEAMS: 18.0, QUALITY: 30.0, CACHE: 12.0}
-HEIGHTS |= {CAMERA: 18.0, MARKERS: 18.0}
+HEIGHTS |= {CAMERA: 18.0, TAKE: 18.0, MARKERS: 18.0}
 """Smallest ones, units of the screen."""
 MIN_CLIPS_HEIGHT = 18.0
-LARGEST = {CLIPS: 54.0, QUALITY: 90.0}
+LARGEST = {CLIPS: 54.0, TAKE: 36.0, QUALITY: 90.0}
 GAP = 2.0
 MIN_TRACK_HEIGHT = HEIGHTS[RULER] + MIN_CLIPS_HEIGHT
 """Below, the transport row gives way."""
