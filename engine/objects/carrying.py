@@ -7,7 +7,7 @@ look alike.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from engine.objects.moving_parts import MovingParts
 
@@ -35,9 +35,9 @@ def carried(known: MovingParts, values: np.ndarray, asked: MovingParts) -> tuple
     if not len(from_) or not len(to):
         return value, surety
     k = min(N_NEIGHBOURS, len(from_))
-    distances, near = cKDTree(sources[from_]).query(targets[to], k=k)
+    distances, near = KDTree(sources[from_]).query(targets[to], k=k)
     distances, near = distances.reshape(len(to), k), near.reshape(len(to), k)
-    own, _ = cKDTree(sources[from_]).query(sources[from_], k=k)
+    own, _ = KDTree(sources[from_]).query(sources[from_], k=k)
     usual = max(float(np.median(own.reshape(len(from_), k)[:, -1])), 1e-9)
     near = from_[near]
     unlike = np.linalg.norm(known.colors[near] - asked.colors[to][:, None], axis=2)
