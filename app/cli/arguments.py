@@ -49,7 +49,9 @@ class PlainParser(argparse.ArgumentParser):
         super().__init__(**{"allow_abbrev": False, **options})
         self.verbs: dict[str, PlainParser] = {}
 
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[argparse.Namespace, list[str]]:
+    def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, args: Any = None, namespace: Any = None
+    ) -> tuple[argparse.Namespace, list[str]]:
         """As argparse does; after a verb, by its own parser. The option `verb` says which, None for none."""
         if not self.verbs:
             return super().parse_known_args(args, namespace)
