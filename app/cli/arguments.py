@@ -39,10 +39,29 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 class PlainParser(argparse.ArgumentParser):
-    """Reports an error in one line and how to get help. Options are written in full: `--seed` is not `--seeds`."""
+    """Reports an error in one line and how to get help. Options are written in full: `--seed` is not `--seeds`.
+
+    Attributes:
+        verbs: By words that may follow the first argument, parsers for all that comes after them.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{"allow_abbrev": False, **options})
+        self.verbs: dict[str, PlainParser] = {}
+
+    def parse_known_args(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, args: Any = None, namespace: Any = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """As argparse does; after a verb, by its own parser. The option `verb` says which, None for none."""
+        if not self.verbs:
+            return super().parse_known_args(args, namespace)
+        words = list(sys.argv[1:] if args is None else args)
+        verb = words[1] if len(words) > 1 and words[1] in self.verbs else None
+        options, unknown = super().parse_known_args(words if verb is None else words[:1], namespace)
+        options.verb = verb
+        if verb is None:
+            return options, unknown
+        return self.verbs[verb].parse_known_args(words[2:], options)
 
     def error(self, message: str) -> NoReturn:
         """End the program with exit code 2 and one line."""

@@ -12,6 +12,7 @@ from app.document.project_settings import ProjectSettings
 from engine.camera.camera_path import CameraPath
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.actions import Vector
+from engine.editing.copies.object_copy import NO_COPIES, Copies
 from engine.editing.edit import Edit
 from engine.editing.effects import EditStack
 from engine.editing.scene_object import NO_OBJECTS, Objects
@@ -83,6 +84,7 @@ class ProjectDocument:
         world: Up and scale.
         timing: Segments of the take in the order in which they play; none for the take as captured.
         objects: People and things that were given a name, in the user's order.
+        copies: Objects that are shown once more, in the user's order.
     """
 
     settings: ProjectSettings
@@ -95,7 +97,8 @@ class ProjectDocument:
     world: World = AS_CAPTURED
     timing: tuple[Segment, ...] = ()
     objects: Objects = NO_OBJECTS
+    copies: Copies = NO_COPIES
 
     def stack(self) -> EditStack:
-        """Its edits, to be asked moment by moment."""
-        return EditStack(self.edits, self.objects)
+        """Its edits, to be asked moment by moment, and what copies are made of."""
+        return EditStack(self.edits, self.objects, self.copies, self.camera_paths)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from app.background.kernels import use_threads
@@ -12,13 +13,16 @@ from app.evaluation.headless import TrainedProject
 from app.playback.modes.contents import part_of
 from engine.capture.clip import Clip
 from engine.capture.files.frame_runs import runs_of
+from engine.editing.copies.copy_moments import CopyMoments, FrameCopies
+from engine.editing.copies.object_copy import nearest_frame
 from engine.editing.effects import EditStack, Effects
 from engine.errors import ProjectError
 from engine.timing.timing import SourceMoment
 
 if TYPE_CHECKING:
     from engine.editing.clip_rows import NamedSet
-    from engine.editing.edited_clip import EditedClip
+    from engine.editing.copies.copied import Copier, CopySource
+    from engine.editing.edited_clip import EditedClip, EditedGaussians
     from engine.metrics.clips.features_apart import Features
     from engine.metrics.clips.trained_clip import TrainedClip
     from engine.raster.gaussians import Gaussians
@@ -26,6 +30,8 @@ if TYPE_CHECKING:
 Part = Literal["all", "static", "moving"]
 PARTS: tuple[Part, ...] = ("all", "static", "moving")
 _CONTENTS = {"all": "all", "static": "static", "moving": "dynamic"}
+MAX_LOADED = 3
+"""Clips kept in memory: that of the moment, and those around it that copies come from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +51,26 @@ class Share:
     gaussians: Gaussians
 
 
+@dataclass(slots=True)
+class _Loaded:
+    """A clip in memory, and its parts that were asked for. named: Its sets, see named_sets."""
+
+    trained: TrainedClip
+    named: dict[str, NamedSet]
+    parts: dict[Part, EditedClip] = field(default_factory=dict)
+
+    def part(self, part: Part) -> EditedClip:
+        """A part of the clip, to be decoded."""
+        from engine.editing.edited_clip import EditedClip
+
+        if part not in self.parts:
+            model = part_of(self.trained.model, _CONTENTS[part])
+            self.parts[part] = EditedClip(model, self.trained.clip, self.named)
+        return self.parts[part]
+
+
 class SceneFrames:
-    """Gaussians of a project's frames, one loaded clip at a time: memory does not grow with the number of frames.
+    """Gaussians of a project's frames, a few loaded clips at a time: memory does not grow with the number of frames.
 
     Args:
         opened: A project opened for reading.
@@ -68,9 +92,9 @@ class SceneFrames:
         self._n_threads = n_threads
         self._features: Features = features
         self._clip_of = [clip for clip in opened.clips for _ in clip.frame_indices()]
-        self._loaded: TrainedClip | None = None
-        self._named: dict[str, NamedSet] = {}
-        self._parts: dict[Part, EditedClip] = {}
+        self._copies = CopyMoments(self._edits)
+        self._copier: Copier | None = None
+        self._loaded: OrderedDict[int, _Loaded] = OrderedDict()
 
     @property
     def trained_frames(self) -> list[int]:
@@ -121,7 +145,7 @@ class SceneFrames:
                 f"There is no frame {frame:g}; the capture has frames 0 to {len(self._clip_of) - 1}.",
                 path=self.opened.project.folder,
             )
-        return self._clip_of[math.ceil(frame - 0.5)]
+        return self._clip_of[nearest_frame(frame)]
 
     def clip_time(self, frame: float) -> float:
         """Clip time of a moment in the clip that shows it."""
@@ -134,42 +158,83 @@ class SceneFrames:
         Raises:
             ProjectError: It is not trained or damaged, or the moment lies outside of the capture.
         """
-        clip = self.clip_at(frame)
-        if self._loaded is None or self._loaded.clip != clip:
+        return self._load(self.clip_at(frame)).trained
+
+    def _load(self, clip: Clip) -> _Loaded:
+        if clip.clip_index not in self._loaded:
             from engine.editing.clip_rows import named_sets
             from engine.metrics.clips.features_apart import with_features
 
+            while len(self._loaded) >= (MAX_LOADED if self._edits.copies else 1):
+                self._loaded.popitem(last=False)
             use_threads(self._n_threads)
             loaded = self.opened.load(clip.clip_index)
             header = self.opened.header(clip.clip_index)
             reference = self.opened.reference
-            self._named = named_sets(loaded.model, header, 0 if reference is None else reference.header.clip_index)
-            self._loaded, self._parts = replace(loaded, model=with_features(loaded.model, self._features)), {}
-        return self._loaded
+            named = named_sets(loaded.model, header, 0 if reference is None else reference.header.clip_index)
+            trained = replace(loaded, model=with_features(loaded.model, self._features))
+            self._loaded[clip.clip_index] = _Loaded(trained, named)
+        self._loaded.move_to_end(clip.clip_index)
+        return self._loaded[clip.clip_index]
 
-    def _part(self, frame: float, part: Part) -> EditedClip:
-        """The part of the clip that shows a moment. Raises as `trained` does."""
-        from engine.editing.edited_clip import EditedClip
+    def _edited(
+        self, frame: float, clip_time: float, effects: Effects, part: Part, *, alive_at: float | None = None
+    ) -> EditedGaussians:
+        """A part of the clip that shows a moment, once edited. Raises as `trained` does."""
+        return self._load(self.clip_at(frame)).part(part).decode(clip_time, effects, alive_at=alive_at)
 
-        trained = self.trained(frame)
-        if part not in self._parts:
-            self._parts[part] = EditedClip(part_of(trained.model, _CONTENTS[part]), trained.clip, self._named)
-        return self._parts[part]
+    def effects(self, frame: float, shown_by: int | None = None) -> Effects:
+        """Of the edits that hold at a moment: between two frames those of the frame before.
 
-    def effects(self, frame: float) -> Effects:
-        """Of the edits that hold at a moment: between two frames those of the frame before."""
-        return self._edits.at(frame)
+        Args:
+            shown_by: A frame of the clip that shows the moment; None for the nearest one.
+        """
+        shown = nearest_frame(frame) if shown_by is None else shown_by
+        is_of_next = self.clip_at(shown).clip_index != self.clip_at(math.floor(frame)).clip_index
+        return self._edits.at(frame, shown if is_of_next else None)
+
+    def copies(self, frame: float) -> FrameCopies:
+        """Copies of objects at a moment."""
+        return self._copies.at(frame)
+
+    def _with_copies(self, edited: EditedGaussians, frame: float) -> Gaussians:
+        """A moment and its copies; those from clips that are not trained are missing. Raises as `trained` does."""
+        copies = self.copies(frame)
+        if not copies:
+            return edited.gaussians
+        return self._made_copier().with_copies(edited, copies, self._copied_clip).gaussians
+
+    def copied(self, frame: float) -> Gaussians | None:
+        """The copies of a moment alone; None where there are none. Raises as `trained` does."""
+        return self._made_copier().gaussians(self.copies(frame), self._copied_clip)
+
+    def _made_copier(self) -> Copier:
+        if self._copier is None:
+            from engine.editing.copies.copied import Copier
+
+            self._copier = Copier()
+        return self._copier
+
+    def _copied_clip(self, frame: float) -> CopySource | None:
+        from engine.editing.copies.copied import CopySource
+
+        at = nearest_frame(frame)
+        clip = self._clip_of[at] if 0 <= at < len(self._clip_of) else None
+        if clip is None or clip.clip_index not in self.opened.trained:
+            return None
+        return CopySource(clip.clip_index, lambda: self._load(clip).part("all"))
 
     def gaussians(self, frame: float, part: Part = "all") -> Gaussians:
         """The scene at a moment, between frames too.
 
         Args:
             frame: In frames of the capture; its field is evaluated there.
-            part: "static": still parts of the whole clip, "moving": the rest, "all": both.
+            part: "static": still parts of the whole clip, "moving": the rest and all copies, "all": both.
         Raises:
             ProjectError: As `trained`; an edit is damaged.
         """
-        return self._part(frame, part).decode(self.clip_time(frame), self.effects(frame)).gaussians
+        edited = self._edited(frame, self.clip_time(frame), self.effects(frame), part)
+        return edited.gaussians if part == "static" else self._with_copies(edited, frame)
 
     def at_moments(self, moments: Sequence[SourceMoment], part: Part = "all") -> Gaussians:
         """The scene at moments that fade into each other: still parts of the one that most is seen of, and what moves
@@ -197,24 +262,22 @@ class SceneFrames:
         Raises:
             ProjectError: As `trained`.
         """
-        before, effects = math.floor(frame), self.effects(frame)
+        before = math.floor(frame)
         fraction = frame - before
         if fraction > 0 and self.clip_at(before) != self.clip_at(before + 1):
             weights = {before: 1.0 - fraction, before + 1: fraction}
             finished = self.opened.trained
             known = {at: weight for at, weight in weights.items() if self.clip_at(at).clip_index in finished}
-            is_loaded = {at: self._loaded is not None and self._loaded.clip == self.clip_at(at) for at in known}
+            is_loaded = {at: self.clip_at(at).clip_index in self._loaded for at in known}
             for at in sorted(known, key=lambda at: not is_loaded[at]):  # each clip is loaded once
                 trained, clip_time = self.trained(at), self.clip_time(at)
-                there = (
-                    frame - trained.clip.start
-                ) / trained.clip.clip_length  # before its first frame, or after its last
-                edited = self._part(at, "all").decode(there, effects, alive_at=clip_time)
-                yield Share(known[at] / sum(known.values()), trained, clip_time, edited.gaussians)
+                there = (frame - trained.clip.start) / trained.clip.clip_length  # may be outside of it
+                edited = self._edited(at, there, self.effects(frame, at), "all", alive_at=clip_time)
+                yield Share(known[at] / sum(known.values()), trained, clip_time, self._with_copies(edited, frame))
             return
         trained, clip_time = self.trained(frame), self.clip_time(frame)
-        knots = trained.model.knots(clip_time)
+        knots, effects = trained.model.knots(clip_time), self.effects(frame)
         for knot, weight in knots:
             alive_at = None if len(knots) == 1 else knot / trained.clip.clip_length
-            edited = self._part(frame, "all").decode(clip_time, effects, alive_at=alive_at)
-            yield Share(weight, trained, clip_time, edited.gaussians)
+            edited = self._edited(frame, clip_time, effects, "all", alive_at=alive_at)
+            yield Share(weight, trained, clip_time, self._with_copies(edited, frame))

@@ -1,9 +1,10 @@
 """FrameDecoder: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by
 key.
 
-A key is (generation, path, clip_index, revision, effects, shown_as, frame_index). The generation goes up when another
+A key is (generation, path, clip_index, revision, changes, shown_as, frame_index). The generation goes up when another
 project is opened: results for the previous one are dropped. A new revision of a live clip makes its older
-frames worthless. Effects are those of the edits that hold at the frame: another edit makes only its own frames anew.
+frames worthless. Changes are the effects of edits that hold at the frame, and copies of objects that are there, with
+the states of the clips that they come from: another edit makes only its own frames anew.
 """
 
 from __future__ import annotations
@@ -20,16 +21,20 @@ from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker, nothing
 from app.playback.modes.arrays import AnchorArrays, GaussianArrays
 from app.playback.modes.contents import EditedParts
-from app.playback.modes.view_modes import PLAIN, ShownAs
+from app.playback.modes.view_modes import ALL, PLAIN, ShownAs
 from app.playback.picture_source import UNKNOWN, PictureSource
 from engine.backends.table import process_backend
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
+from engine.editing.copies.copy_moments import NOTHING_COPIED, FrameCopies
+from engine.editing.copies.object_copy import nearest_frame
 from engine.editing.effects import NO_EFFECTS, Effects
 
 if TYPE_CHECKING:
     from engine.backends.backend import Backend
+    from engine.editing.copies.copied import Copier
+    from engine.editing.edited_clip import EditedGaussians
     from engine.metrics.clips.trained_clip import TrainedClip
     from engine.model.camera_colors import CameraColors
     from engine.model.clip_model import AnchorView, ClipModel  # brings torch, which only the thread needs
@@ -43,7 +48,7 @@ MAX_MODELS = 6
 ModelKey = tuple[int, str, int, str]
 """generation, path, clip_index, revision"""
 FrameKey = tuple[int, str, int, str, str, ShownAs, int]
-"""the same, digest of the effects of edits, the decoded contents, and frame_index"""
+"""the same, digest of the changes, the decoded contents, and frame_index"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,8 @@ class FrameRequest:
         generation: Of the open project.
         shown_as: The mode and content to decode; see app.playback.modes.view_modes.decoded_as.
         effects: Of the edits that hold at the frame.
+        copies: Of objects, at the frame.
+        sources: A frame of each clip that copies come from; those that are not trained are missing.
     """
 
     clip_index: int
@@ -71,6 +78,8 @@ class FrameRequest:
     is_live: bool = field(default=False, compare=False)
     shown_as: ShownAs = PLAIN
     effects: Effects = NO_EFFECTS
+    copies: FrameCopies = NOTHING_COPIED
+    sources: tuple[FrameRequest, ...] = ()
 
     @property
     def model_key(self) -> ModelKey:
@@ -80,7 +89,25 @@ class FrameRequest:
     @property
     def key(self) -> FrameKey:
         """Identity of the result."""
-        return *self.model_key, self.effects.digest, self.shown_as, self.frame_index
+        changes = changes_digest(self.effects, self.copies, self.sources)
+        return *self.model_key, changes, self.shown_as, self.frame_index
+
+    def source_at(self, frame: float) -> FrameRequest | None:
+        """The request among `sources` for the clip that shows a moment; None where it is not trained."""
+        shown = nearest_frame(frame)
+        return next((one for one in self.sources if one.clip.start <= shown < one.clip.stop), None)
+
+
+def changes_digest(effects: Effects, copies: FrameCopies, sources: Sequence[FrameRequest]) -> str:
+    """The same where edits and copies leave the same of a frame. The arguments are those of a FrameRequest."""
+    if not copies:
+        return effects.digest
+    states = sorted((str(one.path), one.revision) for one in sources)
+    return f"{effects.digest} {copies.digest} {states}"
+
+
+WithCopies = Callable[["EditedGaussians", FrameRequest], "EditedGaussians"]
+"""Adds the copies of a request to its decoded frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +178,7 @@ class FrameDecoder:
         self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
         self._files = ClipFiles()
+        self._copier: Copier | None = None
         self._loading: ModelKey | None = None
         self._last: ShownFrame | None = None
         self._frame_bytes = 0  # of the newest one
@@ -250,7 +278,7 @@ class FrameDecoder:
         self.worker.forget()  # first: from here on the thread keeps nothing of its present work
         self._cache.clear()
         self._models = OrderedDict()
-        self._files = ClipFiles()
+        self._files, self._copier = ClipFiles(), None
         self._last = None
 
     def close(self) -> None:
@@ -264,13 +292,20 @@ class FrameDecoder:
         if known is not None:  # it was asked for and planned
             return known
         loaded = self._load(request)
-        shown = decode_frame(loaded, request)
+        shown = decode_frame(loaded, request, self._with_copies)
         arrays, anchors = shown.gaussians, shown.anchors
         if self.worker.is_still_wanted:
             n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
             self._frame_bytes = n_bytes
             self._cache.put(request.key, shown, n_bytes)
         return shown
+
+    def _with_copies(self, edited: EditedGaussians, request: FrameRequest) -> EditedGaussians:
+        if self._copier is None:
+            from engine.editing.copies.copied import Copier
+
+            self._copier = Copier()
+        return add_copies(self._copier, edited, request, self._load)
 
     def _load(self, request: FrameRequest) -> LoadedClip:
         identity = request.model_key
@@ -293,13 +328,39 @@ class FrameDecoder:
         return loaded
 
 
-def decode_frame(loaded: LoadedClip, request: FrameRequest) -> ShownFrame:
-    """Decode a frame of a clip in memory, with the edits of the request."""
+def add_copies(
+    copier: Copier, edited: EditedGaussians, request: FrameRequest, load: Callable[[FrameRequest], LoadedClip]
+) -> EditedGaussians:
+    """A decoded frame and its copies of objects, except in still parts. load: Gives a clip that copies come from."""
+    from engine.editing.copies.copied import CopySource
+
+    content = request.shown_as.content
+    if content == "static":
+        return edited
+    part = content if content in ("f_s", "f_d") else ALL
+
+    def clip_at(frame: float) -> CopySource | None:
+        source = request.source_at(frame)
+        if source is None:
+            return None
+        return CopySource((source.model_key, part), lambda: load(source).parts.part(part))
+
+    return copier.with_copies(edited, request.copies, clip_at)
+
+
+def decode_frame(loaded: LoadedClip, request: FrameRequest, with_copies: WithCopies | None = None) -> ShownFrame:
+    """Decode a frame of a clip in memory, with the edits of the request.
+
+    Args:
+        with_copies: Adds the copies of the request; None leaves them out.
+    """
     from engine.model.host_array import host_array
 
     clip_time = request.clip.clip_time(request.frame_index)
     content = request.shown_as.content
     edited = loaded.parts.part(content).decode(clip_time, request.effects)
+    if request.copies and with_copies is not None:
+        edited = with_copies(edited, request)
     source = PictureSource(
         request.clip_index,
         request.frame_index,

@@ -4,6 +4,7 @@ is trained, captured pictures, and pictures drawn on the processor.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from app.background.latest import LatestWorker
 from app.playback.ahead import Ahead, AskedLook, RequestOf, n_ahead
 from app.playback.capture_pictures import CapturedPictures, PictureRequest
 from app.playback.clouds import CloudRequest, Clouds
-from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame
+from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame, changes_digest
 from app.playback.modes.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.modes.coverage import CoverageFinder, CoveredSpace
 from app.playback.modes.mode_arrays import ModeArrays
@@ -29,6 +30,7 @@ from app.status import WantedFrame
 from app.training.clip_run import ShownState
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
+from engine.editing.copies.copy_moments import CopyMoments, FrameCopies
 from engine.editing.effects import EditStack
 from engine.images.rendition import Rendition
 
@@ -67,7 +69,7 @@ class Playback:
         self.ahead = Ahead(self.decoder, self.renderer)
         self._modes, self._coverage, self._trails = ModeArrays(), CoverageFinder(), TrailMaker()
         self._opened: OpenedProject | None = None
-        self._stack = EditStack()
+        self._copies = CopyMoments(EditStack())
         self._state_of = state_of
         self._n_ahead_seen = 0
         self._inherited: dict[int, Path | None] = {}
@@ -267,13 +269,20 @@ class Playback:
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
-        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), self._edits()), self._is_current)
+        states = self._states() if self._edits().copies else ()
+        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), self._edits(), states), self._is_current)
+
+    def _states(self) -> tuple[ShownState | None, ...]:
+        """Of all clips: copies may come from any of them."""
+        clips = () if self._opened is None else self._opened.clips
+        return tuple(self._state_of(clip.clip_index) for clip in clips)
 
     def _is_current(self, key: FrameKey) -> bool:
         generation, path, clip_index, revision, digest, _, frame_index = key
         state = self._state_of(clip_index)
         is_open = self._opened is not None and self._opened.generation == generation
-        is_edited_so = digest == self._edits().at(frame_index).digest
+        effects, copies = self._edits().at(frame_index), self._copies.at(frame_index)
+        is_edited_so = digest == changes_digest(effects, copies, self._sources(copies))
         return is_open and is_edited_so and state is not None and (str(state.file), state.revision) == (path, revision)
 
     def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
@@ -298,26 +307,52 @@ class Playback:
         state = None if opened is None else (state_of or self._state_of)(clip.clip_index)
         if opened is None or state is None:
             return None
+        effects, copies = self._edits().at(frame_index), self._copies.at(frame_index)
+        bare = self._bare(opened, clip, state)
+        return replace(
+            bare,
+            frame_index=frame_index,
+            shown_as=decoded_as(shown_as),
+            effects=effects,
+            copies=copies,
+            sources=self._sources(copies),
+        )
+
+    def _sources(self, copies: FrameCopies) -> tuple[FrameRequest, ...]:
+        """The clips that copies come from, as far as they have a state."""
+        opened = self._opened
+        if opened is None or not copies:
+            return ()
+        places = {bisect_right(opened.clips, frame, key=lambda clip: clip.start) - 1 for frame in copies.frames}
+        wanted = (opened.clips[place] for place in sorted(places) if place >= 0)
+        found = ((clip, self._state_of(clip.clip_index)) for clip in wanted)
+        return tuple(self._bare(opened, clip, state) for clip, state in found if state is not None)
+
+    def _bare(self, opened: OpenedProject, clip: Clip, state: ShownState) -> FrameRequest:
+        """The first frame of a clip as it was trained."""
         return FrameRequest(
             clip_index=clip.clip_index,
             revision=state.revision,
-            frame_index=frame_index,
+            frame_index=clip.start,
             path=state.file,
             generation=opened.generation,
             reference_path=state.reference_file or self._inherited_path(opened, clip.clip_index),
             clip=clip,
             is_live=state.is_live,
-            shown_as=decoded_as(shown_as),
-            effects=self._edits().at(frame_index),
         )
 
     def _edits(self) -> EditStack:
         """Those of the document as it is now; frames that a change of them leaves alone stay as they are."""
         document = None if self._opened is None else self._opened.project.document
-        edits, objects = ((), ()) if document is None else (document.edits, document.objects)
-        if edits is not self._stack.edits or objects is not self._stack.objects:
-            self._stack = EditStack(edits, objects)
-        return self._stack
+        known = self._copies.stack
+        if document is None:
+            wanted: tuple[object, ...] = ((), (), (), ())
+        else:
+            wanted = (document.edits, document.objects, document.copies, document.camera_paths)
+        if any(one is not other for one, other in zip(wanted, known.parts, strict=True)):
+            known = EditStack() if document is None else document.stack()
+            self._copies = CopyMoments(known)
+        return known
 
     def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:
         """Kept: it is asked for many times in every turn of the loop, and follows from all settings."""

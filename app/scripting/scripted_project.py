@@ -26,6 +26,7 @@ from app.project.opening.opening import open_capture_of
 from app.project.opening.project_access import open_project
 from app.project.project import Project
 from app.scripting.actions import action_called
+from app.scripting.object_copying import ObjectCopying
 from app.scripting.scripted_objects import ScriptedObjects
 from app.session.editing.edit_commands import (
     AddEdit,
@@ -62,7 +63,7 @@ TellNote = Callable[[str], None]
 FILL_VERB = "fill behind"
 
 
-class ScriptedProject(ScriptedObjects):
+class ScriptedProject(ScriptedObjects, ObjectCopying):
     """An open project; made by `app.scripting.open_project`, and closed by `close` or at the end of a `with` block.
 
     Args:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from app.document.project_document import AS_CAPTURED, World
 from engine.camera.camera_path import CameraKey, CameraPath
+from engine.editing.copies.object_copy import NO_COPIES, Copies
 from engine.editing.edit import Edit
 from engine.editing.lost_picks import LostPicks
 from engine.editing.reach import UNKNOWN, ClipAnchors, Reach
@@ -40,6 +41,7 @@ class EditsStatus:
         world: Up and scale.
         timing: Segments of the take; none for the take as captured.
         objects: Those that have a name, in the user's order.
+        copies: Objects that are shown once more, in the user's order.
         lost: Those that have lost their picks because a clip was trained anew.
         clips: Which anchors each clip has; none while that is not known.
         reaches: Where each edit acts, by its number.
@@ -52,6 +54,7 @@ class EditsStatus:
     world: World = AS_CAPTURED
     timing: tuple[Segment, ...] = ()
     objects: Objects = NO_OBJECTS
+    copies: Copies = NO_COPIES
     lost: tuple[LostPicks, ...] = ()
     clips: tuple[ClipAnchors, ...] = ()
     reaches: Mapping[int, Reach] = field(default_factory=dict)

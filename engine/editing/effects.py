@@ -14,7 +14,9 @@ from functools import lru_cache
 import msgspec
 from msgspec import Struct
 
+from engine.camera.camera_path import CameraPath
 from engine.editing.actions import Action
+from engine.editing.copies.object_copy import NO_COPIES, Copies, hiding_edits
 from engine.editing.edit import Edit, KeyedVolume, ObjectTarget, Picked, Target, TargetOfMoment, edits_at
 from engine.editing.fills.fill import fits
 from engine.editing.scene_object import Objects, object_of
@@ -24,17 +26,18 @@ MAX_MOMENTS = 4096
 """Moments whose effects an EditStack keeps."""
 
 
-def at_moment(target: Target, frame: float, objects: Objects) -> TargetOfMoment:
+def at_moment(target: Target, frame: float, objects: Objects, shown_by: float | None = None) -> TargetOfMoment:
     """A target as something that can be looked up in the clip of a moment: Gaussians, a volume in its place then.
 
     Args:
         frame: In frames of the capture, between frames too.
         objects: Of the document.
+        shown_by: See EditStack.at.
     """
     match target:
         case ObjectTarget():
             found = object_of(target, objects)
-            return Picked(()) if found is None else found.picked(frame)
+            return Picked(()) if found is None else found.picked(frame if shown_by is None else shown_by)
         case KeyedVolume():
             return volume_at(target, frame)
         case _:
@@ -77,9 +80,11 @@ class Effects:
         return hash(self.digest)
 
     @classmethod
-    def of(cls, edits: tuple[Edit, ...], frame: float = 0.0, objects: Objects = ()) -> Effects:
-        """Of edits that hold at a moment. frame: When; objects: Of the document."""
-        return cls.made(effect for edit in edits for effect in _effects_of(edit, frame, objects))
+    def of(
+        cls, edits: tuple[Edit, ...], frame: float = 0.0, objects: Objects = (), shown_by: float | None = None
+    ) -> Effects:
+        """Of edits that hold at a moment. frame: When; objects: Of the document; shown_by: See EditStack.at."""
+        return cls.made(effect for edit in edits for effect in _effects_of(edit, frame, objects, shown_by))
 
     @classmethod
     def made(cls, effects: Iterable[Effect]) -> Effects:
@@ -90,9 +95,9 @@ class Effects:
         return cls(effects, hashlib.sha256(b"".join(map(_digest, effects))).hexdigest()[:20])
 
 
-def _effects_of(edit: Edit, frame: float, objects: Objects) -> Iterator[Effect]:
+def _effects_of(edit: Edit, frame: float, objects: Objects, shown_by: float | None) -> Iterator[Effect]:
     """What one edit does: its own effect and, where it has a fill that fits, that of the fill."""
-    target, is_of_reference = at_moment(edit.target, frame, objects), edit.scope.is_reference_only
+    target, is_of_reference = at_moment(edit.target, frame, objects, shown_by), edit.scope.is_reference_only
     if edit.fill is None or not fits(edit):
         yield Effect(target, edit.action, edit.is_inverted, is_of_reference)
         return
@@ -116,10 +121,19 @@ class EditStack:
     Args:
         edits: In the order of the stack.
         objects: Of the document, for edits of objects.
+        copies: Of the document; an object whose place one takes is hidden. See engine.editing.copies for what they add.
+        paths: Of the document, which carry copies.
     """
 
-    def __init__(self, edits: tuple[Edit, ...] = (), objects: Objects = ()) -> None:
-        self.edits, self.objects = edits, objects
+    def __init__(
+        self,
+        edits: tuple[Edit, ...] = (),
+        objects: Objects = (),
+        copies: Copies = NO_COPIES,
+        paths: tuple[CameraPath, ...] = (),
+    ) -> None:
+        self.edits, self.objects, self.copies, self.paths = edits, objects, copies, paths
+        self._edits = edits = (*edits, *hiding_edits(copies))
         scopes = [edit.scope for edit in edits if edit.is_on]
         bounds = {scope.first for scope in scopes} | {scope.stop for scope in scopes if scope.stop is not None}
         for edit in edits:
@@ -133,10 +147,22 @@ class EditStack:
         )
         self._effects: dict[tuple[int, float], Effects] = {}
 
-    def at(self, frame: float) -> Effects:
+    @property
+    def parts(self) -> tuple[object, ...]:
+        """Everything of the document that it is made of."""
+        return self.edits, self.objects, self.copies, self.paths
+
+    def at(self, frame: float, shown_by: int | None = None) -> Effects:
         """The effects that hold at a moment, in frames of the capture; scopes between two frames are those of the one
-        before, volumes move between them, too."""
+        before, volumes move between them, too.
+
+        Args:
+            shown_by: A frame of the clip that shows the moment, where that is not the clip of the frame before: objects
+                are other Gaussians there.
+        """
         frame = max(frame, 0.0)
+        if shown_by is not None:
+            return Effects.of(edits_at(self._edits, frame), frame, self.objects, shown_by)
         place = bisect_right(self._bounds, math.floor(frame))
         first, last = self._moving
         moment = place, min(max(frame, first), last)  # before and after it, nothing moves
@@ -144,6 +170,6 @@ class EditStack:
         if found is None:
             if len(self._effects) >= MAX_MOMENTS:
                 self._effects.clear()
-            found = Effects.of(edits_at(self.edits, frame), frame, self.objects)
+            found = Effects.of(edits_at(self._edits, frame), frame, self.objects)
             self._effects[moment] = found
         return found

@@ -16,6 +16,10 @@ class RowSet:
     role: str
 
 
+COPIED = RowSet("", 0, "copied")
+"""The set of Gaussians that copies of objects add. They are nobody's to select: what is selected are the originals."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class GaussianRows:
     """Where the Gaussians of a frame come from, one row each.
@@ -36,3 +40,10 @@ class GaussianRows:
     def __getitem__(self, rows: np.ndarray | slice) -> GaussianRows:
         """The chosen rows, in the given order."""
         return GaussianRows(self.sets, self.set_index[rows], self.number[rows])
+
+
+def with_copied(rows: GaussianRows, n: int) -> GaussianRows:
+    """Rows, and after them those of so many copied Gaussians."""
+    place = np.full(n, len(rows.sets), rows.set_index.dtype)
+    number = np.concatenate([rows.number, np.arange(n, dtype=rows.number.dtype)])
+    return GaussianRows((*rows.sets, COPIED), np.concatenate([rows.set_index, place]), number)

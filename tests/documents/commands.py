@@ -14,7 +14,9 @@ def command_sections() -> str:
     """The window, the demo, then every command without a window: how it is called, what it does, its options."""
     parser = build_parser(used=COMMANDS)
     subparsers = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction)).choices
-    parsers = [window.build_parser(), window.build_demo_parser(), *subparsers.values()]
+    parsers = [window.build_parser(), window.build_demo_parser()]
+    for subparser in subparsers.values():
+        parsers += [subparser, *subparser.verbs.values()]
     return "\n\n".join(map(_section, parsers))
 
 

@@ -21,6 +21,7 @@ from ui.panels.training.curve_view import CurveView
 from ui.panels.ui_requests import UiRequests
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
+from ui.viewport.editing.copy_tool import CopyTool
 from ui.viewport.editing.edit_tool import EditTool
 from ui.viewport.editing.object_tool import ObjectTool
 from ui.viewport.editing.select_tool import SelectTool
@@ -40,6 +41,7 @@ EDIT_SECTIONS = {
     "selection": "Selection",
     "options": "Selection options",
     "edits": "Edits",
+    "copies": "Copies of objects",
     "timing": "Timing",
     "attribute": "Select by attribute",
     "volume": "Box or sphere by numbers",
@@ -95,6 +97,7 @@ class UiState:
         selecting: The tool that selects, and its options.
         editing: Which edit is chosen, and what is being done to it.
         objects: Which object is chosen, and which are outlined.
+        copies: Which copy of an object is chosen, and what new ones are to be like.
         masks: The brush that paints what training does not see.
         paths: Editing of the camera path's keys.
         navigation: Functions of mouse and keys over a picture.
@@ -123,6 +126,7 @@ class UiState:
     selecting: SelectTool = field(default_factory=SelectTool)
     editing: EditTool = field(default_factory=EditTool)
     objects: ObjectTool = field(default_factory=ObjectTool)
+    copies: CopyTool = field(default_factory=CopyTool)
     masks: MaskTool = field(default_factory=MaskTool)
     paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)

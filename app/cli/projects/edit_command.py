@@ -10,6 +10,7 @@ from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
 from app.cli.projects import fill_verb
+from app.cli.projects.copy_verbs import add_copy_verbs, run_copy_verb
 from app.cli.projects.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -83,10 +84,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     stack.add_argument("--history", action="store_true", help="list the steps as well")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_copy_verbs(command)
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
+    if options.verb is not None:
+        print(run_copy_verb(options, launch))
+        return EXIT_OK
     verb = options.words[0] if options.words else ""
     if take_follow(options):
         check_words(options, FOLLOW, "")

@@ -13,7 +13,14 @@ from typing import Any
 from app.document.camera_paths import check_paths
 from app.document.project_document import ProjectDocument
 from app.document.storing.plain_patch import Patch, PatchError, difference, patched, pieces_of
-from app.document.storing.stored_document import CODECS, Codec, check_numbers, check_objects, check_timing
+from app.document.storing.stored_document import (
+    CODECS,
+    Codec,
+    check_copies,
+    check_numbers,
+    check_objects,
+    check_timing,
+)
 from engine.storage.typed_json import EntryError
 
 
@@ -107,3 +114,5 @@ def _check(document: ProjectDocument, changed: dict[str, Any]) -> None:
         check_timing(document.timing)
     if "objects" in changed:
         check_objects(document.objects)
+    if "copies" in changed:
+        check_copies(document.copies)

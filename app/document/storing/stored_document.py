@@ -13,6 +13,7 @@ from app.document.camera_paths import StoredPath, check_paths, stored_path, to_p
 from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings, check_bounds
 from engine.capture.exclusions import Exclusions
+from engine.editing.copies.object_copy import NO_COPIES, Copies, ObjectCopy
 from engine.editing.edit import Edit, Picked, PickedRows
 from engine.editing.fills.fill import unpacked_fill
 from engine.editing.picks import unpack_rows
@@ -41,6 +42,7 @@ class _Stored(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     exclusions: Exclusions
     timing: tuple[Segment, ...] = ()
     objects: Objects = NO_OBJECTS  # what earlier versions did not write
+    copies: Copies = NO_COPIES
     world: World
 
 
@@ -58,6 +60,7 @@ def plain_document(document: ProjectDocument) -> dict[str, Any]:
     check_numbers(document.edits)
     check_timing(document.timing)
     check_objects(document.objects)
+    check_copies(document.copies)
     return {name: plain_entry(name, getattr(document, name)) for name in ENTRIES}
 
 
@@ -140,6 +143,7 @@ CODECS = {
     "world": _struct(World, is_list=False),
     "timing": _struct(Segment),
     "objects": Codec(True, _checked(SceneObject), _to_object, lambda one: one.object_id),
+    "copies": _struct(ObjectCopy, lambda copy: copy.copy_id),
 }
 
 
@@ -159,6 +163,7 @@ def document_of(content: Any) -> ProjectDocument:
     check_numbers(stored.edits)
     check_timing(stored.timing)
     check_objects(stored.objects)
+    check_copies(stored.copies)
     for edit in stored.edits:
         check_picks(edit)
     for one in stored.objects:
@@ -174,6 +179,7 @@ def document_of(content: Any) -> ProjectDocument:
         stored.world,
         stored.timing,
         stored.objects,
+        stored.copies,
     )
 
 
@@ -209,6 +215,16 @@ def check_objects(objects: Sequence[SceneObject]) -> None:
         raise ProjectError("Two objects have the same number.")
     if len({one.name.casefold() for one in objects}) != len(objects):
         raise ProjectError("Two objects have the same name.")
+
+
+def check_copies(copies: Sequence[ObjectCopy]) -> None:
+    """Check that copies can be distinguished, by number.
+
+    Raises:
+        ProjectError: They cannot.
+    """
+    if len({copy.copy_id for copy in copies}) != len(copies):
+        raise ProjectError("Two copies have the same number.")
 
 
 def check_picks(edit: Edit) -> None:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from app.playback.modes.view_modes import ALL
 from engine.capture.clip import Clip
 from engine.editing.fills.fill import FILLED, GUESSED
-from engine.editing.gaussian_rows import GaussianRows
+from engine.editing.gaussian_rows import COPIED, GaussianRows
 
 if TYPE_CHECKING:
     from engine.clip_files.clip_state import ClipState
@@ -117,6 +117,8 @@ class EditedParts:
     def _birth(self, role: str) -> int:
         if role in (FILLED, GUESSED):
             return OF_FILL if role == FILLED else OF_GUESS
+        if role == COPIED.role:
+            return BORN_HERE
         if self._reference is None or not self._model.anchor_set(role).is_trainable:
             return OF_REFERENCE
         return LEARNED_ON if role in ("adapted", "replacing") else BORN_HERE
@@ -138,7 +140,7 @@ class EditedParts:
         base, whole = self._base_gaussians(), self.part(ALL).rows
         k, row = self._model.decoder.gaussians_per_anchor, np.full(len(rows), -1, np.int64)
         for place, row_set in enumerate(rows.sets):
-            if row_set.role in (FILLED, GUESSED):
+            if row_set.role in (FILLED, GUESSED, COPIED.role):
                 continue
             is_of_set = rows.set_index == place
             anchors, among_k = np.divmod(rows.number[is_of_set].astype(np.int64), k)

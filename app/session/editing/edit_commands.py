@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from app.session.duplicating.copy_commands import CopyCommand
 from engine.editing.actions import Action, Vector
 from engine.editing.edit import EVERYWHERE, Edit, Scope, Target
 
@@ -190,8 +191,9 @@ EditCommand = (
     | SetUpByGround
     | SetScale
     | SetScaleByLength
+    | CopyCommand
 )
-"""Commands that change edits, markers, labels and the world, and can be taken back."""
+"""Commands that change edits, markers, labels, the world and copies, and can be taken back."""
 
 HistoryCommand = Undo | Redo | GoToStep
 """Commands that move in the history."""

@@ -1,4 +1,4 @@
-"""Edits: carries out the commands that change the edits, markers, labels and the world of the open project."""
+"""Edits: carries out the commands that change the edits, markers, labels, copies and the world of the open project."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from app.document.changes import edit_changes, note_changes, world_changes
 from app.document.changes.edit_words import edit_title, what_text
 from app.document.changes.reach_words import check_acts
 from app.document.project_document import ProjectDocument
+from app.session.duplicating.copying import with_copies_changed
 from app.session.edit_status import EditsStatus
 from app.session.editing import edit_commands as c
 from app.session.editing.edit_reaches import EditReaches
@@ -115,8 +116,9 @@ def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
         document.edits,
         labels,
         document.world,
-        document.timing,
-        document.objects,
+        timing=document.timing,
+        objects=document.objects,
+        copies=document.copies,
         can_edit=not why_not,
         why_not=why_not,
     )
@@ -172,6 +174,8 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
             return Change(world_changes.set_scale(document, meters_per_unit), "set the scale from a length")
         case c.SetScale(meters_per_unit=meters_per_unit):
             return Change(world_changes.set_scale(document, meters_per_unit), "set the scale")
+        case _:
+            return Change(*with_copies_changed(document, command))
 
 
 def _title(document: ProjectDocument, edit_id: int) -> str:
@@ -180,9 +184,5 @@ def _title(document: ProjectDocument, edit_id: int) -> str:
 
 def _is_same(before: ProjectDocument, after: ProjectDocument) -> bool:
     """Is everything the same that these commands change?"""
-    return (before.edits, before.markers, before.labels, before.world) == (
-        after.edits,
-        after.markers,
-        after.labels,
-        after.world,
-    )
+    names = ("edits", "markers", "labels", "world", "copies")
+    return all(getattr(before, name) == getattr(after, name) for name in names)

@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.editing.edit import Picked, PickedRows
 from engine.editing.fills.fill import FILLED, GUESSED
-from engine.editing.gaussian_rows import GaussianRows, RowSet
+from engine.editing.gaussian_rows import COPIED, GaussianRows, RowSet
 from engine.editing.picks import pack_rows, unpack_rows
 
 
@@ -62,7 +62,7 @@ class Selection:
         return mask
 
     def with_mask(self, rows: GaussianRows, mask: np.ndarray, *, keeps_others: bool) -> Selection:
-        """A selection in which, of the Gaussians of a frame, just those of a mask are selected.
+        """A selection in which, of the Gaussians of a frame, just those of a mask are selected; never those of copies.
 
         Args:
             mask: [N] bool
@@ -70,7 +70,7 @@ class Selection:
         """
         parts = dict(self.parts) if keeps_others else {}
         for place, row_set in enumerate(rows.sets):
-            if row_set.role in (FILLED, GUESSED):  # of no anchor: they belong to their edit
+            if row_set.role in (FILLED, GUESSED, COPIED.role):  # of no anchor of the clip
                 continue
             is_here, kept = rows.set_index == place, parts.get(row_set, _NONE)
             here = rows.number[is_here]

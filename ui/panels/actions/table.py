@@ -12,6 +12,7 @@ from ui.panels.actions.clips import clips, mending, training
 from ui.panels.actions.editing import (
     camera_path,
     deleting,
+    duplicating,
     editing,
     excluding,
     marking,
@@ -40,6 +41,7 @@ ACTIONS: tuple[Action, ...] = (
     *objects.ACTIONS,
     *marking.ACTIONS,
     *deleting.ACTIONS,
+    *duplicating.ACTIONS,
     *camera_path.ACTIONS,
     *volume_keys.ACTIONS,
     *training.ACTIONS,

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 from imgui_bundle import imgui
 
+from engine.camera.rotations import quats_of_turns, turns_of_quats
+from engine.editing.actions import Quat
 from ui.panels.state import UiState
 
 LABEL_WIDTH = 86.0
@@ -64,3 +67,13 @@ def whole_numbers(
     if imgui.is_item_activated():
         ui.editing.begin_gesture()
     return tuple(min(max(value, low), high) for value in found) if is_changed else None
+
+
+def turn_fields(ui: UiState, name: str, quat: Quat, label: str = "Rotation") -> Quat | None:
+    """A rotation as degrees about the axes of the scene."""
+    degrees = tuple(float(value) for value in np.degrees(turns_of_quats(np.array(quat))))
+    found = numbers(ui, name, label, degrees, speed=0.25, low=-180.0, high=180.0, text_format="%.1f°")
+    if found is None:
+        return None
+    w, x, y, z = (float(value) for value in quats_of_turns(np.radians(found)))
+    return w, x, y, z

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from imgui_bundle import imgui
 from msgspec import structs
 
@@ -14,13 +13,12 @@ from app.document.changes.reach_words import reach_note
 from app.session.editing.edit_commands import ChangeEdit, FillBehind, RenameEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_of, chosen_scope, extent_text
 from app.session.session_view import SessionView
-from engine.camera.rotations import quats_of_turns, turns_of_quats
-from engine.editing.actions import Action, Delete, Hide, Quat, Transform, Vector
+from engine.editing.actions import Action, Delete, Hide, Transform, Vector
 from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Prism, Scope, Sphere, Volume
 from engine.editing.volumes.keyed_volume import volume_of, with_volume
 from engine.setting import Setting, settings_of
 from engine.text import one_line
-from ui.panels.editing.fields import label_before, numbers, whole_numbers
+from ui.panels.editing.fields import label_before, numbers, turn_fields, whole_numbers
 from ui.panels.editing.volume_keys import draw_volume_keys
 from ui.panels.pieces.widgets import elided, segment, text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
@@ -180,7 +178,7 @@ def _draw_volume(ui: UiState, volume: Volume) -> Volume | None:
             found = numbers(ui, "size", "Size", sizes, speed=speed, low=LEAST_SIZE, high=FAR)
             if found is not None:
                 changed = structs.replace(changed, half_sizes=_vector([value / 2.0 for value in found]))
-            turned = _turn_fields(ui, "box turn", quat)
+            turned = turn_fields(ui, "box turn", quat)
             if turned is not None:
                 changed = structs.replace(changed, quat=turned)
         case Sphere(center=center, radius=radius):
@@ -210,7 +208,7 @@ def _field(ui: UiState, one: Setting, value: Any, last_frame: int) -> Any:
     if one.choices:
         return _choice_field(ui, one, value)
     if one.kind is tuple and len(value) == 4:
-        return _turn_fields(ui, one.name, value, one.label)
+        return turn_fields(ui, one.name, value, one.label)
     low, high = one.offered or one.bounds or (-FAR, FAR)
     if one.kind is tuple and (low, high) == (0, 1):
         return _color_field(ui, one, value)
@@ -241,16 +239,6 @@ def _color_field(ui: UiState, one: Setting, value: Vector) -> Vector | None:
     if imgui.is_item_activated():
         ui.editing.begin_gesture()
     return _vector([min(max(part, 0.0), 1.0) for part in color]) if is_changed else None
-
-
-def _turn_fields(ui: UiState, name: str, quat: Quat, label: str = "Rotation") -> Quat | None:
-    """A rotation as degrees about the axes of the scene."""
-    degrees = tuple(float(value) for value in np.degrees(turns_of_quats(np.array(quat))))
-    found = numbers(ui, name, label, degrees, speed=0.25, low=-180.0, high=180.0, text_format="%.1f°")
-    if found is None:
-        return None
-    w, x, y, z = (float(value) for value in quats_of_turns(np.radians(found)))
-    return w, x, y, z
 
 
 def _vector(values: tuple[float, ...] | list[float]) -> Vector:

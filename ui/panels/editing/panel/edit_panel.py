@@ -7,6 +7,7 @@ from collections.abc import Callable
 from imgui_bundle import ImVec2, imgui
 
 from app.session.session_view import SessionView
+from ui.panels.editing.copies.copies_section import draw_copies
 from ui.panels.editing.panel.details import draw_chosen
 from ui.panels.editing.panel.making import draw_making
 from ui.panels.editing.panel.marks import draw_marks
@@ -30,6 +31,7 @@ SECTIONS: tuple[Section, ...] = (
     draw_making,
     draw_chosen,
     draw_stack,
+    draw_copies,
     draw_timing,
     draw_attribute,
     draw_volume_numbers,

@@ -1,0 +1,1 @@
+"""Copies of objects: commands, and what they make of a document."""

@@ -1,0 +1,1 @@
+"""Copies of objects in the panel of edits."""
