@@ -168,8 +168,13 @@ def _staged(project: Project, folder: Path, deletions: Deletions, report: Report
     during = with_new_numbers(deletions.edits, renumbered)
     objects = objects_with_new_numbers(deletions.objects, renumbered)
     done = set() if deletions.untrained else acted - left  # clips that come later may still need them
-    after = tuple(edit for edit in during if edit.edit_id not in done)
+    after = tuple(edit for edit in during if edit.edit_id not in done or _shows_something(edit))
     return StagedClips(deletions.edits, deletions.objects, during, objects, after, tuple(changed), deletions.n_anchors)
+
+
+def _shows_something(edit: Edit) -> bool:
+    """Whether an edit fills what was behind with Gaussians that no clip has."""
+    return edit.fill is not None and bool(edit.fill.gaussians)
 
 
 def _new_state(state: ClipState, deletions: Deletions, clip_index: int, fingerprints: dict[str, str]) -> ClipState:

@@ -53,11 +53,13 @@ from engine.timing.segment import Segment
 if TYPE_CHECKING:
     from app.evaluation.headless import ClipOutcome, TrainedProject
     from app.mending.mend_project import MendOutcome
+    from engine.filling.finding import FillFigures
     from engine.progress import ReportProgress
 
 TellTraining = Callable[[TrainingStatus], None]
 TellExport = Callable[[ExportProgress], None]
 TellNote = Callable[[str], None]
+FILL_VERB = "fill behind"
 
 
 class ScriptedProject(ScriptedObjects):
@@ -298,6 +300,27 @@ class ScriptedProject(ScriptedObjects):
     def rename_edit(self, edit_id: int, name: str) -> None:
         """Give an edit another name. Raises ProjectError."""
         self._carry_out(RenameEdit(edit_id, name))
+
+    def fill(self, edit_id: int, on_progress: Callable[[int, int], None] | None = None) -> FillFigures:
+        """Fill what was behind something that an edit deletes or hides: take traces of it away, too, and continue
+        surfaces that no camera ever saw.
+
+        Args:
+            edit_id: Of the edit, which has the fill afterwards.
+            on_progress: Told how many steps are done, of how many.
+        Returns:
+            What was found.
+        Raises:
+            ProjectError: There is no such edit, it takes nothing away, or the project is read-only.
+        """
+        from app.filling.fill_edit import fill_behind
+
+        self._check_open()
+        self._project.check_writable()
+        tell = (lambda done, total: None) if on_progress is None else on_progress
+        filled, figures = fill_behind(self.open_trained(), self.document.stack(), edit_id, tell)
+        self._carry_out(ChangeEdit(filled, verb=FILL_VERB))
+        return figures
 
     def _carry_out(self, command: EditCommand) -> None:
         """Carry out a command as the window does."""

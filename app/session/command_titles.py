@@ -7,7 +7,7 @@ from typing import get_args
 from app.document.changes.timing_changes import TIME_EDITS, ChangeSegment
 from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
-from app.session.editing.edit_commands import EditCommand, GoToStep, Redo, Undo
+from app.session.editing.edit_commands import EditCommand, FillBehind, GoToStep, Redo, Undo
 from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
@@ -62,6 +62,7 @@ TITLES: dict[type, str] = {
     **dict.fromkeys(get_args(EditCommand), "The edit cannot be made"),
     **dict.fromkeys(get_args(ObjectCommand), "The object cannot be changed"),
     **dict.fromkeys((*TIME_EDITS.values(), ChangeSegment), "The take cannot be changed"),
+    FillBehind: "Nothing can be filled",
     **dict.fromkeys(get_args(PathCommand), "The camera path cannot be changed"),
     AskStartOver: "Training cannot start over",
     StartOver: "Training cannot start over",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from app.document.changes.timing_changes import TimeEdit
 from app.session.captures.capture_commands import CalibrationCommand, DoctorCommand, SynchronisationCommand
 from app.session.clips.clip_commands import ClipCommand
-from app.session.editing.edit_commands import EditCommand, HistoryCommand
+from app.session.editing.edit_commands import EditCommand, FillBehind, HistoryCommand
 from app.session.editing.mark_commands import MarkCommand
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
@@ -59,6 +59,7 @@ Command = (
     | EditCommand
     | ObjectCommand
     | TimeEdit
+    | FillBehind
     | MarkCommand
     | PathCommand
     | HistoryCommand

@@ -32,7 +32,7 @@ from app.session.command_titles import TITLES
 from app.session.commands import CancelJob, CloseQuestion, Command, DismissNotice
 from app.session.copying.command_texts import CommandTexts
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
-from app.session.editing.edit_commands import EditCommand, HistoryCommand
+from app.session.editing.edit_commands import EditCommand, FillBehind, HistoryCommand
 from app.session.editing.edit_reaches import EditReaches
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
@@ -47,6 +47,7 @@ from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.export_commands import AskExport, ExportCommand
 from app.session.exporting import Exporting
 from app.session.files.file_commands import FileCommand
+from app.session.filling import Filling
 from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import ProjectMending
@@ -185,6 +186,7 @@ class Session(SessionFace):
         self.command_texts = CommandTexts(
             lambda: self.project, live.is_finished, lambda: None if self.capture is None else self.capture.n_frames
         )
+        self.filling = parts.add(Filling(self.document, jobs, self.notices))
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
         self.edits: EditsStatus = self.editing.status()
@@ -233,6 +235,8 @@ class Session(SessionFace):
                 self.editing.apply(command)
             case _ if isinstance(command, ObjectCommand):
                 self.objects.apply(command)
+            case FillBehind():
+                self.filling.apply(command)
             case _ if isinstance(command, HistoryCommand):
                 with self.camera_paths.showing_change():
                     self.editing.go(command.n_steps)

@@ -88,8 +88,9 @@ class ClipRows:
         return GaussianRows(self.sets, self.set_of[indices], self.number_of[indices])
 
     def indices_of(self, rows: GaussianRows) -> np.ndarray:
-        """Inverse of `named`. [n] int64"""
-        return self._first_of_set[rows.set_index] + rows.number
+        """Inverse of `named`, without those of fills, which come last. [n] int64"""
+        is_anchored = rows.set_index < len(self.sets)
+        return self._first_of_set[rows.set_index[is_anchored]] + rows.number[is_anchored]
 
     def rows_of_anchors(self, role: str, anchors: np.ndarray) -> np.ndarray:
         """Rows of a set by the numbers of their anchors, none of which is hidden. [n] int64"""

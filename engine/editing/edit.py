@@ -137,6 +137,20 @@ Target = TargetOfMoment | ObjectTarget
 # ---------------------------------------------------------------- the edit
 
 
+class Fill(Struct, frozen=True, forbid_unknown_fields=True):
+    """What shows in the place of something that an edit takes away, see engine.editing.fills.fill.
+
+    Attributes:
+        made_for: `fill_key` of the edit when it was made; with another target or effect it does not fit any more.
+        traces: Still Gaussians that the edit takes away, too.
+        gaussians: New ones, packed, see `packed_fill`.
+    """
+
+    made_for: str
+    traces: tuple[PickedRows, ...] = ()
+    gaussians: bytes = b""
+
+
 class Edit(Struct, frozen=True, forbid_unknown_fields=True):
     """One change to the scene.
 
@@ -148,6 +162,7 @@ class Edit(Struct, frozen=True, forbid_unknown_fields=True):
         action: The action to apply.
         scope: In which frames.
         is_on: Whether it counts now.
+        fill: What shows in the place of what it takes away; None for what is behind, as it was trained.
     """
 
     edit_id: _Count
@@ -157,6 +172,7 @@ class Edit(Struct, frozen=True, forbid_unknown_fields=True):
     scope: Scope = EVERYWHERE
     is_inverted: bool = False
     is_on: bool = True
+    fill: Fill | None = None
 
 
 def edits_at(edits: tuple[Edit, ...], frame: float) -> tuple[Edit, ...]:

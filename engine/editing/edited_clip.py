@@ -17,10 +17,12 @@ from torch import Tensor
 
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
+from engine.clip_files.roles import STATIC
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.changed_gaussians import faded, recolored, transformed
 from engine.editing.clip_rows import ClipRows, NamedSet
 from engine.editing.effects import NO_EFFECTS, Effect, Effects
+from engine.editing.fills.filled import filled_by
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.over_time import Chosen, IndexedGaussians, held, smoothed
 from engine.editing.selecting import TargetFinder
@@ -42,7 +44,7 @@ class EditedGaussians:
     """A moment of a clip.
 
     Attributes:
-        gaussians: The Gaussians left, sets in the order of the model.
+        gaussians: The Gaussians left, sets in the order of the model, those of fills last.
         rows: Where each comes from.
         n_still: So many come first and differ in nothing but their colours between moments with equal effects.
     """
@@ -99,7 +101,15 @@ class EditedClip:
         moving = self._moving(effects.all, clip_time, alive)
         gaussians = Gaussians.concatenate([still.at(clip_time), moving.gaussians])
         index = np.concatenate([still.index, host_array(moving.index)])
-        return EditedGaussians(gaussians, self.rows.named(index), len(still.index))
+        return self._with_fills(EditedGaussians(gaussians, self.rows.named(index), len(still.index)), effects)
+
+    def _with_fills(self, edited: EditedGaussians, effects: Effects) -> EditedGaussians:
+        """Followed by the Gaussians of fills, which belong to the still part of the scene."""
+        filled = filled_by(effects, edited.gaussians.means) if STATIC in self.model.roles() else None
+        if filled is None:
+            return edited
+        gaussians = Gaussians.concatenate([edited.gaussians, filled.gaussians])
+        return EditedGaussians(gaussians, filled.rows(edited.rows, self.clip.clip_index), edited.n_still)
 
     @property
     def n_bytes_kept(self) -> int:

@@ -7,24 +7,30 @@ from __future__ import annotations
 import hashlib
 import math
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import msgspec
 from msgspec import Struct
 
 from engine.editing.actions import Action
-from engine.editing.edit import Edit, ObjectTarget, TargetOfMoment, edits_at
+from engine.editing.edit import Edit, ObjectTarget, Picked, TargetOfMoment, edits_at
+from engine.editing.fills.fill import fits
 from engine.editing.scene_object import Objects, at_moment, object_of
 
 
 class Effect(Struct, frozen=True):
-    """The effect of one edit where it holds. See Edit and Scope; its target is one of the moment, see `at_moment`."""
+    """The effect of one edit where it holds. See Edit and Scope; its target is one of the moment, see `at_moment`.
+
+    Attributes:
+        filled: Gaussians that appear after it, packed; see engine.editing.fills.filled.
+    """
 
     target: TargetOfMoment
     action: Action
     is_inverted: bool = False
     is_reference_only: bool = False
+    filled: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +57,7 @@ class Effects:
     @classmethod
     def of(cls, edits: tuple[Edit, ...], frame: float = 0.0, objects: Objects = ()) -> Effects:
         """Of edits that hold at a moment. frame: When; objects: Of the document."""
-        return cls.made(
-            Effect(at_moment(edit.target, frame, objects), edit.action, edit.is_inverted, edit.scope.is_reference_only)
-            for edit in edits
-        )
+        return cls.made(effect for edit in edits for effect in _effects_of(edit, frame, objects))
 
     @classmethod
     def made(cls, effects: Iterable[Effect]) -> Effects:
@@ -63,6 +66,17 @@ class Effects:
         if not effects:
             return NO_EFFECTS
         return cls(effects, hashlib.sha256(_ENCODER.encode(effects)).hexdigest()[:20])
+
+
+def _effects_of(edit: Edit, frame: float, objects: Objects) -> Iterator[Effect]:
+    """What one edit does: its own effect and, where it has a fill that fits, that of the fill."""
+    target, is_of_reference = at_moment(edit.target, frame, objects), edit.scope.is_reference_only
+    if edit.fill is None or not fits(edit):
+        yield Effect(target, edit.action, edit.is_inverted, is_of_reference)
+        return
+    yield Effect(target, edit.action, edit.is_inverted, is_of_reference, edit.fill.gaussians)
+    if edit.fill.traces:
+        yield Effect(Picked(edit.fill.traces), edit.action)
 
 
 NO_EFFECTS = Effects()

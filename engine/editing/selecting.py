@@ -43,13 +43,8 @@ class TargetFinder:
             ProjectError: Picked numbers are damaged.
         """
         match effect.target:
-            case Everything():
-                is_meant = torch.ones(len(index), dtype=torch.bool, device=self._device)
-            case Box():
-                is_meant = _is_in_box(means, effect.target)
-            case Sphere():
-                away = means.double() - means.new_tensor(effect.target.center, dtype=torch.float64)
-                is_meant = (away * away).sum(1) <= effect.target.radius**2
+            case Everything() | Box() | Sphere():
+                is_meant = is_within(effect.target, means)
             case Picked():
                 table = self._table(effect.target)
                 if table is None:
@@ -70,6 +65,18 @@ class TargetFinder:
         while len(self._picked) > MAX_TABLES:
             self._picked.popitem(last=False)
         return table
+
+
+def is_within(target: Everything | Box | Sphere, means: Tensor) -> Tensor:
+    """Which centres [N, 3] lie in a volume. [N] bool"""
+    match target:
+        case Everything():
+            return torch.ones(len(means), dtype=torch.bool, device=means.device)
+        case Box():
+            return _is_in_box(means, target)
+        case Sphere():
+            away = means.double() - means.new_tensor(target.center, dtype=torch.float64)
+            return (away * away).sum(1) <= target.radius**2
 
 
 def _is_in_box(means: Tensor, box: Box) -> Tensor:

@@ -48,7 +48,7 @@ EXAMPLE = {
         "                    left = faded(shapes.opacities, is_chosen, effect.action)\n"
         "                    shapes = replace(shapes, opacities=left)\n" + CASE,
     },
-    "ui/panels/editing/making.py": {
+    "ui/panels/editing/panel/making.py": {
         "import Action, Delete, Expose,": "import Action, Delete, Expose, Fade,",
         "    DELETE,\n": "    DELETE,\n    _making(Fade, lambda *where: Fade(0.5)),\n",
     },
@@ -70,7 +70,7 @@ from tests.app.made_projects import make_project
 from tests.documents.edits import edits_table
 from tests.engine.editing.edited_clips import edited, make_clip
 from ui.panels.actions.table import ACTIONS
-from ui.panels.editing import details
+from ui.panels.editing.panel import details
 
 found = {"file": clipgstream.__file__}
 made = make_project(Path(sys.argv[1]))

@@ -35,7 +35,7 @@ def pilot(open_pilot: Callable[..., Pilot]) -> Pilot:
     session.dispatch(p.SetCameraKey())
     session.dispatch(p.ChooseCameraKey(None))
     session.view.orbit(130.0, 60.0)
-    session.view.dolly(1.8)
+    session.view.dolly(1.9)
     session.overlays.show_frusta = False
     pilot = open_pilot(session)
     pilot.studio.frame.ui.wanted_panel = PATHS

@@ -22,7 +22,7 @@ from engine.editing.selection.volumes import in_volume
 from tests.app.fakes import write_capture
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from tests.ui.real_session import draw_until, make_session, poll
-from ui.panels.state import EDITS, HISTORY
+from ui.panels.state import EDIT, HISTORY
 from ui.viewport.editing.edit_tool import EditTool
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -41,7 +41,7 @@ def open_window(folder: Path, open_pilot: Callable[..., Pilot]) -> Pilot:
     session.overlays.show_frusta = session.overlays.show_residual = False
     session.overlays.show_inherited = True
     pilot = open_pilot(session, size=(1280, 1300))
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot.studio.frame.ui.wanted_panel = EDIT
     shown(pilot, 0)
     pilot.draw(3)
     return pilot
@@ -142,7 +142,7 @@ def test_box_crop_handles_invert_delete_with_scope_undo_toggle_and_open_again(
     inside = in_volume(box, everything[0])
     assert session.selection.n_gaussians == inside.sum() > 0, "what lies in the box is selected anew"
     window.key(key.I, modifiers=(CTRL,))
-    window.studio.frame.ui.wanted_panel = EDITS
+    window.studio.frame.ui.wanted_panel = EDIT
     window.draw(3)
     window.click("edits.scope frame")
     window.key(key.DELETE)

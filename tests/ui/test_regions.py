@@ -147,7 +147,7 @@ def test_the_whole_job_by_keys_alone(pilot: Pilot) -> None:
     pilot.session.history = HistoryStatus(undo="mark a region", redo="mark a region")
     pilot.key(key.Z, modifiers=(CTRL, SHIFT))
     pilot.key(key.Y, modifiers=(CTRL,))
-    pilot.click("regions.redo")
+    pilot.click("edits.redo")
     assert len(pilot.sent(Redo)) == 3
     assert len(pilot.sent(Undo)) == 1
 
@@ -227,7 +227,7 @@ def test_buttons_and_slider_of_the_panel(pilot: Pilot) -> None:
     pilot.click("regions.accept")
     pilot.draw(2)
     assert len(pilot.sent(MarkRegion)) == 1
-    pilot.click("regions.undo")
+    pilot.click("edits.undo")
     assert len(pilot.sent(Undo)) == 1
 
 
@@ -250,7 +250,7 @@ def test_the_list_highlights_and_removes(pilot: Pilot) -> None:
 
 def test_where_nothing_can_be_marked_it_says_why(pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    monkeypatch.setattr("ui.panels.regions.text_warning", said.append)
+    monkeypatch.setattr("ui.panels.editing.panel.marks.text_warning", said.append)
     session = pilot.session
     session.dispatch(MarkRegion("static", (0.0, 0.0, 0.0), 0.2))
     session.regions = dataclasses.replace(session.regions, can_mark=False, why_not="It is locked.")
@@ -260,7 +260,7 @@ def test_where_nothing_can_be_marked_it_says_why(pilot: Pilot, monkeypatch: pyte
     pilot.draw(2)
     assert said[-1] == "It is locked."
     assert not tool(pilot).is_active
-    for name in ("viewport.mark", "regions.begin", "regions.remove0", "regions.undo"):
+    for name in ("viewport.mark", "regions.begin", "regions.remove0", "edits.undo"):
         pilot.click(name)
     pilot.key(key.N)
     pilot.key(key.DELETE)

@@ -19,7 +19,7 @@ from engine.editing.selection.volumes import in_volume
 from tests.app.fakes import write_capture
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from tests.ui.real_session import draw_until, make_session, poll
-from ui.panels.state import SELECTION, Rect
+from ui.panels.state import EDIT, Rect
 from ui.shell.screenshot import read_window
 from ui.style.colors import YELLOW
 from ui.viewport.editing.select_tool import GROWTH, SelectTool
@@ -41,7 +41,7 @@ def window(tmp_path: Path, open_pilot: Callable[..., Pilot]) -> Iterator[Pilot]:
         if getattr(session.overlays, name):
             session.dispatch(ToggleOverlay(name))
     pilot = open_pilot(session)
-    pilot.studio.frame.ui.wanted_panel = SELECTION
+    pilot.studio.frame.ui.wanted_panel = EDIT
 
     def is_shown() -> bool:
         scene = pilot.studio.frame.viewport.scene

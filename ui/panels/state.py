@@ -28,12 +28,25 @@ from ui.viewport.excluding.mask_tool import MaskTool
 from ui.viewport.path_tool import PathTool
 from ui.viewport.region_tool import RegionTool
 
-VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-SELECTION, EDITS, HISTORY = "Selection", "Edits", "History"
+VIEWPORT, CAPTURE, TRAINING, EDIT, TIMELINE = "Viewport", "Capture", "Training", "Edit", "Timeline"
 RESIDUALS, LOG, DOCTOR = "Residuals", "Log", "Capture doctor"
-PATHS, EXPORTS = "Camera path", "Exports"
-PANELS = (CAPTURE, TRAINING, REGIONS, SELECTION, EDITS, RESIDUALS, PATHS, HISTORY, TIMELINE, LOG, DOCTOR, EXPORTS)
+PATHS, EXPORTS, HISTORY = "Camera path", "Exports", "History"
+PANELS = (CAPTURE, TRAINING, EDIT, RESIDUALS, PATHS, HISTORY, TIMELINE, LOG, DOCTOR, EXPORTS)
 """Titles of the panels around the picture."""
+DRAWER = (LOG, DOCTOR, EXPORTS, HISTORY)
+"""Titles of panels that share a drawer between picture and timeline, and are there once they are asked for."""
+EDIT_SECTIONS = {
+    "selection": "Selection",
+    "options": "Selection options",
+    "objects": "Objects",
+    "edits": "Edits",
+    "timing": "Timing",
+    "attribute": "Select by attribute",
+    "volume": "Box or sphere by numbers",
+    "regions": "Marks for training",
+    "world": "World: up and scale",
+}
+"""Titles of the parts of the panel Edit that can be asked for, by name."""
 LAYOUT_WORDS = {"Standard": "the default", "Long capture": "with a tall timeline, for long captures"}
 LAYOUTS = tuple(LAYOUT_WORDS)
 """Layouts of the panels that the program brings; the first is the one to begin with."""
@@ -96,6 +109,7 @@ class UiState:
         is_view_popup_wanted: Open the popup of lens, axes and bookmarks.
         last_heat: The heat map that was shown last, to be shown again; empty before the first.
         wanted_panel: Title of a panel that is to come to the front, or None.
+        open_drawer: Titles of the panels of the drawer that are open.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
 
@@ -119,6 +133,7 @@ class UiState:
     timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""
     wanted_panel: str | None = None
+    open_drawer: set[str] = field(default_factory=set)
     is_quality_open: bool = False
     is_quality_seen: bool = False
     is_picture_only: bool = False
@@ -139,6 +154,10 @@ class UiState:
     def mark_rect(self, name: str, rect: Rect) -> None:
         """Remember a rectangle that is not an ImGui item."""
         self.rects[name] = rect
+
+    def show_edit(self, section: str = "") -> None:
+        """Bring the panel Edit to the front, at one of EDIT_SECTIONS; where it stands without one."""
+        self.wanted_panel, self.editing.wanted_section = EDIT, section
 
     def redraw_within(self, seconds: float) -> None:
         """Ask for another frame no later than this many seconds from now."""

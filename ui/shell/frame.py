@@ -25,10 +25,9 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.camera_path import draw_paths
 from ui.panels.capture import CapturePanel
 from ui.panels.doctor.panel import DoctorPanel
-from ui.panels.editing.edits_panel import draw_edits
 from ui.panels.editing.history_panel import HistoryPanel
 from ui.panels.editing.mend_panel import draw_mending
-from ui.panels.editing.selecting.select_panel import draw_selection
+from ui.panels.editing.panel.edit_panel import draw_edit
 from ui.panels.exports import draw_exports
 from ui.panels.guard import Guard, draw_failed
 from ui.panels.log import LogPanel
@@ -37,20 +36,18 @@ from ui.panels.panel_keys import step_panel
 from ui.panels.picture.heat_overlay import HeatOverlay
 from ui.panels.picture.picture_pane import PicturePane
 from ui.panels.picture.viewport import ViewportPanel
-from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
-    EDITS,
+    DRAWER,
+    EDIT,
     EXPORTS,
     HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
-    REGIONS,
     RESIDUALS,
-    SELECTION,
     TIMELINE,
     TRAINING,
     VIEWPORT,
@@ -169,17 +166,18 @@ class Frame:
         self.remembering.restore_layout()
         self.remembering.restore_marks(session)
         self._floating_panels: set[str] = set()
-        self._in_front = [TIMELINE]  # a log in front of it would be a surprise
+        self._in_front: list[str] = []
         self._dock_ids: dict[str, int] = {}
+        self._alone = imgui.WindowClass()
+        node_flags = imgui.internal.DockNodeFlagsPrivate_
+        self._alone.dock_node_flags_override_set = node_flags.no_tab_bar | node_flags.no_docking_over_me
         self._is_welcome = self._is_picture_only = False
         self._visible_panels: set[str] = set()
         self._shown_before: set[str] = set()
         self._panels: tuple[tuple[str, Callable[[WindowSession, Dispatch, UiState], None], bool], ...] = (
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
-            (REGIONS, draw_regions, True),
-            (SELECTION, draw_selection, True),
-            (EDITS, draw_edits, True),
+            (EDIT, draw_edit, True),
             (RESIDUALS, self.residuals.draw, True),
             (PATHS, draw_paths, True),
             (TIMELINE, draw_timeline, True),
@@ -295,7 +293,7 @@ class Frame:
         layout = LAYOUTS[0] if ui.is_layout_reset_requested else self.layouts.take_own(ui)
         if layout is not None or not (ui.is_picture_only or is_laid_out(dock_id)):
             ui.is_layout_reset_requested = ui.is_picture_only = False
-            self._in_front = [TRAINING, TIMELINE]  # of those that lie over each other; one in each frame
+            self._in_front = [TRAINING]  # of those that lie over each other; one in each frame
             lay_out(dock_id, layout or LAYOUTS[0])
             self._redraw.request(FIRST_FRAMES)
         elif ui.is_picture_only != self._is_picture_only:
@@ -350,10 +348,15 @@ class Frame:
         self.dispatch(OpenCapture(folder, is_asking=True))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
-        is_wanted = title == self.ui.wanted_panel
+        is_wanted, drawer = title == self.ui.wanted_panel, self.ui.open_drawer
         if is_wanted:
             self.ui.wanted_panel = None
+            if title in DRAWER:
+                drawer.add(title)
             imgui.set_next_window_focus()
+        if title in DRAWER and title not in drawer:
+            self._visible_panels.discard(title)
+            return
         if not has_padding:
             imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
         flags = imgui.WindowFlags_.no_collapse
@@ -365,7 +368,12 @@ class Frame:
         is_bare = title not in self._floating_panels
         if is_bare:
             imgui.push_style_color(imgui.Col_.window_bg, NOTHING)
-        is_visible, _ = imgui.begin(title, None, flags)
+        if title == TIMELINE:  # nothing else lies in its place, so that it is always seen
+            imgui.set_next_window_class(self._alone)
+        is_visible, is_open = imgui.begin(title, True if title in DRAWER else None, flags)
+        if is_open is False:
+            drawer.discard(title)
+            self.request_redraw(FIRST_FRAMES)
         if is_bare:
             imgui.pop_style_color()
         if is_wanted and (self.ui.keyed_panel == title or (title == VIEWPORT and self._is_welcome)):

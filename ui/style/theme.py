@@ -124,8 +124,18 @@ class Icon:
     LOG = "\uf15c"
     MEND = "\uf0ad"
     MORE = "\uf141"
+    MOVE = "\uf0b2"
 
 
+TOOL_ICONS: dict[str, str] = {
+    "rectangle": "\uf5cb",
+    "lasso": "\uf5b7",
+    "brush": "\uf1fc",
+    "box": "\uf1b2",
+    "sphere": "\uf111",
+    "flood": "\uf575",
+}
+"""Glyphs of the tools that select."""
 CLIP_ICONS: dict[str, str] = {
     "untrained": "",
     "queued": Icon.CLOCK,

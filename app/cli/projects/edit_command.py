@@ -9,6 +9,7 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
+from app.cli.projects import fill_verb
 from app.cli.projects.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -22,6 +23,7 @@ from app.cli.projects.edit_timing import add_time_arguments, change_time, given_
 from app.cli.projects.edit_verbs import VERBS, add_verb_arguments, check_words, take_verb
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.edit_words import edit_title
+from app.document.changes.fill_words import fill_text
 from app.document.changes.reach_words import acting_text, reach_note
 from app.document.changes.timing_changes import TIME_EDITS
 from app.document.storing.stored_document import ENTRIES
@@ -34,7 +36,7 @@ from engine.text import one_line
 
 EDIT_SCHEMA = 1
 MAX_STDIN_CHARACTERS = 1 << 28
-_OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo", "apply_permanently")
+_OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "fill", "put", "undo", "redo", "apply_permanently")
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -60,6 +62,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--move-to", nargs=2, type=int, metavar=("ID", "POSITION"), help="its place in the stack, 0 is the bottom"
     )
     one.add_argument("--replace", type=int, metavar="ID", help="change it: given options replace what it had")
+    fill_verb.add_arguments(one)
     one.add_argument("--undo", type=int, nargs="?", const=1, metavar="N", help="undo the last step, or N steps")
     one.add_argument("--redo", type=int, nargs="?", const=1, metavar="N", help="redo the last undone step, or N steps")
     one.add_argument(
@@ -162,6 +165,8 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
         project.move_edit(*options.move_to)
     elif options.replace is not None:
         project.replace_edit(_replaced(options, project), on_note=_say)
+    elif options.fill is not None:
+        fill_verb.run(options, project, _say)
     elif options.put is not None:
         _put(options.put, project)
     elif options.apply_permanently:
@@ -223,7 +228,7 @@ def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict
         "schema": EDIT_SCHEMA,
         "path": str(project.folder),
         "edits": [
-            to_builtins(edit)
+            _plain(edit)
             | {
                 "title": edit_title(edit, project.document.objects),
                 "acts": reaches[edit.edit_id].acts,
@@ -240,6 +245,14 @@ def describe_edits(project: ScriptedProject, *, has_steps: bool = False) -> dict
     return found
 
 
+def _plain(edit: Edit) -> dict[str, Any]:
+    """An edit as plain data; few have a fill."""
+    plain = to_builtins(edit)
+    if edit.fill is None:
+        del plain["fill"]
+    return plain
+
+
 def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str]:
     """The same as text."""
     edits, reaches = project.edits, project.reaches
@@ -248,6 +261,7 @@ def edit_lines(project: ScriptedProject, *, has_steps: bool = False) -> list[str
         state = "" if edit.is_on else " (off)"
         where = acting_text(edit.scope, reaches[edit.edit_id])
         lines.append(f"{edit.edit_id:>5}  {one_line(edit_title(edit, project.document.objects))}, {where}{state}")
+        lines += [f"       {text}" for text in [fill_text(edit)] if text]
     lines += take_lines(project)
     if has_steps:
         history = project.history

@@ -14,6 +14,7 @@ from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings, check_bounds
 from engine.capture.exclusions import Exclusions
 from engine.editing.edit import Edit, Picked, PickedRows
+from engine.editing.fills.fill import unpacked_fill
 from engine.editing.picks import unpack_rows
 from engine.editing.scene_object import NO_OBJECTS, Objects, SceneObject
 from engine.errors import ProjectError
@@ -211,13 +212,20 @@ def check_objects(objects: Sequence[SceneObject]) -> None:
 
 
 def check_picks(edit: Edit) -> None:
-    """Check that the picks of an edit can be read.
+    """Check that the picks of an edit, and its fill, can be read.
 
     Raises:
-        ProjectError: It cannot.
+        ProjectError: They cannot.
     """
     if isinstance(edit.target, Picked):
         check_rows(f"Edit {edit.edit_id}", edit.target.sets)
+    if edit.fill is None:
+        return
+    check_rows(f"The fill of edit {edit.edit_id}", edit.fill.traces)
+    try:
+        unpacked_fill(edit.fill.gaussians)
+    except ValueError as error:
+        raise ProjectError(f"Edit {edit.edit_id} cannot be read: {error}.") from error
 
 
 def check_rows(owner: str, sets: Iterable[PickedRows]) -> None:

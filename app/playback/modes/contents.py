@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from app.playback.modes.view_modes import ALL
 from engine.capture.clip import Clip
+from engine.editing.fills.fill import FILLED, GUESSED
 from engine.editing.gaussian_rows import GaussianRows
 
 if TYPE_CHECKING:
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
     from engine.model.clip_model import ClipModel
     from engine.raster.gaussians import Gaussians
 
-OF_REFERENCE, LEARNED_ON, BORN_HERE = 0, 1, 2
-"""Births: from the reference clip as it was; from it, but trained further in this clip; new in this clip."""
+OF_REFERENCE, LEARNED_ON, BORN_HERE, OF_FILL, OF_GUESS = range(5)
+"""Births: from the reference clip as it was; from it, but trained further in this clip; new in this clip; of the fill
+of an edit, seen by some camera; of such a fill, a guess."""
 _SAME_PLACE_SHARE = 1e-2
 """Anchors nearer to each other than this share of their spacing are the same anchor, stored twice."""
 
@@ -113,6 +115,8 @@ class EditedParts:
         return np.array([self._birth(row_set.role) for row_set in rows.sets], np.uint8)[rows.set_index]
 
     def _birth(self, role: str) -> int:
+        if role in (FILLED, GUESSED):
+            return OF_FILL if role == FILLED else OF_GUESS
         if self._reference is None or not self._model.anchor_set(role).is_trainable:
             return OF_REFERENCE
         return LEARNED_ON if role in ("adapted", "replacing") else BORN_HERE
@@ -134,6 +138,8 @@ class EditedParts:
         base, whole = self._base_gaussians(), self.part(ALL).rows
         k, row = self._model.decoder.gaussians_per_anchor, np.full(len(rows), -1, np.int64)
         for place, row_set in enumerate(rows.sets):
+            if row_set.role in (FILLED, GUESSED):
+                continue
             is_of_set = rows.set_index == place
             anchors, among_k = np.divmod(rows.number[is_of_set].astype(np.int64), k)
             found = self._base_rows[row_set.role][whole.rows_of_anchors(row_set.role, anchors)]

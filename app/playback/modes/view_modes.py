@@ -41,7 +41,14 @@ class ViewMode:
     legend: tuple[tuple[hues.Hue, str], ...] = ()
 
 
-BIRTH_HUES = (hues.SKY, hues.GREEN, hues.ORANGE)
+_BIRTHS = (
+    "from the reference clip",
+    "from it, trained further",
+    "born in this clip",
+    "filled behind an edit",
+    "filled behind an edit, a guess",
+)
+BIRTH_HUES = (hues.SKY, hues.GREEN, hues.ORANGE, hues.YELLOW, hues.PURPLE)
 """By code of a birth: see app.playback.modes.contents."""
 
 _NORMAL_LEGEND = (
@@ -49,9 +56,7 @@ _NORMAL_LEGEND = (
     ((0.5, 1.0, 0.5), "green: faces down (y)"),
     ((0.5, 0.5, 1.0), "blue: faces the camera (-z)"),
 )
-_BIRTH_LEGEND = tuple(
-    zip(BIRTH_HUES, ("from the reference clip", "from it, trained further", "born in this clip"), strict=True)
-)
+_BIRTH_LEGEND = tuple(zip(BIRTH_HUES, _BIRTHS, strict=True))
 
 MODES = MappingProxyType(
     {

@@ -10,6 +10,7 @@ import numpy as np
 from app.playback.modes.arrays import GaussianArrays
 from app.playback.modes.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE
 from engine.clip_files.roles import STATIC
+from engine.editing.fills.fill import FILLED, GUESSED
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ def values_of(name: str, gaussians: GaussianArrays, anchors: AnchorValues | None
         case "clip" if rows is not None:
             return np.array([row_set.clip_index for row_set in rows.sets], np.float32)[rows.set_index]
         case "motion" if rows is not None:
-            moves = [STANDS_STILL if row_set.role == STATIC else MOVES for row_set in rows.sets]
+            moves = [STANDS_STILL if row_set.role in (STATIC, FILLED, GUESSED) else MOVES for row_set in rows.sets]
             return np.array(moves, np.float32)[rows.set_index]
         case "error" | "flicker" if anchors is not None and len(anchors.values):
             return _of_anchors(gaussians, anchors)

@@ -37,6 +37,13 @@ class ChangeEdit:
 
 
 @dataclass(frozen=True, slots=True)
+class FillBehind:
+    """Fill what was behind something that an edit deletes or hides; takes a while."""
+
+    edit_id: int
+
+
+@dataclass(frozen=True, slots=True)
 class RemoveEdit:
     """Take an edit out of the stack."""
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.editing.edit import Picked, PickedRows
+from engine.editing.fills.fill import FILLED, GUESSED
 from engine.editing.gaussian_rows import GaussianRows, RowSet
 from engine.editing.picks import pack_rows, unpack_rows
 
@@ -69,6 +70,8 @@ class Selection:
         """
         parts = dict(self.parts) if keeps_others else {}
         for place, row_set in enumerate(rows.sets):
+            if row_set.role in (FILLED, GUESSED):  # of no anchor: they belong to their edit
+                continue
             is_here, kept = rows.set_index == place, parts.get(row_set, _NONE)
             here = rows.number[is_here]
             table = np.zeros(max(int(kept.max(initial=-1)), int(here.max(initial=-1))) + 1, np.bool_)

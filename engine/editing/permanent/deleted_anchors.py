@@ -55,8 +55,7 @@ def deletes_something(clip: EditedClip, edits: tuple[Edit, ...], edit: Edit, obj
             continue
         without = EditStack(before, objects).at(frame)
         then = Effects.made((*without.all, *EditStack((edit,), objects).at(frame).all))
-        clip_time = clip.clip.clip_time(frame)
-        if len(clip.decode(clip_time, without).rows) != len(clip.decode(clip_time, then).rows):
+        if (_flags(clip, frame, without) != _flags(clip, frame, then)).any():
             return True
     return False
 

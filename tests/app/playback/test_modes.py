@@ -11,6 +11,7 @@ from app.playback.frame_decoder import ShownFrame
 from app.playback.modes import hues
 from app.playback.modes.arrays import BACKGROUND
 from app.playback.modes.color_maps import COLOR_MAPS
+from app.playback.modes.contents import OF_FILL, OF_GUESS
 from app.playback.modes.mode_arrays import MAX_KEPT, ModeArrays, drawn_arrays
 from app.playback.modes.mode_pictures import mode_picture, normals_of
 from app.playback.modes.view_modes import BIRTH_HUES, CONTENTS, MODES, ShownAs, decoded_as, range_of
@@ -139,6 +140,10 @@ def test_rows_that_are_not_finite_are_left_out(mode: str, shown: ShownFrame) -> 
 
 
 def test_colours_of_births_and_changes(shown: ShownFrame) -> None:
+    assert shown.gaussians.births is not None
+    births = shown.gaussians.births.copy()
+    births[:2] = OF_FILL, OF_GUESS  # no edit of this scene has a fill
+    shown = replace(shown, gaussians=replace(shown.gaussians, births=births))
     births, changes = drawn_arrays(shown, "birth"), drawn_arrays(shown, "changed")
     for birth, hue in enumerate(BIRTH_HUES):
         colors = births.colors[shown.gaussians.births == birth]

@@ -324,3 +324,25 @@ def test_what_cannot_be_mended(trained):
                 project.mend(**arguments)
         with pytest.raises(ProjectError):
             project.mend(boundary=7)
+
+
+def test_what_was_behind_is_filled_and_undone(trained, run):
+    with opened(trained) as project:
+        edit = project.apply_edit("delete", Sphere((0.0, 0.0, 0.0), 0.5))
+        before, told = project.document, []
+        figures = project.fill(edit.edit_id, lambda done, total: told.append(done / total))
+        assert told[-1] == 1.0
+        assert project.edits[0].fill is not None
+        filled = project.document
+        assert project.undo() == "fill behind: delete sphere of radius 0.5"
+        assert project.document == before
+        project.redo()
+        assert project.document == filled
+        with pytest.raises(ProjectError, match="There is no edit 9"):
+            project.fill(9)
+    with opened(trained, read_only=True) as project:
+        assert project.document == filled, "as it was kept"
+    code, out, err = run("edit", trained, "--fill", edit.edit_id)
+    assert code == 0
+    assert f"{figures.n_gaussians} Gaussians" in err
+    assert "fill" in out

@@ -22,7 +22,7 @@ from tests.app.residuals.conftest import make_project
 from tests.ui.pilot import Pilot
 from tests.ui.real_session import draw_until, make_session
 from ui.panels.actions.table import ACTIONS
-from ui.panels.state import EDITS, HISTORY
+from ui.panels.state import EDIT, HISTORY
 
 pytestmark = pytest.mark.gl
 NAME = 'it\'s 100 %s##\n"mine"'
@@ -76,11 +76,11 @@ def test_from_the_menus_of_panels(pilot, clipboard):
     session.dispatch(AddEdit(Delete(), Sphere((0.5, 0.0, 0.0), 0.25), name=NAME))
     session.dispatch(PutMarker(2, "here"))
     for panel, row, entry, expected in (
-        (EDITS, "edits.row1", "edits.menu.copy command", ["--delete", "--sphere", "0.5", "0.0", "0.0", "0.25"]),
+        (EDIT, "edits.row1", "edits.menu.copy command", ["--delete", "--sphere", "0.5", "0.0", "0.0", "0.25"]),
         (HISTORY, "history.step1", "history.menu.copy command", ["--delete", "--sphere", "0.5", "0.0", "0.0", "0.25"]),
         (HISTORY, "history.step2", "history.menu.copy command", ["--put", "-"]),
     ):
-        ui.wanted_panel = panel
+        ui.show_edit("edits") if panel == EDIT else setattr(ui, "wanted_panel", panel)
         draw_until(pilot, lambda row=row: row in pilot.rects, row)
         pilot.draw(4)
         pilot.move(*pilot.rects[row].center)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import pytest
+from msgspec import structs
 from pyglet.window import key, mouse
 
 from app.session.clips.clip_commands import ApplyDeletions
@@ -12,6 +13,7 @@ from app.session.edit_status import EditsStatus, HistoryStatus
 from app.session.editing.edit_commands import (
     AddEdit,
     ChangeEdit,
+    FillBehind,
     GoToStep,
     MoveMarker,
     PutMarker,
@@ -25,12 +27,13 @@ from app.session.editing.edit_commands import (
 from app.session.editing.mark_commands import MarkBox, MarkRegion
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.actions import Delete, Expose, Hide, Smooth
-from engine.editing.edit import Box, Scope, Sphere
+from engine.editing.edit import Box, Fill, Scope, Sphere
+from engine.editing.fills.fill import fill_key
 from engine.editing.gaussian_rows import RowSet
 from engine.editing.reach import ClipAnchors
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.panels.editing import details
-from ui.panels.state import EDITS, HISTORY
+from ui.panels.editing.panel import details
+from ui.panels.state import EDIT, HISTORY
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 BOX = Box((0.0, 0.0, 0.0), (0.5, 0.4, 0.3))
@@ -39,8 +42,8 @@ BOX = Box((0.0, 0.0, 0.0), (0.5, 0.4, 0.3))
 @pytest.fixture
 def panel(open_pilot) -> Pilot:
     """With the panel in front."""
-    pilot = open_pilot(size=(1280, 1100))
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot = open_pilot(size=(1280, 1500))
+    pilot.studio.frame.ui.wanted_panel = EDIT
     pilot.draw(4)
     return pilot
 
@@ -79,12 +82,12 @@ def test_a_drawn_volume_is_cropped_to_and_its_handles_become_those_of_the_edit(p
 
 def test_the_details_of_a_new_edit_come_into_sight_and_stay_while_numbers_are_typed(open_pilot, monkeypatch) -> None:
     pilot = open_pilot(size=(1280, 720))
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot.studio.frame.ui.wanted_panel = EDIT
     pilot.draw(4)
     pilot.click("edits.make recolor")
     pilot.draw(3)
     opacity = pilot.rects["edits.opacity"]
-    assert opacity.y1 < pilot.rects["timeline.track"].y0 - 60, "the last field is in sight"
+    assert opacity.y1 < pilot.rects["viewport.canvas"].y1, "the last field is in sight, above the timeline"
     drawn: list[list[str]] = []
     real = details.numbers
 
@@ -193,7 +196,7 @@ def test_names_of_users_are_shown_as_they_are(panel: Pilot) -> None:
 
 def test_where_nothing_can_be_edited_it_says_why(panel: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    monkeypatch.setattr("ui.panels.editing.edits_panel.text_warning", said.append)
+    monkeypatch.setattr("ui.panels.editing.panel.edit_panel.text_warning", said.append)
     panel.session.dispatch(AddEdit(Hide(), BOX))
     panel.draw(2)
     choose(panel, 1)
@@ -295,8 +298,30 @@ def test_without_a_capture_both_panels_say_so(open_pilot) -> None:
     from tests.ui.fake_session import FakeSession
 
     pilot = open_pilot(FakeSession(has_capture=False))
-    for title in (EDITS, HISTORY):
+    for title in (EDIT, HISTORY):
         pilot.studio.frame.ui.wanted_panel = title
         pilot.draw(3)
     assert pilot.session.edits == EditsStatus(why_not="Open a capture first.")
     assert len(pilot.session.notices) == 0
+
+
+def test_what_takes_something_away_is_filled_behind(panel: Pilot) -> None:
+    ui = panel.studio.frame.ui
+    ui.selecting.kind, ui.selecting.volume = "box", BOX
+    panel.draw(3)
+    panel.click("edits.make delete")
+    panel.draw(3)
+    panel.click("edits.fill")
+    assert panel.sent(FillBehind) == [FillBehind(1)]
+    assert "edits.remove_fill" not in panel.rects
+    edit = panel.session.edits.edits[0]
+    panel.session.dispatch(ChangeEdit(structs.replace(edit, fill=Fill(fill_key(edit)))))
+    panel.draw(3)
+    panel.click("edits.remove_fill")
+    assert panel.session.edits.edits == (edit,)
+
+
+def test_only_what_takes_something_away_has_a_fill(panel: Pilot) -> None:
+    panel.click("edits.make expose")
+    panel.draw(3)
+    assert "edits.fill" not in panel.rects

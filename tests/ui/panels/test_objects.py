@@ -33,7 +33,7 @@ from engine.editing.picks import pack_rows
 from engine.editing.reach import ClipAnchors
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.panels.state import EDITS
+from ui.panels.state import EDIT
 
 ALT = key.LALT
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -65,7 +65,7 @@ def put(pilot: Pilot, *found: SceneObject) -> None:
 def panel(open_pilot) -> Pilot:
     """With the panel in front and an object."""
     pilot = open_pilot(size=(1280, 1100))
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot.studio.frame.ui.wanted_panel = EDIT
     pilot.draw(4)
     put(pilot, *objects())
     return pilot
@@ -222,9 +222,9 @@ def test_the_chosen_object_is_outlined_and_all_where_that_is_wanted(panel: Pilot
     tool = panel.studio.frame.ui.objects
     put(panel, *objects(3))
     assert tool.outlined(panel.session.edits.objects) == ()
-    panel.key(key.O, modifiers=(SHIFT,))
+    panel.key(key.O, modifiers=(ALT, SHIFT))
     assert [one.object_id for one in tool.outlined(panel.session.edits.objects)] == [1]
-    panel.key(key.O, modifiers=(SHIFT,))
+    panel.key(key.O, modifiers=(ALT, SHIFT))
     assert [one.object_id for one in tool.outlined(panel.session.edits.objects)] == [2]
     panel.key(key.O, modifiers=(CTRL, SHIFT))
     assert len(tool.outlined(panel.session.edits.objects)) == 3
@@ -232,7 +232,7 @@ def test_the_chosen_object_is_outlined_and_all_where_that_is_wanted(panel: Pilot
 
 
 def test_states_in_words(panel: Pilot) -> None:
-    from ui.panels.editing.objects_section import state_text
+    from ui.panels.editing.panel.objects import state_text
 
     session = panel.session
     one = session.edits.objects[0]

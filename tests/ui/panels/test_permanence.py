@@ -17,7 +17,7 @@ from engine.editing.lost_picks import LostPicks
 from engine.editing.picks import pack_rows
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
-from ui.panels.state import EDITS
+from ui.panels.state import EDIT
 
 pytestmark = pytest.mark.gl
 
@@ -29,7 +29,7 @@ BRIGHTENS = Edit(2, "", Picked((PickedRows(1, "before", "residual", pack_rows(np
 def panel(open_pilot: Callable[..., Pilot]) -> Pilot:
     pilot = open_pilot(FakeSession(), size=(1280, 1400))
     show(pilot, DELETES, BRIGHTENS)
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot.studio.frame.ui.wanted_panel = EDIT
     pilot.draw(4)
     return pilot
 

@@ -26,7 +26,7 @@ from app.session.editing.selection_status import SelectionStatus
 from engine.editing.edit import Box, Sphere
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.panels.state import SELECTION
+from ui.panels.state import EDIT
 from ui.viewport.editing.select_tool import TOOLS, SelectTool
 
 pytestmark = pytest.mark.gl
@@ -42,8 +42,11 @@ def panel(open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch) -> 
     anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="spaced", spacing=0.2)
     monkeypatch.setattr(session, "shown_anchors", lambda: anchors)
     pilot = open_pilot(session, size=(1280, 1500))
-    pilot.studio.frame.ui.wanted_panel = SELECTION
+    pilot.studio.frame.ui.wanted_panel = EDIT
     pilot.draw(4)
+    for header in ("volume", "attribute"):
+        pilot.click(f"edits.{header}")
+        pilot.draw(2)
     return pilot
 
 

@@ -1,4 +1,4 @@
-"""The take in the window: its lane, its section of the Edits panel, and its keys, on the made-up session."""
+"""The take in the window: its lane, its section of the Edit panel, and its keys, on the made-up session."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pyglet.window import key
 from app.document.changes.timing_changes import ChangeSegment, ChangeSpeed, Freeze, Loop, Order, ResetTime, Split, Trim
 from engine.timing.segment import Segment
 from tests.ui.pilot import SHIFT, Pilot
-from ui.panels.editing.timing_section import changed_segment
-from ui.panels.state import EDITS
+from ui.panels.editing.panel.timing import changed_segment
+from ui.panels.state import EDIT
 from ui.panels.timeline.rows.take_lane import MAX_LEVELS, levels_of
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -20,7 +20,7 @@ ALT = key.LALT
 def panel(open_pilot) -> Pilot:
     """With the section open, and the take in three segments."""
     pilot = open_pilot(size=(1280, 1300))
-    pilot.studio.frame.ui.wanted_panel = EDITS
+    pilot.studio.frame.ui.wanted_panel = EDIT
     for edit in (Split(10), ChangeSpeed((10, 20), 0.5), Freeze(5, 12)):
         pilot.session.dispatch(edit)
     pilot.session.commands.clear()

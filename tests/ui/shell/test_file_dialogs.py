@@ -25,7 +25,7 @@ from app.session.projects.project_commands import OpenCapture, OpenProject
 from app.status import JobStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
-from ui.panels.state import EDITS
+from ui.panels.state import EDIT
 from ui.shell.dialogs.dialogs import RELOCATE
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -70,7 +70,7 @@ def test_a_way_can_be_chosen_by_the_pointer(pilot: Pilot) -> None:
 
 def test_a_question_outlives_panels_that_come_to_the_front(pilot: Pilot) -> None:
     asked(pilot, RecoveryQuestion(RECOVERY))
-    pilot.studio.frame.ui.wanted_panel = EDITS  # as the first frames of a window bring its panels
+    pilot.studio.frame.ui.wanted_panel = EDIT  # as the first frames of a window bring its panels
     pilot.draw(4)
     assert pilot.sent(CloseQuestion) == []
     pilot.key(key.ENTER)

@@ -13,7 +13,8 @@ from app.session.projects.project_commands import OpenCapture, OpenProject
 from app.session.showing.look_commands import SetFrame, TogglePlay
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.panels.state import EDITS, PANELS, TIMELINE
+from ui.panels.picture.tool_strip import STRIP_WIDTH
+from ui.panels.state import EDIT, PANELS, TIMELINE
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
@@ -41,7 +42,8 @@ def test_a_layout_is_kept_by_name_shown_again_and_removed(open_pilot: Callable[.
     file = PreferencesFile(tmp_path / "preferences.json")
     pilot = open_pilot(preferences=file)
     canvas = pilot.rects["viewport.canvas"]
-    pilot.drag((canvas.x0 - 1, canvas.center[1]), (canvas.x0 + 90, canvas.center[1]), steps=5)
+    border = canvas.x0 - STRIP_WIDTH - 1
+    pilot.drag((border, canvas.center[1]), (border + 91, canvas.center[1]), steps=5)
     pilot.rest()
     wide = pilot.rects["viewport.canvas"].x0
     assert wide > canvas.x0 + 50
@@ -100,11 +102,11 @@ def test_the_picture_alone_and_back(pilot: Pilot) -> None:
 
 def test_f6_goes_from_panel_to_panel_and_escape_gives_the_keys_back(pilot: Pilot) -> None:
     ui = pilot.studio.frame.ui
-    ui.wanted_panel = EDITS
+    ui.wanted_panel = EDIT
     pilot.draw(3)
     seen = set(pilot.studio.frame._visible_panels)
     in_order = [title for title in PANELS if title in seen]
-    assert EDITS in in_order
+    assert EDIT in in_order
     assert len(in_order) < len(PANELS), "some lie behind others"
     visited = []
     for _ in (*in_order, None):

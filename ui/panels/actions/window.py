@@ -10,7 +10,7 @@ from app.session.projects.project_commands import AskStartOver, NewProject
 from app.session.session_view import SessionView
 from engine.assets import asset_path
 from ui.panels.actions.action import WINDOW, Action, Run
-from ui.panels.state import LAYOUT_WORDS, LAYOUTS, PANELS, Dispatch, UiState
+from ui.panels.state import EDIT_SECTIONS, LAYOUT_WORDS, LAYOUTS, PANELS, Dispatch, UiState
 from ui.style.palette import THEMES
 from ui.style.ui_scale import next_choice
 
@@ -124,6 +124,19 @@ def _show_panel(title: str) -> Run:
     return show
 
 
+def _close_drawer(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    ui.open_drawer.clear()
+    ui.redraw_within(0.0)
+
+
+def _show_section(name: str) -> Run:
+    def show(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+        ui.is_picture_only = False
+        ui.show_edit(name)
+
+    return show
+
+
 def _theme(name: Literal["dark", "light", "system"]) -> Run:
     def take(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.preferences.theme = name
@@ -176,6 +189,18 @@ ACTIONS = (
             **_PANELS,
         )
         for title in PANELS
+    ),
+    *(
+        Action(f"window.panel.{name}", f"Show in the panel Edit: {title}", WINDOW, _show_section(name), **_PANELS)
+        for name, title in EDIT_SECTIONS.items()
+    ),
+    Action(
+        "window.close_drawer",
+        "Close Log, Capture doctor, Exports and History",
+        WINDOW,
+        _close_drawer,
+        keys=("Ctrl+W",),
+        **_PANELS,
     ),
     Action(
         "window.picture_only",

@@ -23,7 +23,7 @@ from ui.panels.state import Dispatch, UiState
 from ui.style.progress_words import job_words
 from ui.style.theme import Icon
 
-WIDE = 720.0
+WIDE = 640.0
 """In a panel at least so wide the list, the pictures and the map stand side by side."""
 PROGRESS = 180.0
 """Width of the bar."""

@@ -14,10 +14,10 @@ from app.playback.prefetch_order import Course
 from app.session.session_view import SessionView
 from engine.camera.rig import CameraRig
 from engine.text import camera_text
+from ui.panels.editing.panel.marks import draw_region_mark
 from ui.panels.picture.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.picture.comparison import shown_compare
 from ui.panels.pieces.widgets import elided
-from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.style import theme

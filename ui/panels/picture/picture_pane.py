@@ -14,6 +14,7 @@ from app.status import version_number
 from ui.panels.editing.edit_grip import EditGrip
 from ui.panels.editing.edit_subject import subject_of
 from ui.panels.editing.handle_drawing import draw_edit_hint, draw_handles, draw_points
+from ui.panels.editing.panel.marks import draw_chosen_sphere
 from ui.panels.editing.selecting.select_drawing import draw_hint, draw_tool
 from ui.panels.editing.selecting.select_grip import DRAG as SELECT
 from ui.panels.editing.selecting.select_grip import SelectGrip
@@ -28,7 +29,6 @@ from ui.panels.picture.panes import Panes, arrange
 from ui.panels.picture.pointer import MOVING_S, Pointer
 from ui.panels.pieces.key_words import key_words
 from ui.panels.pieces.widgets import chip, elided
-from ui.panels.regions import draw_chosen_sphere
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.style import theme
 from ui.style.theme import ON_PICTURE

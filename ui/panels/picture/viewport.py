@@ -1,4 +1,4 @@
-"""The viewport: toolbar, and one, two or four pictures of the same frame, each from its own view."""
+"""The viewport: toolbar, strip of tools, and one, two or four pictures of the same frame, each from its own view."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ui.panels.guard import Guard, draw_failed
 from ui.panels.picture.hud import Hud
 from ui.panels.picture.panes import view_areas
 from ui.panels.picture.picture_pane import PicturePane
+from ui.panels.picture.tool_strip import STRIP_WIDTH, draw_tool_strip
 from ui.panels.picture.toolbar.navigation import ViewPopup
 from ui.panels.picture.toolbar.toolbar import TOOLBAR_HEIGHT, draw_toolbar
 from ui.panels.state import Dispatch, Rect, UiState
@@ -90,7 +91,7 @@ class ViewportPanel:
         return [(index, pane) for index, pane in panes if not self._guard.is_failing(_name(index))]
 
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-        """Toolbar and pictures."""
+        """Toolbar, tools and pictures."""
         status = session.regions
         ui.regions.follow(session.rig, len(status.regions), can_mark=status.can_mark)
         start, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
@@ -103,6 +104,9 @@ class ViewportPanel:
         imgui.get_window_draw_list().add_rect_filled(bar.low, bar.high, theme.u32(theme.PANEL))
         draw_toolbar(session, dispatch, ui, self._view_popup)
         below = Rect(area.x0, bar.y1, area.x1, area.y1)
+        if not ui.is_picture_only:
+            draw_tool_strip(session, dispatch, ui, Rect(area.x0, bar.y1, area.x0 + STRIP_WIDTH, area.y1))
+            below = Rect(area.x0 + STRIP_WIDTH, bar.y1, area.x1, area.y1)
         if below.width >= SMALLEST_PICTURE and below.height >= SMALLEST_PICTURE:
             self._draw_views(session, dispatch, ui, below)
 

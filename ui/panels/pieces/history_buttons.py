@@ -10,17 +10,26 @@ from ui.panels.state import Dispatch, UiState
 from ui.style.theme import Icon
 
 
-def draw_history(history: HistoryStatus, dispatch: Dispatch, ui: UiState, panel: str) -> None:
+def history_width() -> float:
+    """Of the two buttons without words, units."""
+    style = imgui.get_style()
+    glyphs = imgui.calc_text_size(Icon.UNDO).x + imgui.calc_text_size(Icon.LOOP).x
+    return glyphs + 4 * style.frame_padding.x + style.item_spacing.x
+
+
+def draw_history(
+    history: HistoryStatus, dispatch: Dispatch, ui: UiState, panel: str, *, has_words: bool = True
+) -> None:
     """Two buttons in a row. panel: In front of their names in ui.rects."""
     imgui.begin_disabled(not history.undo)
-    if imgui.button(f"{Icon.UNDO}  Undo"):
+    if imgui.button(f"{Icon.UNDO}  Undo" if has_words else f"{Icon.UNDO}##undo"):
         dispatch(Undo())
     ui.mark(f"{panel}.undo")
     imgui.end_disabled()
     imgui.set_item_tooltip(f"Undo: {history.undo or 'nothing'} (Ctrl+Z)")
     imgui.same_line()
     imgui.begin_disabled(not history.redo)
-    if imgui.button(f"{Icon.LOOP}  Redo"):
+    if imgui.button(f"{Icon.LOOP}  Redo" if has_words else f"{Icon.LOOP}##redo"):
         dispatch(Redo())
     ui.mark(f"{panel}.redo")
     imgui.end_disabled()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -141,13 +141,24 @@ def box_flags(width: float) -> int:
     return flags if width >= LEAST_WITH_ARROW else flags | int(imgui.ComboFlags_.no_arrow_button)
 
 
-def segment(label: str, is_on: bool, width: float = 0.0) -> bool:
-    """One of several buttons side by side, of which some are on. width: Units; that of its words when 0."""
+ROW_GAP = 4.0
+"""Between buttons that fill a row, units."""
+
+
+def row_widths(labels: Sequence[str]) -> list[float]:
+    """Of buttons that fill a row, units: each as wide as its words need, and an equal part of the rest."""
+    words = [imgui.calc_text_size(label).x for label in labels]
+    rest = imgui.get_content_region_avail().x - ROW_GAP * (len(labels) - 1) - sum(words)
+    return [width + rest / len(labels) for width in words]
+
+
+def segment(label: str, is_on: bool, width: float = 0.0, height: float = 0.0) -> bool:
+    """One of several buttons side by side, of which some are on. width, height: Units; those of its words when 0."""
     if is_on:
         imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
         imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY))
         imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
-    is_clicked = imgui.button(f"{label}##segment", ImVec2(width, 0))
+    is_clicked = imgui.button(f"{label}##segment", ImVec2(width, height))
     if is_on:
         imgui.pop_style_color(3)
     return is_clicked

@@ -12,33 +12,34 @@ from imgui_bundle import ImVec2, imgui
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
-    EDITS,
+    DRAWER,
+    EDIT,
     EXPORTS,
     HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
-    REGIONS,
     RESIDUALS,
-    SELECTION,
     TIMELINE,
     TRAINING,
     VIEWPORT,
 )
 
-SIDE = (236.0, 0.0)
+SIDE, DRAWN = (236.0, 0.0), (0.0, 96.0)
 SMALLEST = {
     CAPTURE: (176.0, 0.0),
     TRAINING: SIDE,
-    REGIONS: SIDE,
-    SELECTION: SIDE,
-    EDITS: SIDE,
+    EDIT: SIDE,
     RESIDUALS: SIDE,
     PATHS: (176.0, 0.0),
-    TIMELINE: (0.0, 140.0),
+    LOG: DRAWN,
+    DOCTOR: DRAWN,
+    EXPORTS: DRAWN,
+    HISTORY: DRAWN,
+    TIMELINE: (0.0, 116.0),
 }
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
-SMALLEST_PICTURE = (300.0, 150.0)
+SMALLEST_PICTURE = (336.0, 150.0)
 TALL_TIMELINE = 0.4
 """Share of the height that the timeline has in the layout for long captures."""
 WIDE_UNITS = 1240.0
@@ -46,7 +47,8 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture and camera path left, training, regions and residuals right, the others below, the picture in the rest.
+    """Capture and camera path left, training, editing and residuals right, the timeline below, the picture in the rest;
+    the drawer takes a part of the picture's room once it is opened.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -58,27 +60,24 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     internal.dock_builder_remove_node(dock_id)
     internal.dock_builder_add_node(dock_id, internal.DockNodeFlagsPrivate_.dock_space)
     internal.dock_builder_set_node_size(dock_id, size)
-    bottom_height = 244.0 if size.y >= 700.0 else 176.0
+    bottom_height, drawer_height = (220.0, 236.0) if size.y >= 700.0 else (152.0, 170.0)
     if name == "Long capture":
         bottom_height = max(bottom_height, size.y * TALL_TIMELINE)
     _, bottom, top = internal.dock_builder_split_node_py(dock_id, imgui.Dir.down, bottom_height / max(size.y, 1.0))
     _, left, rest = internal.dock_builder_split_node_py(top, imgui.Dir.left, left_width / max(size.x, 1.0))
     right_share = right_width / max(size.x - left_width, 1.0)
     _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
+    drawer_share = drawer_height / max(size.y - bottom_height, 1.0)
+    _, drawer, middle = internal.dock_builder_split_node_py(middle, imgui.Dir.down, drawer_share)
     for title, node_id in (
         (VIEWPORT, middle),
         (PATHS, left),
         (CAPTURE, left),
         (TRAINING, right),
-        (REGIONS, right),
-        (SELECTION, right),
-        (EDITS, right),
+        (EDIT, right),
         (RESIDUALS, right),
         (TIMELINE, bottom),
-        (LOG, bottom),
-        (DOCTOR, bottom),
-        (EXPORTS, bottom),
-        (HISTORY, bottom),
+        *((title, drawer) for title in DRAWER),
     ):
         internal.dock_builder_dock_window(title, node_id)
     node = internal.dock_builder_get_node(middle)  # it stays the central node: the one that gives way

@@ -18,7 +18,7 @@ from app.session.showing.look_commands import ActivateView
 from ui.panels.state import UiState
 
 SAVE_AFTER_S = 5.0
-LAYOUT_VERSION = "; panels of ClipGStream Studio, version 6\n"
+LAYOUT_VERSION = "; panels of ClipGStream Studio, version 7\n"
 """Comes first in the kept layout; another version has other panels and is not taken."""
 
 

@@ -37,8 +37,12 @@ class EditTool:
         asking: Purpose of the scene points being asked for; None while none are.
         points: Those that were given, scene units, [3] each.
         length_m: Known length between two points, m.
-        is_new: Whether the chosen edit was made just now, so that its details are brought into sight.
+        is_new: Whether the chosen edit was made or chosen by key just now: its details are brought into sight.
+        is_row_clicked: Whether it was chosen just now by a click on its row.
+        details_height: Of the details, as they were drawn last, units.
         renamed: The name that is being written; None while it is that of the edit.
+        wanted_section: The part of the panel that is to come into sight; empty for none.
+        used_sections: Parts of the panel whose tool is in use, as it was drawn last.
     """
 
     chosen: int | None = None
@@ -55,7 +59,11 @@ class EditTool:
     points: list[np.ndarray] = field(default_factory=list)
     length_m: float = 1.0
     is_new: bool = False
+    is_row_clicked: bool = False
+    details_height: float = 0.0
     renamed: str | None = None
+    wanted_section: str = ""
+    used_sections: set[str] = field(default_factory=set)
     _pressed_s: float = -1e9
 
     def follow(self, edits: tuple[Edit, ...]) -> None:

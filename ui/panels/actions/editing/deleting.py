@@ -8,7 +8,7 @@ from app.session.paths.path_commands import DeleteCameraKey
 from app.session.session_view import SessionView
 from ui.panels.actions.action import MARK, Action
 from ui.panels.editing.edit_subject import meant
-from ui.panels.editing.making import DELETE, make_edit
+from ui.panels.editing.panel.making import DELETE, make_edit
 from ui.panels.state import Dispatch, UiState
 
 

@@ -11,9 +11,9 @@ from engine.editing.actions import Hide
 from engine.editing.edit import Edit
 from ui.panels.actions.action import EDIT, Action, Run
 from ui.panels.editing.edit_subject import drawn_volume, invert_selection
-from ui.panels.editing.making import MAKINGS, Making, make_edit, mark_moving
-from ui.panels.editing.world_section import view_up
-from ui.panels.state import EDITS, HISTORY, Dispatch, UiState
+from ui.panels.editing.panel.making import MAKINGS, Making, make_edit, mark_moving
+from ui.panels.editing.panel.world import view_up
+from ui.panels.state import HISTORY, Dispatch, UiState
 from ui.viewport.editing.edit_tool import Asking
 
 
@@ -42,7 +42,7 @@ def _hold_in(choice: ScopeChoice) -> Run:
 def _next_scope(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     following = (SCOPE_CHOICES.index(ui.editing.scope) + 1) % len(SCOPE_CHOICES)
     ui.editing.scope = SCOPE_CHOICES[following]
-    ui.wanted_panel = EDITS
+    ui.show_edit()
 
 
 def _outside(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
@@ -57,7 +57,8 @@ def _choose_by(step: int) -> Run:
         ids: list[int | None] = [None, *(edit.edit_id for edit in session.edits.edits)]
         present = ids.index(ui.editing.chosen) if ui.editing.chosen in ids else 0
         ui.editing.choose(ids[(present + step) % len(ids)])
-        ui.wanted_panel = EDITS
+        ui.editing.is_new = True
+        ui.show_edit()
 
     return choose
 
@@ -89,6 +90,8 @@ def _up_of_view(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 def _ask(asking: Asking) -> Run:
     def ask(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.editing.ask(None if ui.editing.asking == asking else asking)
+        if ui.editing.asking is not None:
+            ui.show_edit("world")
 
     return ask
 

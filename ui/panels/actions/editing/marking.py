@@ -9,8 +9,8 @@ from app.session.session_view import SessionView
 from ui.panels.actions.action import MARK, Action, Run
 from ui.panels.actions.editing.camera_path import nudge_key
 from ui.panels.editing.mend_panel import is_asking_to_mend
-from ui.panels.regions import begin_choosing
-from ui.panels.state import REGIONS, Dispatch, UiState
+from ui.panels.editing.panel.marks import begin_choosing
+from ui.panels.state import Dispatch, UiState
 from ui.viewport.region_tool import GROWTH
 
 
@@ -53,7 +53,7 @@ def _shift_by(right: float, down: float, forward: float) -> Run:
 
 
 def _next_region(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    ui.wanted_panel = REGIONS
+    ui.show_edit("regions")
     ui.regions.highlight_next(len(session.regions.regions))
 
 

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from app.session.objects.object_commands import CorrectObject, FindObject, ObjectCommand, SelectObject
 from app.session.session_view import SessionView
 from ui.panels.actions.action import EDIT, SELECT, Action, Run
-from ui.panels.editing.objects_section import make_object
-from ui.panels.state import EDITS, Dispatch, UiState
+from ui.panels.editing.panel.objects import make_object
+from ui.panels.state import Dispatch, UiState
 
 
 def _make(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     make_object(session, dispatch, ui)
-    ui.wanted_panel = EDITS
+    ui.show_edit("objects")
 
 
 def _of_chosen(make: Callable[[int], ObjectCommand]) -> Run:
@@ -24,7 +24,7 @@ def _of_chosen(make: Callable[[int], ObjectCommand]) -> Run:
         if ui.objects.chosen is None and len(objects) == 1:
             ui.objects.choose(objects[0].object_id)
         if ui.objects.chosen is None:
-            ui.wanted_panel = EDITS  # where one can be chosen
+            ui.show_edit("objects")  # where one can be chosen
         else:
             dispatch(make(ui.objects.chosen))
 
@@ -81,6 +81,6 @@ ACTIONS = (
         lacks=lambda session: _no_objects(session) or _cannot_edit(session),
     ),
     Action("objects.select", "Select object", SELECT, _of_chosen(SelectObject), keys=("Alt+O",), lacks=_no_objects),
-    Action("objects.next", "Choose next object", SELECT, _next, keys=("Shift+O",), lacks=_no_objects),
+    Action("objects.next", "Choose next object", SELECT, _next, keys=("Alt+Shift+O",), lacks=_no_objects),
     Action("objects.outlines", "Outline all objects", SELECT, _outline, keys=("Ctrl+Shift+O",), lacks=_no_objects),
 )

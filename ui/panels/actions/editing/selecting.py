@@ -15,8 +15,8 @@ from app.session.editing.selection_commands import (
 from app.session.session_view import SessionView
 from ui.panels.actions.action import SELECT, Action, Run
 from ui.panels.editing.edit_subject import invert_selection
-from ui.panels.editing.selecting.select_panel import near_distance, select_moving
-from ui.panels.state import SELECTION, Dispatch, UiState
+from ui.panels.editing.panel.select_tools import all_moving, near_distance
+from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.select_tool import TOOL_WORDS, ToolKind
 
 
@@ -24,7 +24,8 @@ def _tool(kind: ToolKind) -> Run:
     def take(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         ui.regions.leave()
         ui.selecting.choose(kind)
-        ui.wanted_panel = SELECTION if ui.selecting.is_active else ui.wanted_panel
+        if ui.selecting.is_active:
+            ui.show_edit()
 
     return take
 
@@ -50,7 +51,7 @@ def _by_distance(make: Callable[[float], Any]) -> Run:
 
 
 def _moving(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    select_moving(dispatch, ui)
+    dispatch(all_moving(ui))
 
 
 def _toggle(name: str) -> Run:

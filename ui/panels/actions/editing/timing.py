@@ -19,7 +19,7 @@ from app.session.session_view import SessionView
 from engine.timing.cutting import Span, turned_segment
 from engine.timing.segment import MAX_SPEED, MIN_SPEED, Segment
 from ui.panels.actions.action import TAKE, Action, Run
-from ui.panels.editing.timing_section import changed_segment
+from ui.panels.editing.panel.timing import changed_segment
 from ui.panels.state import Dispatch, UiState
 
 SPEED_STEP = 2.0

@@ -11,12 +11,12 @@ from app.session.session_view import SessionView
 from app.session.showing.look_commands import LookThrough, SetContent, SetMode, ShowHeat, ShowViews, ToggleOverlay
 from ui.panels.actions.viewing.compare import cloud_overlay
 from ui.panels.actions.viewing.modes import mode_key
+from ui.panels.editing.panel.marks import begin_choosing
 from ui.panels.picture.toolbar.compare_box import compare_words, draw_compare_box
 from ui.panels.picture.toolbar.navigation import ViewPopup
 from ui.panels.picture.toolbar.row_fit import fit_row
 from ui.panels.pieces.slider import slider
 from ui.panels.pieces.widgets import MOST_BOX, box_flags, box_width, box_words, segment
-from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 from ui.style.theme import Icon

@@ -9,6 +9,7 @@ from app.session.editing.attributes import ATTRIBUTES, Attribute
 from app.session.editing.selection_commands import SelectByAttribute
 from app.session.session_view import SessionView
 from engine.editing.selection.ranges import ValueSpread
+from ui.panels.editing.panel.sections import section_header
 from ui.panels.pieces.widgets import primary_button, text_wrapped_dim
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.style import theme
@@ -21,6 +22,14 @@ GRAB_PX = 8.0
 
 def draw_attribute(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Choice of the attribute, its histogram, its range, and the button."""
+    if not section_header(ui, "attribute"):
+        return
+    imgui.begin_disabled(not session.selection.can_select)
+    _draw_choice(session, dispatch, ui)
+    imgui.end_disabled()
+
+
+def _draw_choice(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     tool = ui.selecting
     chosen = ATTRIBUTES[tool.attribute]
     imgui.set_next_item_width(-1)

@@ -9,34 +9,65 @@ from imgui_bundle import imgui
 from msgspec import structs
 
 from app.document.changes.edit_words import edit_title, scope_text, target_text
+from app.document.changes.fill_words import fill_text
 from app.document.changes.reach_words import reach_note
-from app.session.editing.edit_commands import ChangeEdit, RenameEdit
+from app.session.editing.edit_commands import ChangeEdit, FillBehind, RenameEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_of, chosen_scope, extent_text
 from app.session.session_view import SessionView
 from engine.camera.rotations import quats_of_turns, turns_of_quats
-from engine.editing.actions import Action, Quat, Transform, Vector
+from engine.editing.actions import Action, Delete, Hide, Quat, Transform, Vector
 from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Scope, Sphere, Target
 from engine.setting import Setting, settings_of
 from engine.text import one_line
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
-from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
+from ui.panels.pieces.widgets import elided, segment, text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 
 FAR = 1e6
 """Largest coordinate that fields take, scene units."""
 LEAST_SIZE = 1e-6
+TITLE_MARGIN = 24.0
+"""Of the line beside a title, units."""
 SPEED_SHARE = 2e-3
 """Of a drag over a field, per unit: as a share of the size of the changed thing."""
 
 
-def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
-    """Fields of the chosen edit."""
-    _draw_name(session, dispatch, ui, edit)
-    _draw_scope(session, dispatch, ui, edit)
-    is_clicked, is_inverted = imgui.checkbox("Acts on everything else", edit.is_inverted)
-    ui.mark("edits.inverted")
-    if is_clicked:
-        dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
+def draw_chosen(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    """The chosen edit in numbers. Where one was just made, what it does comes into sight; a row of the stack below that
+    was clicked stays under the pointer."""
+    edit, top = session.edits.edit(ui.editing.chosen), imgui.get_cursor_pos_y()
+    end_of_action = top if edit is None else _draw_fields(session, dispatch, ui, edit)
+    height, tool, scroll = imgui.get_cursor_pos_y() - top, ui.editing, imgui.get_scroll_y()
+    grown, tool.details_height = height - tool.details_height, height
+    wanted = scroll
+    if tool.is_new and end_of_action > scroll + imgui.get_window_height():
+        wanted = min(top, end_of_action - imgui.get_window_height())
+    elif tool.is_row_clicked:
+        wanted = scroll + grown if edit is None else min(scroll + grown, top)
+    tool.is_new = tool.is_row_clicked = False
+    if wanted != scroll:
+        imgui.set_scroll_y(wanted)
+        ui.redraw_within(0.0)  # the panel scrolls in the next frame
+
+
+def _draw_fields(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> float:
+    """Where the fields of its action end, from the top of the panel, units."""
+    title = one_line(edit_title(edit, session.edits.objects))
+    imgui.separator_text(elided(title, imgui.get_content_region_avail().x - 2 * TITLE_MARGIN))
+    imgui.begin_disabled(not session.edits.can_edit)
+    imgui.push_id(edit.edit_id)
+    # First what the edit does, for which it was just made, then the rest.
+    action = _draw_action(session, ui, edit.action)
+    if action is not None:
+        dispatch(ChangeEdit(structs.replace(edit, action=action), ui.editing.gesture, "change"))
+    end_of_action = imgui.get_cursor_pos_y()
+    _draw_rest(session, dispatch, ui, edit)
+    imgui.pop_id()
+    imgui.end_disabled()
+    return end_of_action
+
+
+def _draw_rest(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
     both = isinstance(edit.action, Transform) and isinstance(edit.target, Box | Sphere)
     if both:
         imgui.text_disabled("Handles")
@@ -48,9 +79,32 @@ def draw_details(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
     target = _draw_target(session, ui, edit.target)
     if target is not None:
         dispatch(ChangeEdit(structs.replace(edit, target=target), ui.editing.gesture, "change"))
-    action = _draw_action(session, ui, edit.action)
-    if action is not None:
-        dispatch(ChangeEdit(structs.replace(edit, action=action), ui.editing.gesture, "change"))
+    _draw_scope(session, dispatch, ui, edit)
+    is_clicked, is_inverted = imgui.checkbox("Acts on everything else", edit.is_inverted)
+    ui.mark("edits.inverted")
+    if is_clicked:
+        dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
+    _draw_name(session, dispatch, ui, edit)
+    if isinstance(edit.action, Delete | Hide):
+        _draw_fill(session, dispatch, ui, edit)
+
+
+def _draw_fill(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
+    """The fill of an edit that takes something away: its figures, and the way to make it or to remove it."""
+    imgui.begin_disabled(not session.edits.can_edit)
+    if imgui.button("Fill behind"):
+        dispatch(FillBehind(edit.edit_id))
+    imgui.end_disabled()
+    ui.mark("edits.fill")
+    imgui.set_item_tooltip("Continue the room behind it where no camera saw it, and take traces of it away")
+    if edit.fill is None:
+        return
+    imgui.same_line()
+    if imgui.button("Remove fill"):
+        dispatch(ChangeEdit(structs.replace(edit, fill=None), verb="remove fill"))
+    ui.mark("edits.remove_fill")
+    text = fill_text(edit)
+    text_wrapped_dim(f"{text[0].upper()}{text[1:]}. The view mode Birth clip shows where.")
 
 
 def _draw_name(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:

@@ -13,6 +13,7 @@ from engine.timing.cutting import turned_segment
 from engine.timing.segment import MAX_FROZEN, MAX_REPEATS, MAX_SPEED, MIN_SPEED, Segment
 from engine.timing.timing import TakeTiming
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
+from ui.panels.editing.panel.sections import section_header
 from ui.panels.pieces.widgets import elided, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 from ui.style.theme import Icon
@@ -23,10 +24,8 @@ EASES = {"linear": "evenly", "smooth": "eased"}
 
 
 def draw_timing(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """Folded away until it is wanted."""
-    is_open = imgui.collapsing_header("Timing")
-    ui.mark("edits.timing")
-    if not is_open:
+    """Folded away until it is wanted, or a segment is chosen."""
+    if not section_header(ui, "timing", is_used=ui.timeline.segment is not None):
         return
     timeline, segments = session.timeline, session.edits.timing
     if not segments:

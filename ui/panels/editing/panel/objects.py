@@ -24,6 +24,7 @@ from engine.editing.edit import MAX_NAME_CHARACTERS
 from engine.editing.reach import unsearched
 from engine.editing.scene_object import SceneObject
 from engine.text import one_line
+from ui.panels.editing.panel.sections import section_header
 from ui.panels.pieces.widgets import draw_job_bar, elided, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
@@ -37,10 +38,8 @@ def draw_objects(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The list, the chosen one below it, and how far a search is."""
     objects = session.edits.objects
     ui.objects.follow(objects)
-    if not imgui.collapsing_header("Objects", imgui.TreeNodeFlags_.default_open):
-        ui.mark("objects.header")
+    if not section_header(ui, "objects", is_used=bool(objects), is_open_first=True):
         return
-    ui.mark("objects.header")
     imgui.begin_disabled(not (session.edits.can_edit and session.selection.n_gaussians))
     if imgui.button("New object from selection", ImVec2(-1, 0)):
         make_object(session, dispatch, ui)

@@ -10,6 +10,8 @@ from app.session.editing.selection_commands import SelectVolume
 from app.session.session_view import SessionView
 from engine.editing.actions import Vector
 from engine.editing.edit import Box, Sphere
+from ui.panels.editing.edit_subject import drawn_volume
+from ui.panels.editing.panel.sections import section_header
 from ui.panels.pieces.widgets import primary_button
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.select_tool import standing_quat
@@ -21,6 +23,14 @@ LARGEST = 1e6
 
 def draw_volume_numbers(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Numbers of the volume, and the commands that use them."""
+    if not section_header(ui, "volume", is_used=drawn_volume(ui) is not None):
+        return
+    imgui.begin_disabled(not session.selection.can_select)
+    _draw_numbers(session, dispatch, ui)
+    imgui.end_disabled()
+
+
+def _draw_numbers(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     tool, width = ui.selecting, (imgui.get_content_region_avail().x - 4) / 2
     for name in ("box", "sphere"):
         if name == "sphere":

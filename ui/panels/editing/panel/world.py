@@ -12,6 +12,7 @@ from app.session.editing.edit_commands import SetScale, SetUp
 from app.session.session_view import SessionView
 from engine.editing.actions import Vector
 from ui.panels.editing.fields import label_before
+from ui.panels.editing.panel.sections import section_header
 from ui.panels.pieces.widgets import text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 
@@ -26,10 +27,8 @@ def view_up(view: OrbitView) -> Vector:
 
 def draw_world(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """Folded away until it is wanted."""
-    if not imgui.collapsing_header("World: up and scale"):
-        ui.mark("edits.world")
+    if not section_header(ui, "world", is_used=ui.editing.asking is not None):
         return
-    ui.mark("edits.world")
     imgui.begin_disabled(not session.edits.can_edit)
     world, tool = session.edits.world, ui.editing
     label_before("Up is")

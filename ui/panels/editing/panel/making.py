@@ -17,9 +17,10 @@ from app.session.session_view import SessionView
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
 from engine.editing.edit import Box, Edit, Everything, ObjectTarget, Scope, Sphere, Target
 from engine.editing.reach import Reach, reach_of, reach_of_edit
-from ui.panels.editing.edit_subject import Meant, bounds_of, invert_selection, meant, pivot_of
-from ui.panels.pieces.widgets import segment, text_warning, text_wrapped_dim
-from ui.panels.state import EDITS, Dispatch, UiState
+from ui.panels.editing.edit_subject import Meant, bounds_of, meant, pivot_of
+from ui.panels.editing.panel.sections import TALL
+from ui.panels.pieces.widgets import ROW_GAP, elided, row_widths, segment, text_warning
+from ui.panels.state import Dispatch, UiState
 
 FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """First values of new edits."""
@@ -81,7 +82,7 @@ MAKINGS = (
     _making(Hold, lambda session, volume: Hold(session.timeline.frame_index)),
     _making(Smooth, lambda *where: Smooth(FIRST_SIGMA_FRAMES), is_for_everything=True),
 )
-PER_ROW = 3
+PER_ROW, WARNING_WIDTH = 3, 30.0
 
 
 def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Making) -> None:
@@ -95,7 +96,7 @@ def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Mak
     before = {edit.edit_id for edit in session.edits.edits}
     scope = chosen_scope(ui.editing.scope, session.timeline)
     dispatch(AddEdit(making.action(session, volume), target, scope, making.is_inverted != is_outside))
-    ui.wanted_panel = EDITS
+    ui.show_edit()
     added = [edit.edit_id for edit in session.edits.edits if edit.edit_id not in before]
     if added:
         ui.editing.choose(added[-1])
@@ -126,38 +127,38 @@ def _reach(session: SessionView, volume: Meant, scope: Scope, *, is_inverted: bo
     return reach_of(picked, scope, session.edits.clips, is_inverted=is_inverted)
 
 
+def _draw_note(note: str) -> None:
+    """As a whole; in a low panel in one line, as the buttons below have to be in sight."""
+    if imgui.get_window_height() >= TALL:
+        text_warning(note)
+        return
+    text_warning(elided(note, imgui.get_content_region_avail().x - WARNING_WIDTH))
+    imgui.set_item_tooltip(note.replace("%", "%%"))
+
+
 def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """The target of new edits, where they are to hold, and a button for each kind."""
+    """Where new edits are to hold, and a button for each kind."""
     volume, words = meant(session, ui)
-    if words:
-        is_outside = isinstance(volume, Box | Sphere) and ui.editing.is_outside
-        imgui.text(f"Acts on {'all but ' if is_outside else ''}{words}")
-        if session.selection.words and volume is None:
-            text_wrapped_dim(session.selection.words)
-    else:
-        text_wrapped_dim("Select Gaussians, or draw a box or sphere; colours and light can be changed everywhere.")
-    if isinstance(volume, Box | Sphere):
-        if imgui.checkbox("Everything outside", ui.editing.is_outside)[0]:
-            invert_selection(dispatch, ui)
-        ui.mark("edits.outside")
-    imgui.text_disabled("Scope")
-    width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / PER_ROW
-    for place, choice in enumerate(SCOPE_CHOICES):
-        if place % PER_ROW:
-            imgui.same_line()
-        if segment(SCOPE_WORDS[choice], ui.editing.scope == choice, width):
-            ui.editing.scope = choice
-        ui.mark(f"edits.scope {choice}")
     scope = chosen_scope(ui.editing.scope, session.timeline)
-    text_wrapped_dim(extent_text(scope, session.timeline))
+    imgui.separator_text(f"Scope: {extent_text(scope, session.timeline)}")
+    for start in range(0, len(SCOPE_CHOICES), PER_ROW):
+        row = SCOPE_CHOICES[start : start + PER_ROW]
+        widths = row_widths([SCOPE_WORDS[choice] for choice in row])
+        for place, choice in enumerate(row):
+            if place:
+                imgui.same_line(0, ROW_GAP)
+            if segment(SCOPE_WORDS[choice], ui.editing.scope == choice, widths[place]):
+                ui.editing.scope = choice
+            ui.mark(f"edits.scope {choice}")
     reach = _reach(session, volume, scope)
     if note := reach_note(reach, scope):
-        text_warning(note)
+        _draw_note(note)
         ui.mark("edits.note")
     imgui.begin_disabled(not session.edits.can_edit)
+    width = (imgui.get_content_region_avail().x - (PER_ROW - 1) * ROW_GAP) / PER_ROW
     for place, making in enumerate(MAKINGS):
         if place % PER_ROW:
-            imgui.same_line()
+            imgui.same_line(0, ROW_GAP)
         imgui.begin_disabled(reach.is_nowhere or not (words or making.is_for_everything))
         label = "Crop" if making.name == "isolate" and isinstance(volume, Box | Sphere) else making.label
         if imgui.button(f"{label}##{making.name}", ImVec2(width, 0)):

@@ -1,4 +1,4 @@
-"""The panel of edits: making new ones, the stack with the last one on top, the chosen one in numbers, and the world."""
+"""The stack of edits in the panel, the last one on top."""
 
 from __future__ import annotations
 
@@ -12,14 +12,9 @@ from app.session.session_view import SessionView
 from engine.editing.actions import Delete
 from engine.editing.edit import Edit
 from engine.text import one_line
-from ui.panels.editing.details import draw_details
-from ui.panels.editing.making import draw_making
-from ui.panels.editing.objects_section import draw_objects
-from ui.panels.editing.timing_section import draw_timing
-from ui.panels.editing.world_section import draw_world
+from ui.panels.editing.panel.sections import reach_section
 from ui.panels.pieces.copying import draw_copy_entries
-from ui.panels.pieces.history_buttons import draw_history
-from ui.panels.pieces.widgets import elided, text_warning, text_wrapped_dim
+from ui.panels.pieces.widgets import elided, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 from ui.style.theme import Icon
@@ -29,38 +24,10 @@ LEAST_ROWS, MOST_ROWS = 1.2, 6.2
 PAYLOAD = "edit"
 
 
-def draw_edits(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """Everything that is edited without training."""
-    if session.capture is None:
-        text_wrapped_dim("Edits appear here once a capture is open.")
-        return
-    ui.editing.follow(session.edits.edits)
-    if session.edits.why_not:
-        text_warning(session.edits.why_not)
-    draw_objects(session, dispatch, ui)
-    if imgui.collapsing_header("New edit", imgui.TreeNodeFlags_.default_open):
-        draw_making(session, dispatch, ui)
-    imgui.separator()
-    _draw_stack(session, dispatch, ui)
-    imgui.begin_disabled(not session.edits.can_edit)
-    edit = session.edits.edit(ui.editing.chosen)
-    if edit is not None:
-        imgui.separator()
-        imgui.push_id(edit.edit_id)
-        draw_details(session, dispatch, ui, edit)
-        if ui.editing.is_new and imgui.get_cursor_pos_y() > imgui.get_scroll_y() + imgui.get_window_height():
-            imgui.set_scroll_here_y(1.0)  # the last field, which else would be below the panel
-        ui.editing.is_new = False
-        imgui.pop_id()
-    imgui.end_disabled()
-    imgui.separator()
-    draw_history(session.history, dispatch, ui, "edits")
-    draw_world(session, dispatch, ui)
-    draw_timing(session, dispatch, ui)
-
-
-def _draw_stack(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+def draw_stack(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """One row per edit, the last one on top: it acts on what the others have left."""
+    imgui.separator_text("Edits")
+    reach_section(ui, "edits")
     edits = session.edits.edits
     if not edits:
         text_wrapped_dim("No edits: everything is shown as it was trained.")
@@ -95,6 +62,7 @@ def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit,
     flags = imgui.SelectableFlags_.allow_overlap
     if imgui.selectable("##edit", is_chosen, flags, ImVec2(0, ROW_HEIGHT))[0]:
         ui.editing.choose(None if is_chosen else edit.edit_id)
+        ui.editing.is_row_clicked = True
     ui.mark(f"edits.row{edit.edit_id}")
     _drag_row(session, dispatch, edit, position)
     if imgui.begin_popup_context_item("menu"):

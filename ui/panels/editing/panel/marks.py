@@ -1,4 +1,4 @@
-"""The regions panel: the sphere that is being chosen, and the list of marks, static or moving."""
+"""Marks for training, under a header of the panel: the sphere that is being chosen, and the list, static or moving."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from app.session.editing.mark_commands import RemoveRegion
 from app.session.session_view import SessionView
 from app.status import RegionsStatus
 from engine.gate.regions import GateRegion
-from ui.panels.pieces.history_buttons import draw_history
+from ui.panels.editing.panel.sections import section_header
 from ui.panels.pieces.widgets import chip, primary_button, text_right, text_warning, text_wrapped_dim
-from ui.panels.state import REGIONS, Dispatch, Rect, UiState
+from ui.panels.state import Dispatch, Rect, UiState
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.palette import ThemeColors
@@ -20,12 +20,12 @@ from ui.style.theme import Icon
 from ui.viewport.region_tool import REGION_WORDS
 
 MEANINGS = {"static": "Nothing inside moves or changes.", "dynamic": "Everything inside may move or change."}
-ROW_HEIGHT = 44.0
+ROW_HEIGHT, MOST_ROWS = 44.0, 4.5
 
 
 def begin_choosing(session: SessionView, ui: UiState) -> None:
     """Start choosing a sphere, or switch what it means; where nothing can be marked the panel says why."""
-    ui.wanted_panel = REGIONS
+    ui.show_edit("regions")
     if session.regions.can_mark:
         ui.selecting.kind, ui.selecting.points = None, []
         ui.regions.begin()
@@ -33,11 +33,10 @@ def begin_choosing(session: SessionView, ui: UiState) -> None:
         ui.regions.leave()
 
 
-def draw_regions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
-    """Choosing, the list, the way back, and in which clips all of it takes effect."""
+def draw_marks(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    """Choosing, the list, and in which clips all of it takes effect."""
     status = session.regions
-    if session.capture is None:
-        text_wrapped_dim("Marked regions appear here once a capture is open.")
+    if not section_header(ui, "regions", is_used=ui.regions.is_active):
         return
     if ui.regions.is_active:
         _draw_choice(ui)
@@ -52,8 +51,6 @@ def draw_regions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
             text_warning(status.why_not)
     imgui.spacing()
     _draw_list(status, dispatch, ui)
-    draw_history(session.history, dispatch, ui, "regions")
-    imgui.spacing()
     if status.effect:
         text_wrapped_dim(status.effect)
         if "again" in status.effect:
@@ -114,8 +111,8 @@ def _draw_list(status: RegionsStatus, dispatch: Dispatch, ui: UiState) -> None:
     if len(status.regions) > 1:
         imgui.same_line()
         imgui.text_disabled("later ones overrule earlier ones")
-    rows_px = len(status.regions) * (ROW_HEIGHT + imgui.get_style().item_spacing.y) + 8
-    height = min(max(imgui.get_content_region_avail().y - 130, 2 * ROW_HEIGHT), rows_px)
+    n_rows = min(len(status.regions), MOST_ROWS)
+    height = n_rows * (ROW_HEIGHT + imgui.get_style().item_spacing.y) + 8
     removed = None
     if imgui.begin_child("list", ImVec2(0, height)):
         for index, region in enumerate(status.regions):

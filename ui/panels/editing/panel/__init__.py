@@ -1,0 +1,1 @@
+"""The panel Edit, section by section."""
