@@ -27,8 +27,8 @@ Section = Callable[[SessionView, Dispatch, UiState], None]
 SECTIONS: tuple[Section, ...] = (
     draw_select_tools,
     draw_making,
-    draw_chosen,
     draw_objects,
+    draw_chosen,
     draw_stack,
     draw_timing,
     draw_attribute,

@@ -38,7 +38,7 @@ def draw_objects(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The list, the chosen one below it, and how far a search is."""
     objects = session.edits.objects
     ui.objects.follow(objects)
-    if not section_header(ui, "objects", is_used=bool(objects), is_open_first=True):
+    if not section_header(ui, "objects", is_used=bool(objects)):
         return
     imgui.begin_disabled(not (session.edits.can_edit and session.selection.n_gaussians))
     if imgui.button("New object from selection", ImVec2(-1, 0)):
