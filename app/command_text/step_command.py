@@ -21,12 +21,15 @@ from engine.editing.edit import (
     Box,
     Edit,
     Everything,
+    KeyedVolume,
     ObjectTarget,
     Picked,
     PickedRows,
+    Prism,
     Scope,
     Sphere,
     Target,
+    VolumeKey,
 )
 from engine.setting import settings_of
 from engine.storage.json_files import json_text
@@ -186,7 +189,7 @@ def _target_arguments(target: Target, *, in_full: bool) -> tuple[tuple[str, ...]
             return ("--turned-box", *_numbers((*center, *half_sizes, *quat))), ""
         case Sphere(center=center, radius=radius):
             return ("--sphere", *_numbers((*center, radius))), ""
-        case Picked() | ObjectTarget():
+        case Picked() | ObjectTarget() | Prism() | KeyedVolume():
             return ("--target", "-"), json_text(to_builtins(target))
 
 
@@ -222,4 +225,7 @@ def _names(values: Sequence[Any]) -> tuple[str, ...]:
     found = [type(value).__name__ for value in values]
     if any(isinstance(value, Picked) for value in values):
         found.append(PickedRows.__name__)
+    for value in values:
+        if isinstance(value, KeyedVolume):
+            found += [VolumeKey.__name__, type(value.keys[0].volume).__name__]
     return tuple(found)

@@ -19,7 +19,20 @@ from app.scripting.functions import apply_edit, change, export, open_project, re
 from app.scripting.scripted_project import ScriptedProject
 from engine.editing import actions
 from engine.editing.actions import *  # noqa: F403 - every action
-from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, ObjectTarget, Picked, PickedRows, Scope, Sphere
+from engine.editing.edit import (
+    EVERYWHERE,
+    Box,
+    Edit,
+    Everything,
+    KeyedVolume,
+    ObjectTarget,
+    Picked,
+    PickedRows,
+    Prism,
+    Scope,
+    Sphere,
+    VolumeKey,
+)
 from engine.errors import CaptureError, DiskError, EngineError, PreparationError, ProjectError, TrainingError
 
 __all__ = [
@@ -30,11 +43,13 @@ __all__ = [
     "Edit",
     "EngineError",
     "Everything",
+    "KeyedVolume",
     "ObjectTarget",
     "Picked",
     "PickedFrames",
     "PickedRows",
     "PreparationError",
+    "Prism",
     "ProjectDocument",
     "ProjectError",
     "Scope",
@@ -42,6 +57,7 @@ __all__ = [
     "Sphere",
     "TrainingError",
     "Turntable",
+    "VolumeKey",
     "apply_edit",
     "change",
     "export",

@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from msgspec import structs
+
 from app.document.changes import object_changes
+from app.document.changes.edit_changes import edit_with
 from app.document.changes.object_changes import object_named
 from app.document.history import Event, ObjectFound
 from app.document.project_document import ProjectDocument
+from app.session.editing.edit_commands import ChangeEdit
+from app.session.editing.edits import changed as edit_change
 from app.session.objects.object_commands import (
     ObjectCommand,
     RecolourObject,
@@ -19,7 +24,7 @@ from app.session.objects.object_commands import (
 )
 from app.session.objects.objects import changed
 from engine.editing.actions import Vector
-from engine.editing.edit import ObjectTarget, Picked
+from engine.editing.edit import Edit, ObjectTarget, Picked
 from engine.editing.scene_object import ObjectSeed, SceneObject
 from engine.errors import ProjectError
 
@@ -198,6 +203,29 @@ class ScriptedObjects:
     def remove_object(self, name: str | int) -> None:
         """Remove an object, and the edits that act on it. Raises ProjectError."""
         self._change_object(RemoveObject(self._named(name).object_id))
+
+    def follow_object(self, name: str | int, edit_id: int, *, on_progress: TellSearch | None = None) -> Edit:
+        """Let an edit act on a volume that goes along with an object: of the kind it has, else a box. One step.
+
+        Args:
+            on_progress: Receives the share of frames that were looked at; its exceptions end it, and nothing changes.
+        Returns:
+            The edit, with a KeyedVolume as its target.
+        Raises:
+            ProjectError: There is no such object or edit, the object was found nowhere, or what `change` raises.
+        """
+        from app.objects.following import follow_in_project
+
+        def report(n_done: int, n_all: int) -> None:
+            if on_progress is not None:
+                on_progress(n_done / max(n_all, 1))
+
+        one, edit = self._named(name), edit_with(self.document, edit_id)
+        keyed = follow_in_project(self._project, self.capture, one, edit.target, report)
+        command = ChangeEdit(structs.replace(edit, target=keyed), verb=f"follow {one.name}")
+        change = edit_change(self.document, command)
+        self.change(change.document, change.name)
+        return edit_with(self.document, edit_id)
 
     # ---------------------------------------------------------------- pieces
 

@@ -43,7 +43,7 @@ from app.training.service import Launch
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.editing.actions import Action
-from engine.editing.edit import EVERYWHERE, Box, Edit, Everything, Picked, Scope, Sphere, Target
+from engine.editing.edit import EVERYWHERE, Edit, Everything, Picked, Scope, Target, Volume
 from engine.editing.reach import ClipAnchors, Reach, reach_of_edit
 from engine.errors import EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
@@ -354,7 +354,7 @@ class ScriptedProject(ScriptedObjects):
         where: str = "",
         *,
         frame_index: int = 0,
-        volume: Box | Sphere | None = None,
+        volume: Volume | None = None,
         is_inverted: bool = False,
     ) -> Picked:
         """Pick Gaussians of a frame, as edits have left them: a target for an edit, in all frames.

@@ -14,7 +14,7 @@ from app.session.editing.finding import Ground, found_by, selection_after
 from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.editing.selection_commands import How, SelectAll, SelectByAttribute, SelectionCommand, SelectVolume
 from engine.backends.table import process_backend
-from engine.editing.edit import Box, Picked, Sphere
+from engine.editing.edit import Picked, Volume
 from engine.editing.effects import EditStack
 from engine.errors import ProjectError
 from engine.text import shown
@@ -32,7 +32,7 @@ def select(
     edits: EditStack,
     frame_index: int,
     *,
-    volume: Box | Sphere | None = None,
+    volume: Volume | None = None,
     where: str = "",
     is_inverted: bool = False,
 ) -> Picked:

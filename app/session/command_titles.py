@@ -13,6 +13,7 @@ from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
+from app.session.objects.follow_commands import FollowObject
 from app.session.objects.object_commands import ObjectCommand
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import AskStartOver, StartOver
@@ -60,6 +61,7 @@ TITLES: dict[type, str] = {
     Redo: "The step cannot be redone",
     GoToStep: "That step of the history cannot be reached",
     **dict.fromkeys(get_args(EditCommand), "The edit cannot be made"),
+    FollowObject: "The volume cannot follow the object",
     **dict.fromkeys(get_args(ObjectCommand), "The object cannot be changed"),
     **dict.fromkeys((*TIME_EDITS.values(), ChangeSegment), "The take cannot be changed"),
     FillBehind: "Nothing can be filled",

@@ -18,6 +18,7 @@ from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.export_commands import ExportCommand
 from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
+from app.session.objects.follow_commands import FollowCommand
 from app.session.objects.object_commands import ObjectCommand
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import ProjectCommand
@@ -58,6 +59,7 @@ Command = (
     | SelectionCommand
     | EditCommand
     | ObjectCommand
+    | FollowCommand
     | TimeEdit
     | FillBehind
     | MarkCommand

@@ -52,6 +52,8 @@ from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import ProjectMending
 from app.session.notices import Notices
+from app.session.objects.follow_commands import FollowCommand
+from app.session.objects.following import Following
 from app.session.objects.object_commands import ObjectCommand
 from app.session.objects.objects import Objects
 from app.session.part import SessionParts
@@ -183,6 +185,7 @@ class Session(SessionFace):
                 is_training=self._is_training,
             )
         )
+        self.following = parts.add(Following(self.document, jobs, self.notices))
         self.command_texts = CommandTexts(
             lambda: self.project, live.is_finished, lambda: None if self.capture is None else self.capture.n_frames
         )
@@ -233,10 +236,12 @@ class Session(SessionFace):
                 self.showing.obey(command)
             case _ if isinstance(command, EditCommand):
                 self.editing.apply(command)
-            case _ if isinstance(command, ObjectCommand):
-                self.objects.apply(command)
             case FillBehind():
                 self.filling.apply(command)
+            case _ if isinstance(command, ObjectCommand):
+                self.objects.apply(command)
+            case _ if isinstance(command, FollowCommand):
+                self.following.apply(command)
             case _ if isinstance(command, HistoryCommand):
                 with self.camera_paths.showing_change():
                     self.editing.go(command.n_steps)

@@ -19,6 +19,7 @@ from typing import Self
 
 import numpy as np
 
+from engine.camera.key_curves import along_curve, tangents_of
 from engine.camera.projection import camera_center
 from engine.camera.rotations import (
     inverse_quats,
@@ -38,8 +39,6 @@ MAX_DISTANCE = 1e12
 """No camera stands farther from the origin, scene units."""
 MIN_FOV_RAD, MAX_FOV_RAD = 1e-3, 3.14
 _RIGID_TOLERANCE = 1e-5
-_MAX_SLOPE = 2.0
-"""A tangent is at most so many times as fast as the slower of the two pieces at its key; up to 3 nothing turns back."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,27 +211,13 @@ class _Curves:
         if len(used) < 2:
             return
         between = quat_product(inverse_quats(self._quats[:-1]), self._quats[1:])
-        self._turn_rates = self._tangents(turns_of_quats(between), is_loop)
-        self._speeds = self._tangents(np.diff(self._centers, axis=0), is_loop)
-        self._log_fov_rates = self._tangents(np.diff(self._log_fovs, axis=0), is_loop)
+        self._turn_rates = tangents_of(turns_of_quats(between), self._lengths, is_loop=is_loop)
+        self._speeds = tangents_of(np.diff(self._centers, axis=0), self._lengths, is_loop=is_loop)
+        self._log_fov_rates = tangents_of(np.diff(self._log_fovs, axis=0), self._lengths, is_loop=is_loop)
         first = self._turn_rates[:-1] * self._lengths[:, None] / 3.0
         last = self._turn_rates[1:] * self._lengths[:, None] / 3.0
         middle = quat_product(quats_of_turns(-first), quat_product(between, quats_of_turns(-last)))
         self._turns = np.stack([first, turns_of_quats(middle), last])  # [3, P, 3]
-
-    def _tangents(self, steps: np.ndarray, is_loop: bool) -> np.ndarray:
-        """Change per frame at every key, from the steps [P, D] between them. [P + 1, D]"""
-        slopes = steps / self._lengths[:, None]
-        if is_loop:
-            slopes = np.concatenate([slopes[-1:], slopes])
-            lengths = np.concatenate([self._lengths[-1:], self._lengths])
-            inner = _inner_tangents(slopes, lengths)
-            return np.concatenate([inner, inner[:1]])
-        inner = _inner_tangents(slopes, self._lengths)
-        if not len(inner):
-            return np.concatenate([slopes, slopes])
-        start, stop = 1.5 * slopes[0] - 0.5 * inner[0], 1.5 * slopes[-1] - 0.5 * inner[-1]  # nothing bends at the ends
-        return np.concatenate([start[None], inner, stop[None]])
 
     def center(self, piece: np.ndarray, share: np.ndarray) -> np.ndarray:
         """Positions, scene units. [F, 3]"""
@@ -245,11 +230,7 @@ class _Curves:
     def _hermite(self, values: np.ndarray, rates: str, piece: np.ndarray, share: np.ndarray) -> np.ndarray:
         if len(values) < 2:
             return np.repeat(values, len(piece), axis=0)
-        tangents = getattr(self, rates)
-        t, length = share[:, None], self._lengths[piece][:, None]
-        step = values[piece + 1] - values[piece]
-        rest = length * ((1 - t) * tangents[piece] - t * tangents[piece + 1]) + (2 * t - 1) * step
-        return values[piece] + t * step + t * (1 - t) * rest
+        return along_curve(values, getattr(self, rates), self._lengths, piece, share)
 
     def rotation(self, piece: np.ndarray, share: np.ndarray) -> np.ndarray:
         """World to camera: the cubic Bezier curve on the sphere of rotations with the turn rates of its ends, written
@@ -262,24 +243,6 @@ class _Curves:
         for weight, turn in zip(weights, self._turns, strict=True):
             turned = quat_product(turned, quats_of_turns(weight[:, None] * turn[piece]))
         return matrices_of(inverse_quats(turned))
-
-
-def _inner_tangents(slopes: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Tangents between neighbouring pieces with these slopes [P, D] and lengths [P]. [P - 1, D]
-
-    That of the parabola through three keys, without what would lead back along one of the pieces, and never much
-    faster than the slower of them.
-    """
-    before, after = slopes[:-1], slopes[1:]
-    h0, h1 = lengths[:-1, None], lengths[1:, None]
-    tangents = (h1 * before + h0 * after) / (h0 + h1)
-    for slope in (before, after):
-        square = np.maximum((slope * slope).sum(-1, keepdims=True), 1e-300)
-        back = np.minimum((tangents * slope).sum(-1, keepdims=True), 0.0)
-        tangents = tangents - back / square * slope
-    slower = np.minimum(np.linalg.norm(before, axis=-1), np.linalg.norm(after, axis=-1))[:, None]
-    speed = np.maximum(np.linalg.norm(tangents, axis=-1), 1e-300)[:, None]
-    return tangents * np.minimum(1.0, _MAX_SLOPE * slower / speed)
 
 
 def _is_rigid(matrix: np.ndarray) -> bool:

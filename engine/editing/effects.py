@@ -9,14 +9,36 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import msgspec
 from msgspec import Struct
 
 from engine.editing.actions import Action
-from engine.editing.edit import Edit, ObjectTarget, Picked, TargetOfMoment, edits_at
+from engine.editing.edit import Edit, KeyedVolume, ObjectTarget, Picked, Target, TargetOfMoment, edits_at
 from engine.editing.fills.fill import fits
-from engine.editing.scene_object import Objects, at_moment, object_of
+from engine.editing.scene_object import Objects, object_of
+from engine.editing.volumes.keyed_volume import volume_at
+
+MAX_MOMENTS = 4096
+"""Moments whose effects an EditStack keeps."""
+
+
+def at_moment(target: Target, frame: float, objects: Objects) -> TargetOfMoment:
+    """A target as something that can be looked up in the clip of a moment: Gaussians, a volume in its place then.
+
+    Args:
+        frame: In frames of the capture, between frames too.
+        objects: Of the document.
+    """
+    match target:
+        case ObjectTarget():
+            found = object_of(target, objects)
+            return Picked(()) if found is None else found.picked(frame)
+        case KeyedVolume():
+            return volume_at(target, frame)
+        case _:
+            return target
 
 
 class Effect(Struct, frozen=True):
@@ -65,7 +87,7 @@ class Effects:
         effects = tuple(effects)
         if not effects:
             return NO_EFFECTS
-        return cls(effects, hashlib.sha256(_ENCODER.encode(effects)).hexdigest()[:20])
+        return cls(effects, hashlib.sha256(b"".join(map(_digest, effects))).hexdigest()[:20])
 
 
 def _effects_of(edit: Edit, frame: float, objects: Objects) -> Iterator[Effect]:
@@ -81,6 +103,11 @@ def _effects_of(edit: Edit, frame: float, objects: Objects) -> Iterator[Effect]:
 
 NO_EFFECTS = Effects()
 _ENCODER = msgspec.msgpack.Encoder()
+
+
+@lru_cache(maxsize=256)  # while a volume moves, all others stay the same, and some are large
+def _digest(effect: Effect) -> bytes:
+    return hashlib.sha256(_ENCODER.encode(effect)).digest()
 
 
 class EditStack:
@@ -99,12 +126,24 @@ class EditStack:
             found = object_of(edit.target, objects) if isinstance(edit.target, ObjectTarget) else None
             bounds |= set() if found is None or not edit.is_on else found.bounds
         self._bounds = sorted(bounds - {0})
-        self._effects: dict[int, Effects] = {}
+        keyed = [edit.target for edit in edits if edit.is_on and isinstance(edit.target, KeyedVolume)]
+        self._moving = (
+            min((target.keys[0].frame for target in keyed), default=0.0),
+            max((target.keys[-1].frame for target in keyed), default=0.0),
+        )
+        self._effects: dict[tuple[int, float], Effects] = {}
 
     def at(self, frame: float) -> Effects:
-        """The effects that hold at a moment, in frames of the capture; between two frames that of the one before."""
+        """The effects that hold at a moment, in frames of the capture; scopes between two frames are those of the one
+        before, volumes move between them, too."""
+        frame = max(frame, 0.0)
         place = bisect_right(self._bounds, math.floor(frame))
-        if place not in self._effects:
-            first = self._bounds[place - 1] if place else 0
-            self._effects[place] = Effects.of(edits_at(self.edits, first), first, self.objects)
-        return self._effects[place]
+        first, last = self._moving
+        moment = place, min(max(frame, first), last)  # before and after it, nothing moves
+        found = self._effects.get(moment)
+        if found is None:
+            if len(self._effects) >= MAX_MOMENTS:
+                self._effects.clear()
+            found = Effects.of(edits_at(self.edits, frame), frame, self.objects)
+            self._effects[moment] = found
+        return found

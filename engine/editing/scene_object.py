@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from engine.editing.actions import Vector
-from engine.editing.edit import MAX_NAME_CHARACTERS, ObjectTarget, Picked, PickedRows, Target, TargetOfMoment
+from engine.editing.edit import MAX_NAME_CHARACTERS, ObjectTarget, Picked, PickedRows
 
 _Count = Annotated[int, Meta(ge=0, lt=2**31)]
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -122,16 +122,3 @@ NO_OBJECTS: Objects = ()
 def object_of(target: ObjectTarget, objects: Objects) -> SceneObject | None:
     """The object that a target means; None where it was removed."""
     return next((one for one in objects if one.object_id == target.object_id), None)
-
-
-def at_moment(target: Target, frame: float, objects: Objects) -> TargetOfMoment:
-    """A target as something that can be looked up in the clip of a moment: Gaussians, a volume in its place then.
-
-    Args:
-        frame: In frames of the capture, between frames too.
-        objects: Of the document.
-    """
-    if isinstance(target, ObjectTarget):
-        found = object_of(target, objects)
-        return Picked(()) if found is None else found.picked(frame)
-    return target

@@ -10,8 +10,10 @@ from torch import Tensor
 
 from engine.camera.rotations import matrices_of
 from engine.editing.clip_rows import ClipRows
-from engine.editing.edit import Box, Everything, Picked, Sphere
+from engine.editing.edit import Box, Everything, Picked, Prism, Sphere, Volume
 from engine.editing.effects import Effect
+from engine.editing.volumes.prisms import in_prism
+from engine.model.host_array import host_array
 
 MAX_TABLES = 64
 """Sets of picked Gaussians that are kept unpacked, a byte per Gaussian of the clip."""
@@ -34,7 +36,7 @@ class TargetFinder:
         """Whether an effect acts on each of some Gaussians. [N] bool
 
         The target is inverted, not whether it must come from the reference clip. Picks from before a clip was
-        trained anew stand for nothing, inverted or not. A centre that is not finite lies in no box and no sphere.
+        trained anew stand for nothing, inverted or not. A centre that is not finite lies in no volume.
 
         Args:
             means: Their centres now. [N, 3]
@@ -43,7 +45,7 @@ class TargetFinder:
             ProjectError: Picked numbers are damaged.
         """
         match effect.target:
-            case Everything() | Box() | Sphere():
+            case Everything() | Box() | Sphere() | Prism():
                 is_meant = is_within(effect.target, means)
             case Picked():
                 table = self._table(effect.target)
@@ -67,7 +69,7 @@ class TargetFinder:
         return table
 
 
-def is_within(target: Everything | Box | Sphere, means: Tensor) -> Tensor:
+def is_within(target: Everything | Volume, means: Tensor) -> Tensor:
     """Which centres [N, 3] lie in a volume. [N] bool"""
     match target:
         case Everything():
@@ -77,6 +79,8 @@ def is_within(target: Everything | Box | Sphere, means: Tensor) -> Tensor:
         case Sphere():
             away = means.double() - means.new_tensor(target.center, dtype=torch.float64)
             return (away * away).sum(1) <= target.radius**2
+        case Prism():
+            return torch.from_numpy(in_prism(target, host_array(means))).to(means.device)
 
 
 def _is_in_box(means: Tensor, box: Box) -> Tensor:

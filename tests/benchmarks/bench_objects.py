@@ -31,7 +31,8 @@ from app.project.opening.project_access import open_project
 from engine.editing.clip_rows import named_sets
 from engine.editing.edit import ObjectTarget, Picked
 from engine.editing.edited_clip import EditedClip
-from engine.editing.scene_object import SceneObject, at_moment
+from engine.editing.effects import at_moment
+from engine.editing.scene_object import SceneObject
 from engine.editing.selection.seen_from import SeenFrom
 from engine.objects.finding import SearchedClip, find_object
 from engine.storage.json_files import json_text

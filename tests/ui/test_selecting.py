@@ -14,7 +14,7 @@ from app.session.session import Session
 from app.session.showing.look_commands import ShowViews, ToggleOverlay
 from app.session.training.train_commands import TrainNextClip
 from engine.camera.rotations import matrices_of
-from engine.editing.edit import Box, Sphere
+from engine.editing.edit import Box, Prism, Sphere
 from engine.editing.selection.volumes import in_volume
 from tests.app.fakes import write_capture
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -215,6 +215,22 @@ def test_a_sphere_begins_on_what_is_seen_and_grows_with_the_drag(window: Pilot) 
     depth = (view.world_to_camera() @ [*sphere.center, 1.0])[2]
     focal = view.K(round(area.width), round(area.height))[0, 0]
     assert sphere.radius * focal / depth == pytest.approx(45.0, abs=1.0)
+
+
+def test_a_prism_goes_around_what_the_loop_goes_around_and_has_handles(window: Pilot) -> None:
+    gaussians, at = window.session.shown_gaussians(), pixels(window)
+    x, y = window.rects["viewport.rendered"].center
+    window.key(key.R, modifiers=(ALT, SHIFT))
+    angles = np.linspace(0.0, 2.0 * np.pi, 120)
+    drag_along(window, np.stack([x + 80 * np.cos(angles), y + 80 * np.sin(angles)], axis=1))
+    found, prism = chosen(window), tool(window).volume
+    assert isinstance(prism, Prism)
+    np.testing.assert_array_equal(found, in_volume(prism, gaussians.means))
+    is_under = np.hypot(*(at - [x, y]).T) < 79
+    assert not (found & (np.hypot(*(at - [x, y]).T) > 81)).any()
+    assert found[is_under].mean() > 0.9, "but for the nearest and farthest"
+    window.draw(2)
+    assert "handle.face +z" in window.rects
 
 
 def test_a_box_stands_where_it_is_drawn_and_the_wheel_changes_its_height(window: Pilot) -> None:

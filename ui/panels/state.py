@@ -36,9 +36,9 @@ PANELS = (CAPTURE, TRAINING, EDIT, RESIDUALS, PATHS, HISTORY, TIMELINE, LOG, DOC
 DRAWER = (LOG, DOCTOR, EXPORTS, HISTORY)
 """Titles of panels that share a drawer between picture and timeline, and are there once they are asked for."""
 EDIT_SECTIONS = {
+    "objects": "Objects",
     "selection": "Selection",
     "options": "Selection options",
-    "objects": "Objects",
     "edits": "Edits",
     "timing": "Timing",
     "attribute": "Select by attribute",

@@ -133,6 +133,7 @@ TOOL_ICONS: dict[str, str] = {
     "brush": "\uf1fc",
     "box": "\uf1b2",
     "sphere": "\uf111",
+    "prism": "\uf61f",
     "flood": "\uf575",
 }
 """Glyphs of the tools that select."""

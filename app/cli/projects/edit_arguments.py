@@ -11,7 +11,8 @@ from msgspec import Struct
 
 from app.scripting.scripted_project import ScriptedProject
 from engine.editing.actions import ACTIONS, Action, Quat, Vector
-from engine.editing.edit import Box, Everything, ObjectTarget, Picked, Scope, Sphere, Target
+from engine.editing.edit import Box, Everything, KeyedVolume, ObjectTarget, Picked, Prism, Scope, Sphere, Target
+from engine.editing.volumes.keyed_volume import volume_at
 from engine.errors import ProjectError
 from engine.storage.json_files import JsonError, parse_json
 from engine.storage.typed_json import EntryError, to_type
@@ -145,7 +146,9 @@ def chosen_target(options: argparse.Namespace, project: ScriptedProject, read_te
         return target
     if isinstance(target, Picked | ObjectTarget):
         given = "--target" if options.object is None else "--object"
-        raise ProjectError("--where goes with a box, a sphere or everything.", hint=f"Leave {given} out.")
+        raise ProjectError("--where goes with a box, a sphere, a prism or everything.", hint=f"Leave {given} out.")
+    if isinstance(target, KeyedVolume):
+        target = volume_at(target, options.at or 0)
     volume = None if isinstance(target, Everything) else target
     return project.select(options.where, frame_index=options.at or 0, volume=volume)
 
@@ -215,7 +218,9 @@ def _given_actions(options: argparse.Namespace) -> list[tuple[type[Action], dict
 
 def _action(kind: type[Action], given: dict[str, list[Any]], target: Target) -> Action:
     values: dict[str, Any] = {}
-    if kind.centered and isinstance(target, Box | Sphere):
+    if isinstance(target, KeyedVolume):
+        target = target.keys[0].volume
+    if kind.centered and isinstance(target, Box | Sphere | Prism):
         values[kind.centered] = target.center
     said: dict[str, str] = {}
     for name, words in given.items():

@@ -21,6 +21,8 @@ from app.cli.projects.edit_arguments import (
 )
 from app.cli.projects.edit_timing import add_time_arguments, change_time, given_time_options, take_lines
 from app.cli.projects.edit_verbs import VERBS, add_verb_arguments, check_words, take_verb
+from app.cli.projects.follow_verb import FOLLOW, MEANING, add_follow_arguments, take_follow
+from app.cli.terminal.progress import ProgressLine
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.edit_words import edit_title
 from app.document.changes.fill_words import fill_text
@@ -42,7 +44,8 @@ _OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "fill", "put
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream edit`."""
     command.add_argument("project", type=path_argument, help="project folder")
-    verbs = {**{name: verb.meaning for name, verb in VERBS.items()}, **{name: "see below" for name in TIME_EDITS}}
+    verbs = {name: verb.meaning for name, verb in VERBS.items()} | {FOLLOW: MEANING}
+    verbs |= {name: "see below" for name in TIME_EDITS}
     command.add_argument(
         "words",
         nargs="*",
@@ -50,6 +53,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help=f"what to do: {'; '.join(f'{name}: {words}' for name, words in verbs.items())}",
     )
     add_verb_arguments(command)
+    add_follow_arguments(command)
     add_edit_arguments(command)
     add_time_arguments(command)
     stack = command.add_argument_group("the stack and the history")
@@ -84,10 +88,15 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream edit: make the requested changes, then list the stack. Returns the exit code."""
     verb = options.words[0] if options.words else ""
-    if verb in TIME_EDITS:
+    if take_follow(options):
+        check_words(options, FOLLOW, "")
+    elif verb in TIME_EDITS:
         return _run_verb(options, launch)
-    take_verb(options)
-    chosen = [name for name in _OF_STACK if getattr(options, name) is not None]
+    else:
+        take_verb(options)
+    chosen = [name for name in (*_OF_STACK, "follow") if getattr(options, name) is not None]
+    if len(chosen) > 1:
+        raise ProjectError(f"--{chosen[0].replace('_', '-')} is given with follow.", hint="Leave one of them out.")
     is_new = not chosen and has_action(options)
     _check_options(options, chosen[0] if chosen else "")
     with open_scripted(options.project, read_only=not (chosen or is_new), launch=launch) as project:
@@ -169,10 +178,19 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
         fill_verb.run(options, project, _say)
     elif options.put is not None:
         _put(options.put, project)
+    elif options.follow is not None:
+        _follow(options, project)
     elif options.apply_permanently:
         project.apply_permanently()
     else:
         _take_steps(options, project)
+
+
+def _follow(options: argparse.Namespace, project: ScriptedProject) -> None:
+    line = ProgressLine(is_quiet=options.json)
+    name, edit_id = options.follow
+    project.follow_object(name, edit_id, on_progress=lambda done: line.update(f"Following {name}", done))
+    line.finish()
 
 
 def _take_steps(options: argparse.Namespace, project: ScriptedProject) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 
+from app.cli.projects.follow_verb import FOLLOW
 from app.document.changes.timing_changes import TIME_EDITS
 from engine.editing.actions import ACTIONS, Action
 from engine.errors import ProjectError
@@ -74,7 +75,7 @@ def take_verb(options: argparse.Namespace) -> None:
     name, *rest = options.words or [""]
     verb = VERBS.get(name)
     if name and verb is None:
-        raise ProjectError(f"'{name}' is not a verb.", hint=f"Verbs are {', '.join((*VERBS, *TIME_EDITS))}.")
+        raise ProjectError(f"'{name}' is not a verb.", hint=f"Verbs are {', '.join((*VERBS, FOLLOW, *TIME_EDITS))}.")
     if rest:
         raise ProjectError(f"{name} is followed by '{rest[0]}', which is not an option of it.")
     check_words(options, name or "an edit without a verb", "" if verb is None else verb.word)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from engine.capture.clip import Clip
 from engine.editing.actions import Action
-from engine.editing.edit import Box, Edit, Everything, ObjectTarget, Picked, Scope, Sphere, Target
+from engine.editing.edit import Box, Edit, Everything, KeyedVolume, ObjectTarget, Picked, Prism, Scope, Sphere, Target
 from engine.editing.picks import n_rows
 from engine.editing.scene_object import NO_OBJECTS, Objects, object_of
 from engine.text import one_line
@@ -60,6 +60,10 @@ def _shape_text(target: Target, objects: Objects) -> str:
             return "box " + " × ".join(f"{2 * half:.3g}" for half in half_sizes)
         case Sphere(radius=radius):
             return f"sphere of radius {radius:.3g}"
+        case Prism(half_sizes=half_sizes):
+            return "prism " + " × ".join(f"{2 * half:.3g}" for half in half_sizes)
+        case KeyedVolume(keys=keys):
+            return f"{_shape_text(keys[0].volume, objects)} with {len(keys)} key{'' if len(keys) == 1 else 's'}"
         case ObjectTarget():
             found = object_of(target, objects)
             return f"object {target.object_id}, which was removed" if found is None else one_line(found.name)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from engine.editing.actions import Vector
-from engine.editing.edit import Box, Sphere
+from engine.editing.edit import Volume
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
 
@@ -70,9 +70,9 @@ class SelectInPicture:
 
 @dataclass(frozen=True, slots=True)
 class SelectVolume:
-    """Select Gaussians in a box or a sphere."""
+    """Select Gaussians in a box, a sphere or a prism."""
 
-    volume: Box | Sphere
+    volume: Volume
     how: How = field(default_factory=How)
     is_by_extent: bool = False
 

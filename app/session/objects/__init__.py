@@ -1,1 +1,1 @@
-"""Objects of the open project: made, corrected and looked for."""
+"""Objects of the open project: made, corrected, looked for, and followed by volumes."""

@@ -52,11 +52,11 @@ def with_new_numbers(edits: tuple[Edit, ...], sets: Mapping[tuple[str, str], Ren
 def _renumbered(edit: Edit, sets: Mapping[tuple[str, str], Renumbered]) -> Edit:
     now, fill = edit, edit.fill
     if isinstance(edit.target, Picked):
-        added = _added(edit.target.sets, sets)
-        now = replace(edit, target=Picked((*edit.target.sets, *added))) if added else edit
+        picked = _with_new_sets(edit.target.sets, sets)
+        now = edit if picked is edit.target.sets else replace(edit, target=Picked(picked))
     if fill is None or not fits(edit):
         return now
-    traces = (*fill.traces, *_added(fill.traces, sets))
+    traces = _with_new_sets(fill.traces, sets)
     return replace(now, fill=replace(fill, made_for=fill_key(now), traces=traces))
 
 
@@ -69,18 +69,21 @@ def objects_with_new_numbers(objects: Objects, sets: Mapping[tuple[str, str], Re
 def _renumbered_object(
     one: SceneObject, sets: Mapping[tuple[str, str], Renumbered], origins: Mapping[str, str]
 ) -> SceneObject:
-    def both(picked: tuple[PickedRows, ...]) -> tuple[PickedRows, ...]:
-        return (*picked, *_added(picked, sets))
-
-    seeds = tuple(replace(seed, added=both(seed.added), removed=both(seed.removed)) for seed in one.seeds)
+    seeds = tuple(
+        replace(seed, added=_with_new_sets(seed.added, sets), removed=_with_new_sets(seed.removed, sets))
+        for seed in one.seeds
+    )
     clips = tuple(
-        replace(clip, sets=both(clip.sets), origin=origins.get(clip.origin, clip.origin)) for clip in one.clips
+        replace(clip, sets=_with_new_sets(clip.sets, sets), origin=origins.get(clip.origin, clip.origin))
+        for clip in one.clips
     )
     return replace(one, seeds=seeds, clips=clips)
 
 
-def _added(picked: tuple[PickedRows, ...], sets: Mapping[tuple[str, str], Renumbered]) -> list[PickedRows]:
-    """The same picks in sets that have other numbers now."""
+def _with_new_sets(
+    picked: tuple[PickedRows, ...], sets: Mapping[tuple[str, str], Renumbered]
+) -> tuple[PickedRows, ...]:
+    """Picks, and the same under their new numbers; the same object where there are none."""
     known = {(one.origin, one.role) for one in picked}
     added: list[PickedRows] = []
     for one in picked:
@@ -89,4 +92,4 @@ def _added(picked: tuple[PickedRows, ...], sets: Mapping[tuple[str, str], Renumb
             added.append(
                 PickedRows(one.clip_index, now.origin, one.role, pack_rows(now.numbers(unpack_rows(one.rows))))
             )
-    return added
+    return (*picked, *added) if added else picked

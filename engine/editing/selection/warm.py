@@ -11,6 +11,7 @@ from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.shapes import brush_mask, lasso_mask
 from engine.editing.selection.share import selected_share
 from engine.editing.selection.visibility import seen_rows
+from engine.editing.volumes.prisms import in_outline
 
 
 def warm_up() -> None:
@@ -23,5 +24,6 @@ def warm_up() -> None:
     under_mask(projected, brush_mask(np.array([[4.0, 4.0]]), 2.0, view.size), is_by_extent=True)
     seen_rows(projected, np.full(2, 0.9))
     selected_share(projected, np.full(2, 0.9), np.ones(2, np.bool_))
+    in_outline(means[:, :2], ((-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)))
     grown(means, np.array([True, False]), 0.5)
     flooded(means, means, 0, 0.5, 1.0)

@@ -9,7 +9,18 @@ import numpy as np
 from hypothesis import strategies as st
 
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere
+from engine.editing.edit import (
+    Box,
+    Edit,
+    Everything,
+    KeyedVolume,
+    Picked,
+    PickedRows,
+    Prism,
+    Scope,
+    Sphere,
+    VolumeKey,
+)
 from engine.editing.picks import pack_rows
 
 HARD_NAMES = (
@@ -46,6 +57,19 @@ _TARGETS: Any = st.one_of(
     st.just(Everything()),
     st.builds(Sphere, _VECTORS, _POSITIVE),
     st.builds(Box, _VECTORS, st.tuples(_POSITIVE, _POSITIVE, _POSITIVE), _QUATS),
+    st.lists(st.integers(-4, 400), min_size=1, max_size=4, unique=True).map(
+        lambda frames: KeyedVolume(
+            tuple(VolumeKey(frame / 4, Box((frame / 7, 0.0, 1e-7), (1.0, 2.0, 3.0))) for frame in sorted(frames))
+        )
+    ),
+    st.builds(
+        Prism,
+        _VECTORS,
+        st.tuples(_POSITIVE, _POSITIVE, _POSITIVE),
+        st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=3, max_size=9).map(tuple),
+        _QUATS,
+        st.none() | st.floats(1.01, 100.0),
+    ),
     st.lists(st.builds(PickedRows, st.integers(0, 9), st.just("abc"), st.just("static"), _ROWS), max_size=2).map(
         lambda sets: Picked(tuple(sets))
     ),

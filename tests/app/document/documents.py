@@ -18,7 +18,7 @@ from app.document.storing.stored_document import plain_document
 from engine.camera.path_presets import turntable
 from engine.capture.exclusions import Exclusions, PaintedMask, Stroke
 from engine.editing.actions import Delete, Expose, Hide, Recolor, Transform
-from engine.editing.edit import Box, Edit, Picked, PickedRows, Scope, Sphere
+from engine.editing.edit import Box, Edit, KeyedVolume, Picked, PickedRows, Prism, Scope, Sphere, VolumeKey
 from engine.editing.picks import pack_rows
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from engine.gate.regions import sphere_region
@@ -106,12 +106,15 @@ def _clips(rng: random.Random) -> tuple[ObjectInClip, ...]:
 
 def _edited(edit: Edit, rng: random.Random) -> Edit:
     first = rng.randrange(20)
+    prism = Prism((rng.random(), 0.0, 0.0), (1.0, 2.0, rng.random() + 0.1), ((-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)))
+    other = structs.replace(prism, center=(0.0, rng.random(), 1.0))
     change = rng.choice(
         (
             {"is_on": not edit.is_on},
             {"name": f"name {rng.random()}"},
             {"scope": Scope(first, first + 5, rng.random() < 0.5)},
             {"target": Box((rng.random(), -0.0, 0.0), (1, 2, 3)), "is_inverted": True},
+            {"target": KeyedVolume((VolumeKey(first, prism), VolumeKey(first + 0.5, other)))},
             {"action": rng.choice((Hide(), Recolor(gains=(1.0, rng.random(), 1.0)), Transform((1, 0, 0))))},
         )
     )

@@ -26,6 +26,7 @@ from app.export.jobs.video import VideoJob
 from app.export.picked_frames import PickedFrames
 from app.export.player_job import PlayerJob
 from app.export.player_job import run as export_player
+from app.export.scene_frames import SceneFrames
 from app.export.video.render import render_video
 from app.playback.frame_decoder import ShownFrame
 from app.playback.playback import Playback
@@ -34,9 +35,11 @@ from app.project.opening.opened_project import opened_project
 from app.project.opening.project_access import open_project
 from app.training.service import ShownState
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Edit, Everything, Picked, PickedRows, Scope, Sphere, Target
+from engine.editing.edit import Edit, Everything, KeyedVolume, Picked, PickedRows, Scope, Sphere, Target, VolumeKey
+from engine.editing.effects import EditStack
 from engine.editing.picks import pack_rows
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
+from engine.editing.volumes.keyed_volume import volume_at
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS
 from tests.app.stored_project import copy_stored
@@ -135,6 +138,24 @@ def test_the_window_shows_it_in_its_frames_alone(name: str, opened: TrainedProje
         assert len(rows) == len(births) == len(one.gaussians)
     give(opened)  # taken back
     assert [shown(playback, timeline, frame).gaussians for frame in FRAMES] == [one.gaussians for one in before]
+
+
+def test_a_volume_with_keys_is_in_its_place_in_each_frame_and_between_frames(
+    opened: TrainedProject, playback: Playback
+) -> None:
+    keys = tuple(VolumeKey(frame, Sphere((x, 0.0, 0.5), 0.7)) for frame, x in ((1.0, -0.6), (4.0, 0.6)))
+    keyed = Edit(1, "", KeyedVolume(keys), Delete())
+    give(opened, keyed)
+    timeline, scene = Timeline(opened.clips), SceneFrames(opened)
+    for moment in (*map(float, FRAMES), 2.25, 2.5, 3.75):
+        resting = Edit(1, "", volume_at(keyed.target, moment), Delete())  # type: ignore[arg-type]
+        truth = SceneFrames(opened, edits=EditStack((resting,))).gaussians(moment).means.numpy()
+        np.testing.assert_array_equal(scene.gaussians(moment).means.numpy(), truth)
+        if moment in FRAMES:
+            np.testing.assert_array_equal(shown(playback, timeline, int(moment)).gaussians.means, truth)
+    trained = SceneFrames(opened, edits=EditStack()).gaussians(2.0)
+    assert 0 < len(scene.gaussians(2.0)) < len(trained)
+    give(opened)
 
 
 def test_anchors_without_gaussians_are_not_shown(opened: TrainedProject, playback: Playback) -> None:

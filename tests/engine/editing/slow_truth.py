@@ -10,7 +10,7 @@ import numpy as np
 from engine.camera.rotations import matrices_of, quat_product
 from engine.capture.clip import Clip
 from engine.editing.actions import Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Everything, Picked, Sphere, TargetOfMoment
+from engine.editing.edit import Box, Everything, Picked, Prism, Sphere, TargetOfMoment
 from engine.editing.effects import Effect
 from engine.editing.picks import unpack_rows
 from engine.images.srgb import encoded_of, linear_of
@@ -91,6 +91,8 @@ class SlowTruth:
             case Sphere():
                 away = one.mean - np.array(target.center)
                 return bool(math.sqrt(away @ away) <= target.radius) if np.isfinite(away).all() else False
+            case Prism():
+                return is_in_prism(target, one.mean)
             case Picked():
                 clips = {clip_index for _, clip_index in self.names.values()}
                 here = [known for known in target.sets if known.clip_index in clips]
@@ -142,6 +144,19 @@ class SlowTruth:
             if found:
                 result[name] = _mean(found, sum(weights))
         return result
+
+
+def is_in_prism(prism: Prism, mean: np.ndarray) -> bool:
+    """Whether the outline, cut at the depth of a point, goes around it: by the angle that it sweeps."""
+    x, y, z = matrices_of(np.array(prism.quat)).T @ (mean - np.array(prism.center))
+    if not np.isfinite(mean).all() or abs(z) > prism.half_sizes[2]:
+        return False
+    width = 1.0 if prism.apex is None else 1.0 + z / (prism.apex * prism.half_sizes[2])
+    corners = [(u * prism.half_sizes[0] * width - x, v * prism.half_sizes[1] * width - y) for u, v in prism.outline]
+    swept = 0.0
+    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+        swept += math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+    return abs(swept) > math.pi
 
 
 def _is_finite(one: One) -> bool:

@@ -9,7 +9,19 @@ import pytest
 import torch
 
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Edit, Everything, Picked, PickedRows, Scope, Sphere, TargetOfMoment
+from engine.editing.edit import (
+    Box,
+    Edit,
+    Everything,
+    KeyedVolume,
+    Picked,
+    PickedRows,
+    Prism,
+    Scope,
+    Sphere,
+    TargetOfMoment,
+    VolumeKey,
+)
 from engine.editing.edited_clip import EditedGaussians
 from engine.editing.effects import NO_EFFECTS, EditStack, Effect, Effects
 from engine.editing.picks import pack_rows
@@ -23,6 +35,9 @@ TARGETS: dict[str, TargetOfMoment] = {
     "everything": Everything(),
     "box": Box((0.5, 0.4, 0.5), (0.3, 0.5, 0.25), TURN),
     "sphere": Sphere((0.5, 0.5, 0.5), 0.45),
+    "prism": Prism(
+        (0.5, 0.45, 0.5), (0.4, 0.35, 0.45), ((-1.0, -0.6), (0.9, -1.0), (0.1, 0.1), (1.0, 0.8), (-0.7, 1.0)), TURN, 2.5
+    ),
     "picked": Picked(
         (
             PickedRows(0, REFERENCE, "static", pack_rows(np.arange(3, 30, 2))),
@@ -220,3 +235,35 @@ def test_names_and_numbers_of_edits_are_no_part_of_what_they_do() -> None:
     assert EditStack((one,)).at(5) == EditStack((other,)).at(5)
     assert hash(EditStack((one,)).at(5)) == hash(EditStack((other,)).at(5))
     assert EditStack((one,)).at(5) != EditStack((one, other)).at(5)
+
+
+@pytest.mark.parametrize("action", ["delete", "move", "recolor", "hold", "smooth"])
+def test_a_keyed_volume_acts_where_it_is_at_each_moment(action: str) -> None:
+    model = make_clip()
+    clip, truth = edited(model), truth_of(model)
+    keys = (
+        VolumeKey(11.0, Box((0.2, 0.4, 0.5), (0.2, 0.5, 0.6), TURN)),
+        VolumeKey(12.0, Box((0.6, 0.5, 0.4), (0.3, 0.4, 0.6))),
+        VolumeKey(13.5, Box((0.8, 0.2, 0.5), (0.5, 0.3, 0.2), TURN)),
+    )
+    stack = EditStack((Edit(1, "", KeyedVolume(keys), ACTIONS[action]), Edit(2, "", TARGETS["sphere"], Expose(1.0))))
+    found = set()
+    for frame in (10.0, 11.0, 11.3, 11.9, 12.0, 12.75, 13.5, 14.0):
+        effects, clip_time = stack.at(frame), (frame - CLIP.start) / CLIP.clip_length
+        target = effects.all[0].target
+        assert isinstance(target, Box)
+        found.add(target)
+        assert_same(clip.decode(clip_time, effects), truth.at(effects.all, clip_time))
+    assert len(found) == 6, "it rests before its first key and after its last one, and moves in between"
+
+
+def test_a_stack_with_a_keyed_volume_is_exact_between_frames_and_knows_when_nothing_moves() -> None:
+    keys = tuple(VolumeKey(frame, Sphere((frame, 0.0, 0.0), 1.0)) for frame in (2.0, 6.0))
+    edits = (Edit(1, "", KeyedVolume(keys), Delete(), Scope(1, 9)), Edit(2, "", Everything(), Expose(1.0), Scope(4, 5)))
+    stack = EditStack(edits)
+    assert [len(stack.at(frame).all) for frame in (0.9, 1.0, 4.0, 4.9, 5.0, 8.9, 9.0)] == [0, 1, 2, 2, 1, 1, 0]
+    assert stack.at(3.25).all[0].target == Sphere((3.25, 0.0, 0.0), 1.0)
+    assert stack.at(1.0) is stack.at(1.5) is stack.at(2.0)
+    assert stack.at(6.0) == stack.at(8.0) != stack.at(5.5)
+    off = EditStack((Edit(1, "", KeyedVolume(keys), Delete(), is_on=False), edits[1]))
+    assert off.at(4.0) is off.at(4.5)

@@ -33,7 +33,6 @@ from engine.editing.picks import pack_rows
 from engine.editing.reach import ClipAnchors
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.panels.state import EDIT
 
 ALT = key.LALT
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -65,7 +64,7 @@ def put(pilot: Pilot, *found: SceneObject) -> None:
 def panel(open_pilot) -> Pilot:
     """With the panel in front and an object."""
     pilot = open_pilot(size=(1280, 1100))
-    pilot.studio.frame.ui.wanted_panel = EDIT
+    pilot.studio.frame.ui.show_edit("objects")
     pilot.draw(4)
     put(pilot, *objects())
     return pilot

@@ -10,7 +10,8 @@ import pytest
 
 from engine.camera.rotations import matrices_of
 from engine.editing.actions import Transform
-from engine.editing.edit import Box, Sphere
+from engine.editing.edit import Box, Prism, Sphere
+from engine.editing.volumes.prisms import widths_at
 from ui.viewport.editing.handles import (
     Handle,
     HandleView,
@@ -28,7 +29,8 @@ TURN = (math.cos(0.3), 0.0, 0.0, math.sin(0.3))
 BOX = Box((0.1, -0.2, 0.3), (0.5, 0.4, 0.3), TURN)
 SPHERE = Sphere((0.1, -0.2, 0.3), 0.5)
 MOVEMENT = Transform((0.3, 0.0, 0.0), TURN, 1.5, (0.0, 0.1, 0.0))
-THINGS: tuple[Thing, ...] = (BOX, SPHERE, MOVEMENT)
+PRISM = Prism(BOX.center, BOX.half_sizes, ((-1.0, -0.5), (1.0, -1.0), (0.2, 1.0)), TURN, 3.0)
+THINGS: tuple[Thing, ...] = (BOX, SPHERE, PRISM, MOVEMENT)
 
 
 def lens(yaw: float = 0.4, pitch: float = 0.3, distance: float = 4.0) -> HandleView:
@@ -85,6 +87,31 @@ def test_a_face_follows_the_pointer_and_the_opposite_one_stays(axis: int, sign: 
     assert isinstance(whole, Box)
     assert whole.half_sizes == BOX.half_sizes
     np.testing.assert_allclose(middle_of(whole), middle_of(BOX) + sign * 0.2 * direction, atol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_side_of_a_prism_follows_the_pointer_and_its_ends_cut_the_same_pyramid(axis: int, sign: int) -> None:
+    view, handle = lens(), Handle("face", axis, sign)
+    direction = matrices_of(np.array(TURN))[:, axis]
+    start, wanted = place_of(PRISM, handle, view), place_of(PRISM, handle, view) + sign * 0.2 * direction
+    after = dragged(PRISM, handle, view, at(view, start), at(view, wanted))
+    assert isinstance(after, Prism)
+    np.testing.assert_allclose(place_of(after, handle, view), wanted, atol=1e-9)
+    assert (after.outline, after.quat) == (PRISM.outline, PRISM.quat)
+    if axis == 2:  # the end that stays is as large as before
+        other = np.array([-float(sign)])
+        before_size = PRISM.half_sizes[0] * widths_at(PRISM, other)
+        assert after.half_sizes[0] * widths_at(after, other) == pytest.approx(before_size)
+    else:
+        assert after.apex == PRISM.apex
+
+
+def test_an_end_of_a_prism_never_goes_beyond_where_its_sides_meet() -> None:
+    view, handle = lens(), Handle("face", 2, -1)
+    start = place_of(PRISM, handle, view)
+    far = at(view, start - 0.8 * matrices_of(np.array(TURN))[:, 2])
+    assert dragged(PRISM, handle, view, at(view, start), far) == PRISM
 
 
 def test_a_face_never_goes_through_the_other_one() -> None:

@@ -9,7 +9,17 @@ from app.session.session_view import SessionView
 from ui.panels.actions import copying, doctor, exporting, playing, time, window
 from ui.panels.actions.action import Action
 from ui.panels.actions.clips import clips, mending, training
-from ui.panels.actions.editing import camera_path, deleting, editing, excluding, marking, objects, selecting, timing
+from ui.panels.actions.editing import (
+    camera_path,
+    deleting,
+    editing,
+    excluding,
+    marking,
+    objects,
+    selecting,
+    timing,
+    volume_keys,
+)
 from ui.panels.actions.viewing import bookmarks, compare, heat, modes, navigation, view
 from ui.panels.panel_keys import belongs_to_panel
 from ui.panels.state import Dispatch, UiState
@@ -31,6 +41,7 @@ ACTIONS: tuple[Action, ...] = (
     *marking.ACTIONS,
     *deleting.ACTIONS,
     *camera_path.ACTIONS,
+    *volume_keys.ACTIONS,
     *training.ACTIONS,
     *clips.ACTIONS,
     *mending.ACTIONS,

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from engine.editing.edit import Box, Sphere
+from engine.editing.actions import Transform
 from ui.panels.editing.edit_grip import lens_of
 from ui.panels.editing.edit_subject import Subject
 from ui.panels.editing.selecting.select_drawing import draw_volume
@@ -35,7 +35,7 @@ def draw_handles(
 ) -> None:
     """Wire and handles of one thing. Clipped by the caller."""
     lens, tool, thing = lens_of(view, density), ui.editing, subject.thing
-    if isinstance(thing, Box | Sphere):
+    if not isinstance(thing, Transform):
         draw_volume(draw, thing, view, pane, density)
     for handle in reversed(handles_of(thing)):
         is_pointed = handle == (tool.held or tool.pointed)

@@ -8,6 +8,8 @@ from app.session.session_view import SessionView
 from app.session.showing.look_commands import SetFrame
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.timeline.jump_text import HINT, parse_jump
+from ui.panels.timeline.key_lanes.path_lane import draw_path_lane
+from ui.panels.timeline.key_lanes.volume_lane import draw_volume_lane, keyed_edit
 from ui.panels.timeline.marker_box import draw_marker_box
 from ui.panels.timeline.menu import draw_clip_menu
 from ui.panels.timeline.pointer import handle_track
@@ -16,7 +18,6 @@ from ui.panels.timeline.rows.gutter import WIDTH as GUTTER_WIDTH
 from ui.panels.timeline.rows.gutter import draw_gutter
 from ui.panels.timeline.rows.object_lane import draw_object_lane
 from ui.panels.timeline.rows.overview import draw_overview
-from ui.panels.timeline.rows.path_lane import draw_path_lane
 from ui.panels.timeline.rows.quality_lane import draw_quality_lane
 from ui.panels.timeline.rows.rows import (
     CACHE,
@@ -29,6 +30,7 @@ from ui.panels.timeline.rows.rows import (
     RULER,
     SEAMS,
     TAKE,
+    VOLUMES,
     arrange_rows,
 )
 from ui.panels.timeline.rows.ruler import draw_hover, draw_played, draw_playhead, draw_ruler
@@ -55,7 +57,8 @@ def draw_timeline(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
 def _draw_rows(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     left, right = origin.x + GUTTER_WIDTH, origin.x + max(size.x, GUTTER_WIDTH + 1.0)
-    folded = ui.timeline.folded if session.paths.paths else ui.timeline.folded | {CAMERA}
+    folded = ui.timeline.folded | (set() if session.paths.paths else {CAMERA})
+    folded |= {VOLUMES} if keyed_edit(session, ui) is None else set()
     is_zoomed, objects = ui.timeline.is_zoomed, session.edits.objects
     folded = folded if session.edits.timing else folded | {TAKE}
     rows = {
@@ -108,6 +111,8 @@ def _draw_track(stage: TimelineStage, session: SessionView) -> None:
         draw_path_lane(stage, session)
     if OBJECTS in stage.rows:
         draw_object_lane(stage, session)
+    if VOLUMES in stage.rows:
+        draw_volume_lane(stage, session)
     if TAKE in stage.rows:
         draw_take_lane(stage, session)
     if MARKERS in stage.rows:

@@ -1,5 +1,5 @@
 """The pointer's use over the track: scrub, zoom, pan, play around a seam, go to a marker, move or edit it, and move
-keys of the camera path.
+keys of the camera path and of volumes.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from app.session.editing.edit_commands import MoveMarker
 from app.session.session_view import SessionView
 from app.session.showing.look_commands import SetFrame
 from ui.panels.state import Dispatch
+from ui.panels.timeline.key_lanes.diamonds import DRAG_FROM
+from ui.panels.timeline.key_lanes.path_lane import handle_keys_of_path
+from ui.panels.timeline.key_lanes.volume_lane import handle_keys_of_volume
 from ui.panels.timeline.marker_box import edit_marker
 from ui.panels.timeline.rows.object_lane import object_at, scroll_objects
-from ui.panels.timeline.rows.path_lane import DRAG_FROM, handle_keys_of_path
 from ui.panels.timeline.rows.seam_lane import seam_at
 from ui.panels.timeline.rows.small_lanes import marker_at
 from ui.panels.timeline.rows.stage import TimelineStage
@@ -53,7 +55,9 @@ def _handle_middle_drag(stage: TimelineStage, session: SessionView) -> None:
 
 def _handle_left(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> None:
     view, timeline = stage.ui.timeline, session.timeline
-    if handle_keys_of_path(stage, session, dispatch) or _drag_marker(stage, session, dispatch):
+    if handle_keys_of_path(stage, session, dispatch) or handle_keys_of_volume(stage, session, dispatch):
+        return
+    if _drag_marker(stage, session, dispatch):
         return
     if _press_segment(stage, session):
         return

@@ -10,7 +10,8 @@ import numpy as np
 
 from app.session.editing.scope_choice import ScopeChoice
 from engine.editing.actions import Transform
-from engine.editing.edit import Box, Edit, Sphere
+from engine.editing.edit import Edit
+from engine.editing.volumes.keyed_volume import volume_of
 from ui.viewport.editing.handles import Handle, Thing
 
 TOGETHER_S = 1.0
@@ -26,9 +27,9 @@ class EditTool:
 
     Attributes:
         chosen: Number of the edit whose details and handles are shown; None without one.
-        is_shape_meant: Of an edit that moves a box or sphere: whether handles are those of that shape.
+        is_shape_meant: Of an edit that moves what is in a volume: whether handles are those of that shape.
         scope: Where new edits are to hold.
-        is_outside: Of a box or sphere that was drawn: whether everything outside of it is meant.
+        is_outside: Of a volume that was drawn: whether everything outside of it is meant.
         gesture: Number of what is being done; see app.session.editing.edit_commands.
         held: The handle that is dragged; None while none is.
         held_thing, held_at: The thing it belonged to when the drag began, and where in the picture that was, px.
@@ -43,6 +44,8 @@ class EditTool:
         renamed: The name that is being written; None while it is that of the edit.
         wanted_section: The part of the panel that is to come into sight; empty for none.
         used_sections: Parts of the panel whose tool is in use, as it was drawn last.
+        timed: Number of the volume's key that is pressed on the timeline; None while none is.
+        timed_from: Where it was pressed, units of the screen; None once that has become a drag.
     """
 
     chosen: int | None = None
@@ -64,6 +67,8 @@ class EditTool:
     renamed: str | None = None
     wanted_section: str = ""
     used_sections: set[str] = field(default_factory=set)
+    timed: int | None = None
+    timed_from: float | None = None
     _pressed_s: float = -1e9
 
     def follow(self, edits: tuple[Edit, ...]) -> None:
@@ -114,11 +119,11 @@ class EditTool:
         else:
             self.choose(None)
 
-    def shown_thing(self, edit: Edit | None) -> Thing | None:
-        """The part of the chosen edit with handles: the movement that it makes, else the box or sphere it acts on."""
+    def shown_thing(self, edit: Edit | None, frame: float) -> Thing | None:
+        """What has handles of the chosen edit: the movement that it makes, else the volume it acts on at a frame."""
         if edit is None:
             return None
-        has_shape = isinstance(edit.target, Box | Sphere)
-        if isinstance(edit.action, Transform) and not (self.is_shape_meant and has_shape):
+        volume = volume_of(edit.target, frame)
+        if isinstance(edit.action, Transform) and not (self.is_shape_meant and volume is not None):
             return edit.action
-        return edit.target if isinstance(edit.target, Box | Sphere) else None
+        return volume

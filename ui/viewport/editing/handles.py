@@ -1,4 +1,4 @@
-"""Handles of a box, a sphere or a movement: which there are, where they are seen, and what a drag of one makes of it.
+"""Handles of a volume or a movement: which there are, where they are seen, and what a drag of one makes of it.
 
 No ImGui, no GL. A drag is always worked out from where it began, so that it has no memory and can be taken back.
 """
@@ -16,9 +16,10 @@ from app.playback.views.pointing import pixel_ray, point_beside
 from engine.camera.projection import focal_px, to_camera, to_pixels
 from engine.camera.rotations import matrices_of, quat_product, quats_of_turns
 from engine.editing.actions import Quat, Transform, Vector
-from engine.editing.edit import Box, Sphere
+from engine.editing.edit import Box, Prism, Sphere, Volume
+from engine.editing.volumes.prisms import with_depth
 
-Thing = Box | Sphere | Transform
+Thing = Volume | Transform
 """A thing with handles: a place that an edit acts on, or the movement that it makes."""
 HandleKind = Literal["face", "radius", "center", "arrow", "ring", "scale"]
 RING_PX, ARROW_PX, SCALE_PX = 62.0, 84.0, 112.0
@@ -95,15 +96,15 @@ def middle_of(thing: Thing) -> np.ndarray:
 
 
 def axes_of(thing: Thing) -> np.ndarray:
-    """Axes of a thing as columns: a box has its own, everything else those of the scene. [3, 3]"""
-    return _matrix(thing.quat) if isinstance(thing, Box) else np.eye(3)
+    """Axes of a thing as columns: a box or a prism has its own, everything else those of the scene. [3, 3]"""
+    return _matrix(thing.quat) if isinstance(thing, Box | Prism) else np.eye(3)
 
 
 def handles_of(thing: Thing) -> list[Handle]:
     """All handles; where they are near each other, an earlier one is meant."""
     center = [Handle("center")]
     rings = [Handle("ring", axis) for axis in range(3)]
-    if isinstance(thing, Box):
+    if isinstance(thing, Box | Prism):
         faces = [Handle("face", axis, sign) for axis in range(3) for sign in (1, -1)]
         return [*faces, *center, *rings]
     if isinstance(thing, Sphere):
@@ -115,7 +116,7 @@ def place_of(thing: Thing, handle: Handle, lens: HandleView) -> np.ndarray:
     """Where a handle is, scene units; of a ring, its middle. [3]"""
     middle, axes = middle_of(thing), axes_of(thing)
     match handle.kind:
-        case "face" if isinstance(thing, Box):
+        case "face" if isinstance(thing, Box | Prism):
             return middle + handle.sign * thing.half_sizes[handle.axis] * axes[:, handle.axis]
         case "radius" if isinstance(thing, Sphere):
             return middle + handle.sign * thing.radius * axes[:, handle.axis]
@@ -208,14 +209,17 @@ def _dragged_along(
     if ends[0] is None or ends[1] is None:
         return thing
     along = ends[1] - ends[0]
-    if isinstance(thing, Box) and not is_whole:
+    if isinstance(thing, Box | Prism) and not is_whole:
         size = 2.0 * thing.half_sizes[handle.axis]
         wanted = size + handle.sign * along
         wanted = max(_to_multiple(wanted, step) if step else wanted, max(step, LEAST_SHARE * size))
         halves = list(thing.half_sizes)
         halves[handle.axis] = wanted / 2.0
         center = np.array(thing.center) + handle.sign * (wanted - size) / 2.0 * direction
-        return Box(_vector(center), (halves[0], halves[1], halves[2]), thing.quat)
+        sides = (halves[0], halves[1], halves[2])
+        if isinstance(thing, Prism) and thing.apex is not None and handle.axis == 2:
+            return with_depth(thing, _vector(center), halves[2])
+        return structs.replace(thing, center=_vector(center), half_sizes=sides)
     if isinstance(thing, Sphere):
         wanted = thing.radius + handle.sign * along
         return Sphere(

@@ -6,6 +6,7 @@ Places in the picture are logical pixels of the window, until a command is made 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
@@ -23,11 +24,12 @@ from app.session.editing.selection_commands import (
 )
 from engine.camera.projection import to_camera
 from engine.camera.rotations import quats_of
-from engine.editing.edit import Box, Sphere
+from engine.editing.edit import Box, Prism, Sphere, Volume
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
+from engine.editing.volumes.prisms import prism_of_lasso
 
-ToolKind = Literal["rectangle", "lasso", "brush", "box", "sphere", "flood"]
+ToolKind = Literal["rectangle", "lasso", "brush", "box", "sphere", "prism", "flood"]
 TOOLS: tuple[ToolKind, ...] = get_args(ToolKind)
 TOOL_WORDS: dict[ToolKind, str] = {
     "rectangle": "Rectangle",
@@ -35,6 +37,7 @@ TOOL_WORDS: dict[ToolKind, str] = {
     "brush": "Brush",
     "box": "Box",
     "sphere": "Sphere",
+    "prism": "Prism",
     "flood": "Flood",
 }
 TOOL_HINTS: dict[ToolKind, str] = {
@@ -43,14 +46,18 @@ TOOL_HINTS: dict[ToolKind, str] = {
     "brush": "Paint over Gaussians; [ ] or Ctrl + wheel change its size",
     "box": "Drag on a surface; Ctrl + wheel changes its height",
     "sphere": "Press on a surface and drag",
+    "prism": "Drag a loop; the volume is as deep as the things under it",
     "flood": "Click on something; Ctrl + wheel changes the tolerance",
 }
+Depths = Callable[[np.ndarray], tuple[float, float] | None]
 MODE_WORDS: dict[SelectMode, str] = {
     "replace": "New",
     "add": "Add",
     "subtract": "Subtract",
     "intersect": "Intersect",
 }
+VOLUME_TOOLS: tuple[ToolKind, ...] = ("box", "sphere", "prism")
+"""Tools that draw a volume in space, which has handles then."""
 SIZED: tuple[ToolKind, ...] = ("brush", "box", "flood")
 """Tools whose size the wheel changes with Ctrl."""
 SMALLEST_BRUSH, LARGEST_BRUSH = 2.0, 400.0
@@ -78,7 +85,7 @@ class SelectTool:
         points: Of the drag in progress; empty without one. Logical pixels.
         held_mode: How that drag changes the selection.
         surface: Place on the surface where a volume began, scene units, [3]; None without one.
-        volume: The box or sphere that was drawn last or typed; None before the first.
+        volume: The volume that was drawn last or typed; None before the first.
         attribute: Name of the one that the panel shows.
         ranges: Chosen range by attribute, as shares of its axis.
         is_high_held: Whether the pointer leads the upper end of the range, not the lower one.
@@ -96,7 +103,7 @@ class SelectTool:
     points: list[tuple[float, float]] = field(default_factory=list)
     held_mode: SelectMode = "replace"
     surface: np.ndarray | None = None
-    volume: Box | Sphere | None = None
+    volume: Volume | None = None
     attribute: str = "opacity"
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
     is_high_held: bool = False
@@ -176,7 +183,7 @@ class SelectTool:
         match self.kind:
             case "rectangle":
                 return Rectangle(*at[0], *at[-1])
-            case "lasso":
+            case "lasso" | "prism":
                 return Lasso(tuple(at))
             case "brush":
                 return Brush(tuple(at), self.brush_px * density)
@@ -208,19 +215,42 @@ class SelectTool:
         middle = center + 0.5 * (corner - center) + STANDING_SHARE * height * axes[:, 1]
         return Box(_vector(middle), (width / 2, height, length / 2), standing_quat(view.world_to_camera, up))
 
+    def prism_under(self, view: SeenFrom, low: tuple[float, float], density: float, depths_of: Depths) -> Prism | None:
+        """The prism of the loop; None where it is too small, or nothing is under it. Arguments as of `command`."""
+        shape = self.shape(low, density)
+        if not isinstance(shape, Lasso) or len(shape.points) < 3:
+            return None
+        pixels = np.array(shape.points)
+        depths = depths_of(pixels)
+        return None if depths is None else prism_of_lasso(pixels, view.world_to_camera, view.K, depths)
+
     def command(
-        self, view: SeenFrom, low: tuple[float, float], density: float, up: np.ndarray, spacing: float
+        self,
+        view: SeenFrom,
+        low: tuple[float, float],
+        density: float,
+        up: np.ndarray,
+        spacing: float,
+        depths_of: Depths = lambda pixels: None,
     ) -> SelectInPicture | SelectVolume | SelectFlood | None:
-        """The command of the drag that ends now; None where it means nothing. spacing: Between anchors, scene units."""
+        """The command of the drag that ends now; None where it means nothing.
+
+        Args:
+            spacing: Between anchors, scene units.
+            depths_of: From where to where a prism around a loop of pixels [P, 2] reaches; None where nothing is there.
+        """
         how = self.how(self.held_mode)
         shape = self.shape(low, density)
-        if shape is not None:
+        if shape is not None and self.kind != "prism":
             return SelectInPicture(shape, view, how, self.is_visible_only, self.is_by_extent)
         if self.kind == "flood":
             if self.surface is None:
                 return None
             return SelectFlood(_vector(self.surface), self.near_share * spacing, self.color_tolerance, how)
-        volume = self.volume_under(view, low, density, up)
+        if self.kind == "prism":
+            volume = self.prism_under(view, low, density, depths_of)
+        else:
+            volume = self.volume_under(view, low, density, up)
         if volume is None:
             return None
         self.volume = volume

@@ -79,6 +79,7 @@ _TOOL_KEYS: dict[ToolKind, str] = {
     "brush": "Ctrl+R",
     "box": "Alt+R",
     "sphere": "Ctrl+Shift+R",
+    "prism": "Alt+Shift+R",
     "flood": "Y",
 }
 _ANY: dict[str, Any] = {"lacks": _nothing_to_select}

@@ -16,10 +16,12 @@ from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_
 from app.session.session_view import SessionView
 from engine.camera.rotations import quats_of_turns, turns_of_quats
 from engine.editing.actions import Action, Delete, Hide, Quat, Transform, Vector
-from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Scope, Sphere, Target
+from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Prism, Scope, Sphere, Volume
+from engine.editing.volumes.keyed_volume import volume_of, with_volume
 from engine.setting import Setting, settings_of
 from engine.text import one_line
 from ui.panels.editing.fields import label_before, numbers, whole_numbers
+from ui.panels.editing.volume_keys import draw_volume_keys
 from ui.panels.pieces.widgets import elided, segment, text_warning, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
 
@@ -68,7 +70,9 @@ def _draw_fields(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Ed
 
 
 def _draw_rest(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit) -> None:
-    both = isinstance(edit.action, Transform) and isinstance(edit.target, Box | Sphere)
+    frame = session.timeline.frame_index
+    volume = volume_of(edit.target, frame)
+    both = isinstance(edit.action, Transform) and volume is not None
     if both:
         imgui.text_disabled("Handles")
         for is_shape, words in ((False, "the movement"), (True, "the shape")):
@@ -76,14 +80,20 @@ def _draw_rest(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edit
             if segment(words, ui.editing.is_shape_meant == is_shape):
                 ui.editing.is_shape_meant = is_shape
             ui.mark(f"edits.handles {'shape' if is_shape else 'movement'}")
-    target = _draw_target(session, ui, edit.target)
-    if target is not None:
-        dispatch(ChangeEdit(structs.replace(edit, target=target), ui.editing.gesture, "change"))
+    if volume is None:
+        text_wrapped_dim(f"Acts on {target_text(edit.target, session.edits.objects)}.")
+    else:
+        changed = _draw_volume(ui, volume)
+        if changed is not None:
+            target = with_volume(edit.target, frame, changed)
+            dispatch(ChangeEdit(structs.replace(edit, target=target), ui.editing.gesture, "change"))
     _draw_scope(session, dispatch, ui, edit)
     is_clicked, is_inverted = imgui.checkbox("Acts on everything else", edit.is_inverted)
     ui.mark("edits.inverted")
     if is_clicked:
         dispatch(ChangeEdit(structs.replace(edit, is_inverted=is_inverted), verb="invert"))
+    if volume is not None:
+        draw_volume_keys(session, dispatch, ui, edit)
     _draw_name(session, dispatch, ui, edit)
     if isinstance(edit.action, Delete | Hide):
         _draw_fill(session, dispatch, ui, edit)
@@ -154,11 +164,14 @@ def _draw_scope(session: SessionView, dispatch: Dispatch, ui: UiState, edit: Edi
 # Every field is drawn, whichever was changed: with fewer the panel would be lower for a moment, and scroll.
 
 
-def _draw_target(session: SessionView, ui: UiState, target: Target) -> Target | None:
-    """Numbers of what an edit acts on; what they were changed to."""
-    changed = target
-    match target:
-        case Box(center=center, half_sizes=half_sizes, quat=quat):
+def _draw_volume(ui: UiState, volume: Volume) -> Volume | None:
+    """Numbers of the volume that an edit acts on; what they were changed to."""
+    changed = volume
+    match volume:
+        case (
+            Box(center=center, half_sizes=half_sizes, quat=quat)
+            | Prism(center=center, half_sizes=half_sizes, quat=quat)
+        ):
             speed = SPEED_SHARE * max(half_sizes)
             found = numbers(ui, "center", "Centre", center, speed=speed, low=-FAR, high=FAR)
             if found is not None:
@@ -178,9 +191,7 @@ def _draw_target(session: SessionView, ui: UiState, target: Target) -> Target | 
             found = numbers(ui, "radius", "Radius", [radius], speed=speed, low=LEAST_SIZE, high=FAR)
             if found is not None:
                 changed = structs.replace(changed, radius=found[0])
-        case _:
-            text_wrapped_dim(f"Acts on {target_text(target, session.edits.objects)}.")
-    return None if changed is target else changed
+    return None if changed is volume else changed
 
 
 def _draw_action(session: SessionView, ui: UiState, action: Action) -> Action | None:

@@ -15,7 +15,7 @@ from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_
 from app.session.editing.selection_commands import ClearSelection
 from app.session.session_view import SessionView
 from engine.editing.actions import Action, Delete, Expose, Hide, Hold, Recolor, Smooth, Transform
-from engine.editing.edit import Box, Edit, Everything, ObjectTarget, Scope, Sphere, Target
+from engine.editing.edit import Edit, Everything, ObjectTarget, Scope, Sphere, Target, Volume
 from engine.editing.reach import Reach, reach_of, reach_of_edit
 from ui.panels.editing.edit_subject import Meant, bounds_of, meant, pivot_of
 from ui.panels.editing.panel.sections import TALL
@@ -91,7 +91,7 @@ def make_edit(session: SessionView, dispatch: Dispatch, ui: UiState, making: Mak
     target: Target | None = volume
     if not words and making.is_for_everything:
         target = Everything()
-    is_drawn = isinstance(volume, Box | Sphere)
+    is_drawn = isinstance(volume, Volume)
     is_outside = is_drawn and ui.editing.is_outside
     before = {edit.edit_id for edit in session.edits.edits}
     scope = chosen_scope(ui.editing.scope, session.timeline)
@@ -160,7 +160,7 @@ def draw_making(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         if place % PER_ROW:
             imgui.same_line(0, ROW_GAP)
         imgui.begin_disabled(reach.is_nowhere or not (words or making.is_for_everything))
-        label = "Crop" if making.name == "isolate" and isinstance(volume, Box | Sphere) else making.label
+        label = "Crop" if making.name == "isolate" and isinstance(volume, Volume) else making.label
         if imgui.button(f"{label}##{making.name}", ImVec2(width, 0)):
             make_edit(session, dispatch, ui, making)
         ui.mark(f"edits.make {making.name}")

@@ -1,15 +1,16 @@
-"""A box or a sphere by numbers: the one that was drawn last, or one around what the view turns about."""
+"""A volume by numbers: the one that was drawn last, or one around what the view turns about."""
 
 from __future__ import annotations
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
+from msgspec import structs
 
 from app.playback.views.orbit_view import OrbitView
 from app.session.editing.selection_commands import SelectVolume
 from app.session.session_view import SessionView
 from engine.editing.actions import Vector
-from engine.editing.edit import Box, Sphere
+from engine.editing.edit import Box, Prism, Sphere, Volume
 from ui.panels.editing.edit_subject import drawn_volume
 from ui.panels.editing.panel.sections import section_header
 from ui.panels.pieces.widgets import primary_button
@@ -43,10 +44,10 @@ def _draw_numbers(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
     if volume is None:
         return
     center = _input_vector("Middle", volume.center, ui)
-    if isinstance(volume, Box):
+    if isinstance(volume, Box | Prism):
         x, y, z = _input_vector("Half sizes", volume.half_sizes, ui)
         half_sizes = (max(x, 1e-9), max(y, 1e-9), max(z, 1e-9))
-        changed: Box | Sphere = Box(center, half_sizes, volume.quat)
+        changed: Volume = structs.replace(volume, center=center, half_sizes=half_sizes)
     else:
         imgui.set_next_item_width(_room())
         _, radius = imgui.input_float("Radius", volume.radius, 0.0, 0.0, "%.4g")

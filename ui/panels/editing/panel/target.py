@@ -40,7 +40,7 @@ def _target_words(session: SessionView, ui: UiState) -> tuple[str, str]:
     """What new edits act on, and a remark on it."""
     status, (volume, words) = session.selection, meant(session, ui)
     if isinstance(volume, ObjectTarget):
-        return words, "The chosen object, in all clips"
+        return words, "The chosen object"
     if volume is not None:
         return (f"All but {words}" if ui.editing.is_outside else f"In {words}"), ""
     if words:

@@ -8,15 +8,17 @@ from imgui_bundle import ImVec2, imgui
 from app.session.editing.selection_commands import Rectangle
 from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rotations import matrices_of
-from engine.editing.edit import Box, Sphere
+from engine.editing.edit import Prism, Sphere, Volume
+from engine.editing.volumes.prisms import axes_of_prism, widths_at
 from ui.panels.pieces.widgets import chip
 from ui.panels.state import Rect
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
-from ui.viewport.editing.select_tool import MODE_WORDS, TOOL_HINTS, TOOL_WORDS, SelectTool
+from ui.viewport.editing.select_tool import MODE_WORDS, TOOL_HINTS, TOOL_WORDS, VOLUME_TOOLS, SelectTool
 from ui.viewport.scene import SceneView
 
-N_SEGMENTS = 48
+N_SEGMENTS, N_EDGES = 48, 8
+"""Of circles; of the edges of a prism, those that are drawn."""
 WIDTH, RIM_WIDTH = 1.6, 3.6
 """Of lines, and of their dark rims, units."""
 LEAST_SHARE = 0.02
@@ -35,7 +37,7 @@ def draw_tool(
         _outlined_circle(draw, (pointer.x, pointer.y), tool.brush_px)
     if is_over:
         imgui.set_mouse_cursor(imgui.MouseCursor_.none if tool.kind == "brush" else imgui.MouseCursor_.hand)
-    volume = tool.volume if tool.kind in ("box", "sphere") else None
+    volume = tool.volume if tool.kind in VOLUME_TOOLS else None
     if tool.is_dragging:
         volume = (
             tool.volume_under(view.seen_from, (pane.x0, pane.y0), density, up) if tool.surface is not None else None
@@ -75,8 +77,8 @@ def _draw_shape(draw: imgui.ImDrawList, tool: SelectTool, pane: Rect, density: f
     _outlined(draw, corners, is_closed=True)
 
 
-def draw_volume(draw: imgui.ImDrawList, volume: Box | Sphere, view: SceneView, pane: Rect, density: float) -> None:
-    """A box or sphere as wire."""
+def draw_volume(draw: imgui.ImDrawList, volume: Volume, view: SceneView, pane: Rect, density: float) -> None:
+    """A volume as wire."""
     center = np.asarray(volume.center)
     depth = float(to_camera(center[None], view.world_to_camera)[0, 2])
     near = max(view.near, LEAST_SHARE * abs(depth), 1e-6)
@@ -90,13 +92,16 @@ def draw_volume(draw: imgui.ImDrawList, volume: Box | Sphere, view: SceneView, p
                 _outlined(draw, [(pane.x0 + a[0], pane.y0 + a[1]), (pane.x0 + b[0], pane.y0 + b[1])])
 
 
-def volume_lines(volume: Box | Sphere) -> list[np.ndarray]:
-    """Lines of a wire: three circles of a sphere, twelve edges of a box. [n, 3] each, scene units"""
+def volume_lines(volume: Volume) -> list[np.ndarray]:
+    """Lines of a wire: three circles of a sphere, twelve edges of a box, ends and some edges of a prism. [n, 3] each,
+    scene units"""
     center = np.asarray(volume.center, np.float64)
     if isinstance(volume, Sphere):
         angles = np.linspace(0.0, 2.0 * np.pi, N_SEGMENTS + 1)
         circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
         return [center + volume.radius * np.roll(circle, shift, axis=1) for shift in range(3)]
+    if isinstance(volume, Prism):
+        return _prism_lines(volume)
     axes = matrices_of(np.asarray(volume.quat) / np.linalg.norm(volume.quat)) * np.asarray(volume.half_sizes)
     lines = []
     for axis in range(3):
@@ -107,6 +112,17 @@ def volume_lines(volume: Box | Sphere) -> list[np.ndarray]:
                 shares = np.linspace(-1.0, 1.0, 9)[:, None]
                 lines.append(middle + shares * axes[:, axis])
     return lines
+
+
+def _prism_lines(prism: Prism) -> list[np.ndarray]:
+    corners = np.array([*prism.outline, prism.outline[0]])
+    depths = np.linspace(-1.0, 1.0, 5)
+    rings = []
+    for depth, width in zip(depths, widths_at(prism, depths), strict=True):
+        own = np.column_stack([corners * width, np.full(len(corners), depth)]) * np.asarray(prism.half_sizes)
+        rings.append(np.asarray(prism.center) + own @ axes_of_prism(prism).T)
+    edges = np.stack(rings, axis=1)[:-1]  # [corners, depths, 3]
+    return [rings[0], rings[-1], *edges[:: max(len(edges) // N_EDGES, 1)]]
 
 
 def _outlined(draw: imgui.ImDrawList, points: list[tuple[float, float]], *, is_closed: bool = False) -> None:

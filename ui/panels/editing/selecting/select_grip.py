@@ -6,13 +6,16 @@ For the item drawn last, the picture's button.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from imgui_bundle import imgui
 
 from app.session.editing.selection_commands import SelectAnchor, SelectVolume
 from app.session.session_view import SessionView
+from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
+from engine.editing.volumes.prisms import depths_under
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.viewport.editing.select_tool import SelectTool
@@ -81,9 +84,11 @@ class SelectGrip:
         spacing: float,
     ) -> None:
         up = np.asarray(session.view.up, np.float64)
-        command = tool.command(view.seen_from, (pane.x0, pane.y0), density, up, spacing)
+        seen = view.seen_from
+        depths_of = partial(_depths, session, seen)
+        command = tool.command(seen, (pane.x0, pane.y0), density, up, spacing, depths_of)
         mode, tool.points, tool.surface = tool.held_mode, [], None
-        if tool.kind in ("rectangle", "lasso") and not pointer.is_beyond_click():
+        if tool.kind in ("rectangle", "lasso", "prism") and not pointer.is_beyond_click():
             place = pick(*pointer.pressed_at)  # a click means an anchor
             command = None if place is None else SelectAnchor(_vector(place), tool.how(mode))
         if command is not None:
@@ -93,6 +98,12 @@ class SelectGrip:
         io = imgui.get_io()
         if io.mouse_wheel and io.key_ctrl and tool.resize(io.mouse_wheel) and tool.volume is not None:
             dispatch(SelectVolume(tool.volume, tool.how(), tool.is_by_extent))
+
+
+def _depths(session: SessionView, view: SeenFrom, pixels: np.ndarray) -> tuple[float, float] | None:
+    """From where to where the shown Gaussians under a loop reach; None where there are none."""
+    gaussians = session.shown_gaussians()
+    return None if gaussians is None else depths_under(pixels, gaussians.means, gaussians.opacities, view)
 
 
 def _vector(place: np.ndarray) -> tuple[float, float, float]:

@@ -18,6 +18,7 @@ from ui.panels.timeline.rows.rows import (
     RULER,
     SEAMS,
     TAKE,
+    VOLUMES,
 )
 from ui.panels.timeline.rows.stage import SMALL_TEXT, small_text, small_width
 from ui.panels.timeline.units import unit_note
@@ -34,6 +35,7 @@ NOTES = {
     CACHE: "Frames decoded in memory, shown at once",
     CAMERA: "Keys of the camera path: C at the playhead",
     OBJECTS: "Objects: in their colours where they are seen, hatched where that is doubtful",
+    VOLUMES: "Keys of the volume that the chosen edit acts on: Ctrl+Shift+K at the playhead",
     TAKE: "Segments of the take over the frames that they play, numbered in the order in which they play",
     MARKERS: "Markers: Ctrl+M at the playhead",
 }

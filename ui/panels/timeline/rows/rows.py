@@ -1,9 +1,9 @@
 """How the height of the timeline is shared: which rows there are, and which give way where there is not room for all.
 
-Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, camera, objects, take, markers.
-Ruler and clips are always there, the keys of the camera where there is a camera path, objects where there are some, and
-the take where it is edited in time. In a low panel quality gives way first, then markers, cache, take, camera, objects,
-seams and the overview, last the transport row.
+Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, camera, objects, volumes, take,
+markers. Ruler and clips are always there, the keys of the camera where there is a camera path, objects where there are
+some, the keys of a volume while its edit is chosen, and the take where it is edited in time. In a low panel quality
+gives way first, then markers, cache, take, volumes, camera, objects, seams and the overview, last the transport row.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, OBJECTS, TAKE, MARKERS = (
+OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, OBJECTS, VOLUMES, TAKE, MARKERS = (
     "overview",
     "ruler",
     "clips",
@@ -20,17 +20,18 @@ OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, OBJECTS, TAKE, MARKERS = 
     "cache",
     "camera",
     "objects",
+    "volumes",
     "take",
     "markers",
 )
-LANES = (SEAMS, QUALITY, CACHE, CAMERA, OBJECTS, TAKE, MARKERS)
+LANES = (SEAMS, QUALITY, CACHE, CAMERA, OBJECTS, VOLUMES, TAKE, MARKERS)
 """Those that can be folded away."""
-ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, OBJECTS, TAKE, MARKERS)
-KEPT_FIRST = (OVERVIEW, SEAMS, OBJECTS, CAMERA, TAKE, CACHE, MARKERS, QUALITY)
+ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, OBJECTS, VOLUMES, TAKE, MARKERS)
+KEPT_FIRST = (OVERVIEW, SEAMS, OBJECTS, CAMERA, VOLUMES, TAKE, CACHE, MARKERS, QUALITY)
 HEIGHTS = {OVERVIEW: 16.0, RULER: 22.0, CLIPS: 32.0, SEAMS: 18.0, QUALITY: 30.0, CACHE: 12.0}
 OBJECT_HEIGHT, MAX_OBJECT_ROWS = 17.0, 4
 """Of one object; of more than so many, the others are scrolled to."""
-HEIGHTS |= {CAMERA: 18.0, OBJECTS: OBJECT_HEIGHT, TAKE: 18.0, MARKERS: 18.0}
+HEIGHTS |= {CAMERA: 18.0, OBJECTS: OBJECT_HEIGHT, VOLUMES: 18.0, TAKE: 18.0, MARKERS: 18.0}
 """Smallest ones, units of the screen."""
 MIN_CLIPS_HEIGHT = 18.0
 LARGEST = {CLIPS: 54.0, TAKE: 36.0, QUALITY: 90.0}

@@ -4,25 +4,16 @@ time, and a double click goes there.
 
 from __future__ import annotations
 
-import numpy as np
-from imgui_bundle import ImVec2, imgui
+from imgui_bundle import imgui
 
 from app.session.paths.path_commands import ChooseCameraKey, TimeCameraKey
 from app.session.session_view import SessionView
-from engine.camera.camera_path import CameraPath
 from ui.panels.pieces.key_words import key_words
-from ui.panels.state import Dispatch, Rect
+from ui.panels.state import Dispatch
+from ui.panels.timeline.key_lanes.diamonds import DRAG_FROM, draw_diamonds, nearest_diamond
 from ui.panels.timeline.rows.rows import CAMERA
 from ui.panels.timeline.rows.stage import TimelineStage
 from ui.style import theme
-
-HALF, CHOSEN_HALF = 5.0, 6.5
-MIN_KEY_DISTANCE = 3.0
-"""Keys closer to each other than this are drawn as one."""
-DRAG_FROM = 3.0
-"""A press that moves less than this chooses a key and leaves it where it is."""
-EASY = 2.0
-"""By how much a diamond is easier to hit than it looks."""
 
 
 def draw_path_lane(stage: TimelineStage, session: SessionView) -> None:
@@ -38,14 +29,8 @@ def draw_path_lane(stage: TimelineStage, session: SessionView) -> None:
     stage.draw.add_line_h(first, last, y, theme.u32(color), 2)
     if stop > last:
         stage.draw.add_line_h(last, stop, y, theme.u32(theme.faded(color, 0.4)), 2)
-    x_before = -1e9
-    for index in keys_in_sight(stage, path):
-        x = scale.middle_of(path.keys[index].frame)
-        is_chosen = index == status.chosen_key
-        if x - x_before < MIN_KEY_DISTANCE and not is_chosen:
-            continue
-        x_before = x
-        _draw_key(stage, index, x, y, is_chosen=is_chosen)
+    frames = [key.frame for key in path.keys]
+    draw_diamonds(stage, frames, row, "timeline.key", color, chosen=status.chosen_key)
     pointed = key_at(stage, session)
     if pointed is not None and stage.ui.paths.timed is None:
         imgui.begin_tooltip()
@@ -54,32 +39,12 @@ def draw_path_lane(stage: TimelineStage, session: SessionView) -> None:
         imgui.end_tooltip()
 
 
-def _draw_key(stage: TimelineStage, index: int, x: float, y: float, *, is_chosen: bool) -> None:
-    half = CHOSEN_HALF if is_chosen else HALF
-    corners = ImVec2(x, y - half), ImVec2(x + half, y), ImVec2(x, y + half), ImVec2(x - half, y)
-    stage.draw.add_quad_filled(*corners, theme.u32(theme.YELLOW if is_chosen else theme.GREEN))
-    if is_chosen:
-        stage.draw.add_quad(*corners, theme.u32(theme.TEXT), 1.5)
-    stage.ui.mark_rect(f"timeline.key{index}", Rect(x - half, y - half, x + half, y + half))
-
-
-def keys_in_sight(stage: TimelineStage, path: CameraPath) -> range:
-    """Numbers of the keys within the shown part."""
-    frames = np.array([key.frame for key in path.keys])
-    shown = stage.scale.shown
-    first, stop = np.searchsorted(frames, [shown.start - 0.5, shown.stop + 0.5])
-    return range(int(first), int(stop))
-
-
 def key_at(stage: TimelineStage, session: SessionView) -> int | None:
     """Number of the key under the pointer."""
     path = session.paths.path
     if path is None or stage.pointer is None or not stage.is_pointed_at(CAMERA):
         return None
-    x = stage.pointer[0]
-    away = [(abs(stage.scale.middle_of(path.keys[index].frame) - x), index) for index in keys_in_sight(stage, path)]
-    distance, nearest = min(away, default=(np.inf, -1))
-    return nearest if distance <= CHOSEN_HALF + EASY else None
+    return nearest_diamond(stage, [key.frame for key in path.keys], stage.pointer[0])
 
 
 def handle_keys_of_path(stage: TimelineStage, session: SessionView, dispatch: Dispatch) -> bool:

@@ -1,0 +1,1 @@
+"""Volumes: prisms, volumes that move from key to key, and those that follow an object."""
