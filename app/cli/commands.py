@@ -111,13 +111,13 @@ COMMANDS = {
     "exclude": Command("leave cameras and pictures out of training", "app.cli.projects.exclude_command"),
     "edit": Command(
         "list and change the edits of a project, undo and redo",
-        "app.cli.projects.edit_command",
+        "app.cli.projects.editing.edit_command",
         "Nothing was changed.",
         has_backend=True,
     ),
     "object": Command(
         "make objects of a project, find them in its clips, and correct them",
-        "app.cli.projects.object_command",
+        "app.cli.projects.editing.object_command",
         "Nothing was changed.",
         has_backend=True,
     ),

@@ -55,6 +55,9 @@ def make_project(folder: Path) -> None:
     from engine.camera.path_presets import turntable
     from engine.clip_files.clip_state import write_clip_state
     from engine.clip_files.compact import compact_clip, write_compact_clip
+    from engine.editing.edit import PickedRows
+    from engine.editing.picks import pack_rows
+    from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
     from engine.gate.regions import parse_region
     from engine.storage.array_files import write_arrays
     from engine.storage.json_files import checked_line
@@ -66,7 +69,10 @@ def make_project(folder: Path) -> None:
     project = create_project(folder, settings)
     regions = (parse_region({"treat": "dynamic", "box": [[0, 0, 0], [1, 2, 3]]}),)
     paths = (turntable(np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 0.3, (0, 9)),)
-    project.change(replace(project.document, regions=regions, camera_paths=paths), "mark")
+    rows = (PickedRows(0, "abc", "moving", pack_rows(np.arange(0, 90, 3))),)
+    found = (ObjectInClip(0, N_FRAMES, rows, ((0, 3),), 0.7, "touching", "abc"),)
+    objects = (SceneObject(1, "ball", seeds=(ObjectSeed(1, rows, rows),), clips=found, stop=3),)
+    project.change(replace(project.document, regions=regions, camera_paths=paths, objects=objects), "mark")
     project.close()
     project.clip_path(0).parent.mkdir()
     write_compact_clip(project.clip_path(0), reference)

@@ -26,9 +26,10 @@ def written_edits(document: ProjectDocument, job: Written) -> EditStack:
     Raises:
         ProjectError: There is no such object; names those that there are.
     """
+    if job.object is None:
+        return document.stack() if job.has_edits else EditStack()
     edits = document.edits if job.has_edits else ()
-    if job.object is not None:
-        target = ObjectTarget(object_named(document, job.object).object_id)
-        top = max((edit.edit_id for edit in edits), default=0) + 1
-        edits = (*edits, Edit(top, "", target, Hide(), is_inverted=True))
-    return EditStack(edits, document.objects)
+    target = ObjectTarget(object_named(document, job.object).object_id)
+    top = max((edit.edit_id for edit in edits), default=0) + 1
+    alone = Edit(top, "", target, Hide(), is_inverted=True)
+    return EditStack((*edits, alone), document.objects)  # without copies, which would stand beside it

@@ -30,7 +30,6 @@ def panel(open_pilot) -> Pilot:
     session.edits = edits_status(session.content)
     pilot.studio.frame.ui.show_edit("copies")
     pilot.draw(4)
-    pilot.click("copies.section")
     pilot.draw(3)
     return pilot
 
@@ -86,7 +85,6 @@ def test_without_an_object_the_section_says_what_to_do(open_pilot) -> None:
     pilot = open_pilot(size=(1280, 1300))
     pilot.studio.frame.ui.show_edit("copies")
     pilot.draw(4)
-    pilot.click("copies.section")
     pilot.draw(3)
     assert "copies.duplicate" not in pilot.rects
     pilot.key(key.D, modifiers=(CTRL, SHIFT))

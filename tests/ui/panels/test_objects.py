@@ -221,9 +221,9 @@ def test_the_chosen_object_is_outlined_and_all_where_that_is_wanted(panel: Pilot
     tool = panel.studio.frame.ui.objects
     put(panel, *objects(3))
     assert tool.outlined(panel.session.edits.objects) == ()
-    panel.key(key.O, modifiers=(SHIFT,))
+    panel.key(key.O, modifiers=(ALT, SHIFT))
     assert [one.object_id for one in tool.outlined(panel.session.edits.objects)] == [1]
-    panel.key(key.O, modifiers=(SHIFT,))
+    panel.key(key.O, modifiers=(ALT, SHIFT))
     assert [one.object_id for one in tool.outlined(panel.session.edits.objects)] == [2]
     panel.key(key.O, modifiers=(CTRL, SHIFT))
     assert len(tool.outlined(panel.session.edits.objects)) == 3

@@ -81,6 +81,6 @@ ACTIONS = (
         lacks=lambda session: _no_objects(session) or _cannot_edit(session),
     ),
     Action("objects.select", "Select object", SELECT, _of_chosen(SelectObject), keys=("Alt+O",), lacks=_no_objects),
-    Action("objects.next", "Choose next object", SELECT, _next, keys=("Shift+O",), lacks=_no_objects),
+    Action("objects.next", "Choose next object", SELECT, _next, keys=("Alt+Shift+O",), lacks=_no_objects),
     Action("objects.outlines", "Outline all objects", SELECT, _outline, keys=("Ctrl+Shift+O",), lacks=_no_objects),
 )

@@ -26,9 +26,9 @@ ROW_GAP = 3.0
 """Between two rows, units: in the smallest window, the first row of what can be done is in sight."""
 Section = Callable[[SessionView, Dispatch, UiState], None]
 SECTIONS: tuple[Section, ...] = (
-    draw_objects,
     draw_select_tools,
     draw_making,
+    draw_objects,
     draw_chosen,
     draw_stack,
     draw_copies,

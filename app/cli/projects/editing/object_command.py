@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from app.cli.arguments import EXIT_OK, path_argument
-from app.cli.projects.edit_arguments import add_pick_arguments, chosen_picks
+from app.cli.projects.editing.edit_arguments import add_pick_arguments, chosen_picks
 from app.cli.terminal.progress import ProgressLine
 from app.document.changes.object_words import confidence_text, runs_within, seen_text
 from app.document.changes.reach_words import frames_text

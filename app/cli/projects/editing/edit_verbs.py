@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 
-from app.cli.projects.follow_verb import FOLLOW
+from app.cli.projects.editing.follow_verb import FOLLOW
 from app.document.changes.timing_changes import TIME_EDITS
 from engine.editing.actions import ACTIONS, Action
 from engine.errors import ProjectError

@@ -9,9 +9,9 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
-from app.cli.projects import fill_verb
-from app.cli.projects.copy_verbs import add_copy_verbs, run_copy_verb
-from app.cli.projects.edit_arguments import (
+from app.cli.projects.editing import fill_verb
+from app.cli.projects.editing.copy_verbs import add_copy_verbs, run_copy_verb
+from app.cli.projects.editing.edit_arguments import (
     add_edit_arguments,
     chosen_action,
     chosen_scope,
@@ -20,9 +20,9 @@ from app.cli.projects.edit_arguments import (
     has_scope,
     has_target,
 )
-from app.cli.projects.edit_timing import add_time_arguments, change_time, given_time_options, take_lines
-from app.cli.projects.edit_verbs import VERBS, add_verb_arguments, check_words, take_verb
-from app.cli.projects.follow_verb import FOLLOW, MEANING, add_follow_arguments, take_follow
+from app.cli.projects.editing.edit_timing import add_time_arguments, change_time, given_time_options, take_lines
+from app.cli.projects.editing.edit_verbs import VERBS, add_verb_arguments, check_words, take_verb
+from app.cli.projects.editing.follow_verb import FOLLOW, MEANING, add_follow_arguments, take_follow
 from app.cli.terminal.progress import ProgressLine
 from app.document.changes.edit_changes import edit_with
 from app.document.changes.edit_words import edit_title
