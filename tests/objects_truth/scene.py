@@ -12,7 +12,7 @@ from app.lab.synthetic.scene import Part, SyntheticScene, make_room, placed, sti
 from app.lab.synthetic.textures import rgb
 from engine.camera.rig import CameraRig
 from tests.long_captures.scene import CONTRAST, FOCAL, PAINT
-from tests.objects_truth.people import Clothes, hand, make_person, walk
+from tests.objects_truth.people import Clothes, Walk, hand, make_person, walk
 
 SIZE = (160, 120)
 """Width and height of every picture."""
