@@ -49,6 +49,9 @@ from tests.objects_truth.volumes import read_volumes, truth_in_volumes
 FRAME, CAMERA, N_CORRECTIONS = 4, "cam03", 2
 """Where objects of generated captures are selected, and how often they are corrected."""
 
+TRAINING = {"long": ("--preset", "toy", "--set", "gaussians_per_anchor=8", "--set", "passes=6")}
+"""Options of the training, by scenario; none by default."""
+
 
 def oracle_of(truth: ObjectsTruth, name: str) -> PicksOf:
     """The picks that the masks themselves say."""
@@ -139,7 +142,7 @@ def found_in_scenario(folder: Path, scenario: str) -> Iterator[Row]:
     if not (capture / "cameras.json").is_file():
         write_scenario(folder, scenario)
     with contextlib.redirect_stdout(sys.stderr):
-        code = clipgstream(["train", str(capture), "--project", str(project)])
+        code = clipgstream(["train", str(capture), "--project", str(project), *TRAINING.get(scenario, ())])
     if code:
         sys.exit(code)
     opened, truth = open_trained(open_project(project, is_writable=False)), read_truth(folder / f"{scenario}-masks")

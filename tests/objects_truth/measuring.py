@@ -97,8 +97,9 @@ def clip_figures(
         n_both = n_either = 0
         for camera, view in views.items():
             labels, behind = truth.labels[camera][frame_index], truth.behind[camera][label - 1, frame_index]
-            drawn = shown(whole, view, chosen) > MOST
-            moved, moves = shown(whole, view, is_moving(whole)) > MOST, shown(rest, view, is_moving(rest)) > MOST
+            seen, opacities = projected(whole, view), whole.gaussians.opacities.numpy()
+            drawn, moved = (selected_share(seen, opacities, which) > MOST for which in (chosen, is_moving(whole)))
+            moves = shown(rest, view, is_moving(rest)) > MOST
             is_true, is_other = labels == label, (labels != label) & (labels != 0) & moved
             is_clear = is_true & (behind == 0)
             counted = (is_true, drawn, is_true & drawn, is_clear, is_clear & moves, is_other, is_other & ~moves)
