@@ -51,6 +51,8 @@ FRAME, CAMERA, N_CORRECTIONS = 4, "cam03", 2
 
 TRAINING = {"long": ("--preset", "toy", "--set", "gaussians_per_anchor=8", "--set", "passes=6")}
 """Options of the training, by scenario; none by default."""
+EVERY = {"long": 2}
+"""Of that many frames one is measured, by scenario; of the others, all."""
 
 
 def oracle_of(truth: ObjectsTruth, name: str) -> PicksOf:
@@ -116,10 +118,11 @@ def found_and_said(
     *,
     seen_from: str | None,
     n_corrections: int,
+    every: int = 1,
 ) -> Iterator[Found]:
     """As `searches`, and prints a table of each."""
     for found in searches(
-        opened, truth, name, frame_index=frame_index, seen_from=seen_from, n_corrections=n_corrections
+        opened, truth, name, frame_index=frame_index, seen_from=seen_from, n_corrections=n_corrections, every=every
     ):
         how = f"selected in frame {frame_index}, {found.n_corrections} corrections, searched in {found.search_s:.1f} s"
         print(f"{name}, {how}\n{report(found.clips)}", flush=True)
@@ -147,7 +150,9 @@ def found_in_scenario(folder: Path, scenario: str) -> Iterator[Row]:
         sys.exit(code)
     opened, truth = open_trained(open_project(project, is_writable=False)), read_truth(folder / f"{scenario}-masks")
     for name in truth.objects:
-        found = found_and_said(opened, truth, name, FRAME, seen_from=CAMERA, n_corrections=N_CORRECTIONS)
+        found = found_and_said(
+            opened, truth, name, FRAME, seen_from=CAMERA, n_corrections=N_CORRECTIONS, every=EVERY.get(scenario, 1)
+        )
         yield scenario, name, list(found)
 
 

@@ -66,14 +66,14 @@ def edited_clip(opened: TrainedProject, clip_index: int) -> tuple[EditedClip, fl
 
 
 def measured(
-    opened: TrainedProject, truth: ObjectsTruth, name: str, picks_of: PicksOf
+    opened: TrainedProject, truth: ObjectsTruth, name: str, picks_of: PicksOf, *, every: int = 1
 ) -> Iterator[tuple[ClipFigures, str]]:
-    """Clip by clip."""
+    """Clip by clip. every: See `clip_figures`."""
     for clip_index in opened.trained:
         edited, near = edited_clip(opened, clip_index)
         views = views_of(truth, opened.rig, near=near)
         picked, note = picks_of(edited, views)
-        yield clip_figures(edited, views, truth, name, picked), note
+        yield clip_figures(edited, views, truth, name, picked, every=every), note
 
 
 def searches(
@@ -84,6 +84,7 @@ def searches(
     frame_index: int,
     seen_from: str | None = None,
     n_corrections: int = 0,
+    every: int = 1,
 ) -> Iterator[Found]:
     """What is found from a lasso in one frame, then from that and one correction in the worst clip, and so on.
 
@@ -94,6 +95,7 @@ def searches(
         frame_index: In which it is selected.
         seen_from: The camera from which it is selected; None for all evaluated ones. See `lasso_seed`.
         n_corrections: See `correction`.
+        every: See `clip_figures`.
     """
     clips = {i: edited_clip(opened, i)[0].clip for i in opened.trained}
     searched = [SearchedClip(clip, lambda i=i: edited_clip(opened, i)[0]) for i, clip in clips.items()]
@@ -112,7 +114,7 @@ def searches(
             one = by_start[edited.clip.start]
             return Picked(one.sets), f"{one.confidence:.2f} {one.doubt}"
 
-        figures = list(measured(opened, truth, name, picks))
+        figures = list(measured(opened, truth, name, picks, every=every))
         n_bytes = float(np.mean([len(msgspec.json.encode(one)) for one in found]))
         yield Found(len(seeds) - 1, figures, search_s, n_bytes)
         if len(seeds) > n_corrections:
@@ -120,7 +122,7 @@ def searches(
         worst = min((clip for clip, _ in figures if clip.iou is not None), key=lambda clip: clip.iou or 0.0)
         edited, near = edited_clip(opened, worst.clip_index)
         views = views_of(truth, opened.rig, near=near)
-        seeds = (*seeds, correction(edited, views, truth, name, picks(edited, views)[0]))
+        seeds = (*seeds, correction(edited, views, truth, name, picks(edited, views)[0], every=every))
 
 
 Row = tuple[str, str, Sequence[Found]]

@@ -18,7 +18,7 @@ from tests.objects_truth.truth import ObjectsTruth
 
 
 def correction(
-    edited: EditedClip, views: dict[str, SeenFrom], truth: ObjectsTruth, name: str, picked: Picked
+    edited: EditedClip, views: dict[str, SeenFrom], truth: ObjectsTruth, name: str, picked: Picked, *, every: int = 1
 ) -> ObjectSeed:
     """One lasso in the camera and frame of a clip in which most pixels are missing from the object, or too much.
 
@@ -31,10 +31,11 @@ def correction(
         truth: Of the capture.
         name: Of the object.
         picked: What is taken for it so far.
+        every: So many frames lie from one that is looked at to the next.
     """
     is_picked, label = edited.rows.is_picked(picked), truth.label(name)
     most, frame, camera, too_much = -1, edited.clip.start, next(iter(views)), np.zeros((0, 0), bool)
-    for frame_index, found in moments(edited):
+    for frame_index, found in moments(edited, every=every):
         chosen = is_picked[edited.rows.indices_of(found.rows)]
         for one, view in views.items():
             mask, drawn = truth.labels[one][frame_index] == label, shown(found, view, chosen) > MOST
