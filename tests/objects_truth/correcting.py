@@ -39,7 +39,7 @@ def correction(
         chosen = is_picked[edited.rows.indices_of(found.rows)]
         for one, view in views.items():
             mask, drawn = truth.labels[one][frame_index] == label, shown(found, view, chosen) > MOST
-            extra = drawn & ~binary_dilation(mask, iterations=SLACK_PX)
+            extra = drawn & np.logical_not(binary_dilation(mask, iterations=SLACK_PX))
             n_missing, n_extra = np.count_nonzero(mask & ~drawn), np.count_nonzero(extra)
             if max(n_missing, n_extra) > most:
                 most, frame, camera = max(n_missing, n_extra), frame_index, one
