@@ -7,7 +7,7 @@ from scipy.ndimage import binary_dilation
 
 from engine.editing.edit import Picked
 from engine.editing.edited_clip import EditedClip
-from engine.editing.scene_object import ObjectSeed
+from engine.editing.scene_object import ObjectSeed, SeedView
 from engine.editing.selection.in_picture import under_mask
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.visibility import seen_rows
@@ -51,4 +51,4 @@ def correction(
     is_extra = under_mask(seen, too_much) & seen_rows(seen, found.gaussians.opacities.numpy())
     is_removed = np.zeros(edited.rows.n, bool)
     is_removed[edited.rows.indices_of(found.rows)[is_extra]] = True
-    return ObjectSeed(frame, removed=picked_rows(edited, is_removed))
+    return ObjectSeed(frame, removed=picked_rows(edited, is_removed), view=SeedView.of(views[camera]))
