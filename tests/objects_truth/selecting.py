@@ -25,7 +25,7 @@ def lasso_seed(
 
     Args:
         edited: The clip of the frame.
-        views: Those in which it is selected, by camera; the search is told of a single one.
+        views: Those in which it is selected, by camera; of a single one the seed keeps the view.
         truth: Of the capture.
         name: Of the object.
         frame_index: The frame.
