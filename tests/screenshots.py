@@ -228,6 +228,8 @@ def draw_objects(stage: Stage) -> None:
     ui = stage.studio.frame.ui
     ui.objects.choose(stage.session.edits.objects[-1].object_id)
     ui.editing.wanted_section = "objects"
+    outlines = stage.studio.frame.viewport.scene.objects
+    stage.wait(lambda: not outlines.is_empty, "the outline is drawn")
     stage.rest()
 
 
