@@ -68,7 +68,7 @@ def add_copies(document: ProjectDocument, copies: Iterable[ObjectCopy]) -> Proje
     names = {one.object_id: one.name for one in document.objects}
     added = []
     for number, copy in enumerate(copies, first):
-        name = copy.name.strip() or f"{names.get(copy.object_id, 'copy')} {number}"
+        name = copy.name.strip() or f"{names.get(copy.object_id, 'object')} copy {number}"
         added.append(_checked(document, structs.replace(copy, copy_id=number, name=name)))
     return replace(document, copies=(*document.copies, *added))
 

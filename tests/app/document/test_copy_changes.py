@@ -34,7 +34,7 @@ COPY = ObjectCopy(0, "", 1, Transform((1.0, 0.0, 0.5), TURN, 2.0), shift_frames=
 
 def test_new_copies_have_numbers_and_names_of_their_own() -> None:
     document = change.add_copies(BASE, [COPY, structs.replace(COPY, object_id=2, name="mine")])
-    assert [(copy.copy_id, copy.name) for copy in document.copies] == [(1, "one 1"), (2, "mine")]
+    assert [(copy.copy_id, copy.name) for copy in document.copies] == [(1, "one copy 1"), (2, "mine")]
     document = change.add_copies(change.remove_copies(document, [1]), [COPY])
     assert [copy.copy_id for copy in document.copies] == [2, 3]
     assert BASE.copies == ()

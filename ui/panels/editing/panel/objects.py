@@ -152,9 +152,9 @@ def _draw_chosen(session: SessionView, dispatch: Dispatch, ui: UiState, one: Sce
     job = job_of(session, one)
     rows = (
         ("Add selection", "add", CorrectObject(one.object_id, adds=True), can_edit and has_selection,
-         "What is selected in this frame belongs to it as well (Alt+A)"),
+         "What is selected in this frame belongs to it as well (Alt+I)"),
         ("Remove selection", "subtract", CorrectObject(one.object_id, adds=False), can_edit and has_selection,
-         "What is selected in this frame does not belong to it (Alt+Shift+A)"),
+         "What is selected in this frame does not belong to it (Alt+Shift+I)"),
         ("Find again", "find", FindObject(one.object_id), can_edit and job is None,
          "Looks for it in all clips again"),
         ("Select", "select", SelectObject(one.object_id), True,
