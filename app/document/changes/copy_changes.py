@@ -97,8 +97,8 @@ def stepped(copy: ObjectCopy, n: int, group: str = "") -> list[ObjectCopy]:
     Raises:
         ProjectError: A value gets out of range.
     """
-    if n < 1:
-        raise ProjectError(f"{n} copies cannot be made.", hint="Make at least one.")
+    if not 1 <= n <= MAX_COPIES:
+        raise ProjectError(f"{n} copies cannot be made.", hint=f"Make 1 to {MAX_COPIES}.")
     turn = turns_of_quats(_unit(copy.transform.quat))
     found = []
     for k in range(1, n + 1):

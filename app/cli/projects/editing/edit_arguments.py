@@ -204,7 +204,9 @@ def chosen_action(options: argparse.Namespace, target: Target) -> tuple[Action, 
         raise ProjectError(f"{said}.", hint="An edit does one thing; give one of them.")
     ((kind, given),) = found
     said_as = getattr(options, "said_as", {})  # after a verb
-    return _made(" with ".join(said_as.get(flag, flag) for flag in given), lambda: _action(kind, given, target)), f"--{kind.opposite}" in given
+    return _made(
+        " with ".join(said_as.get(flag, flag) for flag in given), lambda: _action(kind, given, target)
+    ), f"--{kind.opposite}" in given
 
 
 def _given_actions(options: argparse.Namespace) -> list[tuple[type[Action], dict[str, list[Any]]]]:
