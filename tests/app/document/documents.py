@@ -90,13 +90,15 @@ def _random_change(document: ProjectDocument, rng: random.Random, number: int) -
         return "paint", replace(document, exclusions=excluded), "brush"
     if kind == 10:
         seed = ObjectSeed(number, (PickedRows(0, "abc", "moving", pack_rows(np.arange(rng.randrange(1, 9)))),))
-        made = SceneObject(number, f"object {number}", seeds=(seed,))
+        object_id = max((one.object_id for one in document.objects), default=0) + 1  # also after another start
+        made = SceneObject(object_id, f"object {object_id}", seeds=(seed,))
         return "make an object", replace(document, objects=(*document.objects, made)[-3:]), None
     if kind == 11:
         return "change the time", replace(document, timing=random_timing(rng)), None
     if kind == 12:
         carried = rng.choice((None, OnPath("path 1"), OnObject(number)))
-        copy = ObjectCopy(number, f"copy {number}", rng.randrange(99), Transform((x, y, z)), x, y, carried_by=carried)
+        copy_id = max((one.copy_id for one in document.copies), default=0) + 1
+        copy = ObjectCopy(copy_id, f"copy {copy_id}", rng.randrange(9), Transform((x, y, z)), x, y, carried_by=carried)
         return "duplicate", replace(document, copies=(*document.copies, copy)[-4:]), ("copy", number // 9)
     if kind == 8:
         world = World((0.0, 0.0, rng.choice((1.0, -1.0))), abs(x) + 0.5) if x > 0 else World()
