@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from msgspec import Meta, Struct
 
 from engine.editing.actions import Vector
 from engine.editing.edit import MAX_NAME_CHARACTERS, ObjectTarget, Picked, PickedRows
+from engine.editing.selection.seen_from import SeenFrom
 
+MAX_VIEW_PX = 1 << 16
 _Count = Annotated[int, Meta(ge=0, lt=2**31)]
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 _Name = Annotated[str, Meta(min_length=1, max_length=MAX_NAME_CHARACTERS)]
@@ -22,6 +25,43 @@ Doubt = Literal["", "touching", "returning", "resting", "gone"]
 like it has come, it does not move, or nothing of it is there."""
 
 
+class SeedView(Struct, frozen=True, forbid_unknown_fields=True):
+    """The picture in which something was selected; see engine.editing.selection.seen_from.SeenFrom.
+
+    Attributes:
+        world_to_camera: Rigid map, OpenCV axes, row by row. [4, 4]
+        K: Intrinsics in pixels, row by row. [3, 3]
+        width, height: Of the picture, px.
+        near, set_back: See SeenFrom.
+
+    Raises:
+        ValueError: These numbers are not a view.
+    """
+
+    world_to_camera: tuple[float, ...]
+    K: tuple[float, ...]
+    width: int
+    height: int
+    near: float
+    set_back: float = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.world_to_camera) != 16 or len(self.K) != 9 or max(self.width, self.height) > MAX_VIEW_PX:
+            raise ValueError("a view has a pose of 16 numbers, intrinsics of 9, and fewer pixels a side than 2^16")
+        self.view()
+
+    @classmethod
+    def of(cls, view: SeenFrom) -> SeedView:
+        """As plain numbers."""
+        pose, K = (tuple(float(number) for number in np.ravel(m)) for m in (view.world_to_camera, view.K))
+        return cls(pose, K, view.width, view.height, view.near, view.set_back)
+
+    def view(self) -> SeenFrom:
+        """To project with."""
+        pose, K = np.reshape(self.world_to_camera, (4, 4)), np.reshape(self.K, (3, 3))
+        return SeenFrom(pose, K, self.width, self.height, self.near, self.set_back)
+
+
 class ObjectSeed(Struct, frozen=True, forbid_unknown_fields=True):
     """What somebody has said of an object in one frame: the first seed makes it, later ones correct it.
 
@@ -29,11 +69,14 @@ class ObjectSeed(Struct, frozen=True, forbid_unknown_fields=True):
         frame_index: The frame that was looked at.
         added: Gaussians that belong to it.
         removed: Gaussians that do not.
+        view: The picture in which they were selected: what could not be seen in it was not meant. None where all of
+            them are meant, as for a box.
     """
 
     frame_index: _Count
     added: tuple[PickedRows, ...] = ()
     removed: tuple[PickedRows, ...] = ()
+    view: SeedView | None = None
 
 
 class ObjectInClip(Struct, frozen=True, forbid_unknown_fields=True):

@@ -16,12 +16,15 @@ from engine.capture.clip import Clip
 from engine.editing.clip_rows import ClipRows
 from engine.editing.edit import Picked, PickedRows
 from engine.editing.edited_clip import EditedClip
-from engine.editing.picks import n_rows, pack_rows
+from engine.editing.picks import pack_rows
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
+from engine.editing.selection.projected import project_gaussians
+from engine.editing.selection.visibility import seen_rows
+from engine.model.host_array import host_array
 from engine.objects.moving_parts import ROLES, MovingParts, moving_parts
 from engine.objects.search import ObjectSearch, SearchGround
 
-LEAST_MOVING = 0.03
+LEAST_MOVING = 0.15
 """A selection of which less than this share travels is of something that stands still: the same in all clips."""
 SEEN_SHARE = 0.1
 """In frames with less of its mass than this share of the most, an object is not there."""
@@ -29,6 +32,10 @@ TOUCHING = 0.02
 """Share of an object's bonds that lead to something else, from which on it touches that."""
 Report = Callable[[int, int], None]
 """Told how many clips are done, of how many; its exceptions end the search."""
+
+
+_Said = tuple[int, np.ndarray, np.ndarray]
+"""The place of a seed's clip among all, and the Gaussians of it that belong to the object, and that do not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,17 +65,21 @@ def find_object(
         return ()
     grounds: list[SearchGround] = []
     rows: list[ClipRows] = []
+    said: dict[ObjectSeed, _Said] = {}
     for number, found in enumerate(clips):
         report(number, len(clips))
         edited = found.load()
-        if not grounds and (still := _standing_still(seeded, edited.rows, clips)):
-            return still
         grounds.append(SearchGround(moving_parts(edited)))
         rows.append(edited.rows)
+        for seed in seeded:
+            if _holds(found.clip, seed):
+                said[seed] = number, *_said(edited, seed)
+    if still := _standing_still(seeded, said, rows, clips):
+        return still
     search = ObjectSearch(grounds)
     for seed in seeded:
-        place = next(place for place, found in enumerate(clips) if _holds(found.clip, seed))
-        added, removed = (_among(rows[place], grounds[place].parts, sets) for sets in (seed.added, seed.removed))
+        place, *flags = said[seed]
+        added, removed = (flag[grounds[place].parts.index] for flag in flags)
         search.take(place, seed.frame_index, added, removed)
     report(len(clips), len(clips))
     return tuple(map(_result, rows, grounds))
@@ -81,22 +92,37 @@ def _holds(clip: Clip, seed: ObjectSeed) -> bool:
     return clip.start <= seed.frame_index < clip.stop
 
 
-def _among(rows: ClipRows, parts: MovingParts, sets: tuple[PickedRows, ...]) -> np.ndarray:
-    """Which parts of a clip were picked. [N] bool"""
-    return rows.is_picked(Picked(sets))[parts.index]
+def _said(edited: EditedClip, seed: ObjectSeed) -> tuple[np.ndarray, np.ndarray]:
+    """Which Gaussians of a clip were meant, of those that were added and removed. [n] bool each"""
+    added, removed = (edited.rows.is_picked(Picked(sets)) for sets in (seed.added, seed.removed))
+    if seed.view is None:
+        return added, removed
+    found = edited.decode(edited.clip.clip_time(seed.frame_index))
+    gaussians, view = found.gaussians, seed.view.view()
+    arrays = (host_array(tensor) for tensor in (gaussians.means, gaussians.quats, gaussians.scales))
+    is_seen = np.zeros(edited.rows.n, bool)
+    is_seen[edited.rows.indices_of(found.rows)] = seen_rows(
+        project_gaussians(*arrays, view), host_array(gaussians.opacities)
+    )
+    added, removed = (flags & is_seen if (flags & is_seen).any() else flags for flags in (added, removed))
+    return added, removed
 
 
 def _standing_still(
-    seeds: Sequence[ObjectSeed], rows: ClipRows, clips: Sequence[SearchedClip]
+    seeds: Sequence[ObjectSeed],
+    said: dict[ObjectSeed, _Said],
+    rows: Sequence[ClipRows],
+    clips: Sequence[SearchedClip],
 ) -> tuple[ObjectInClip, ...]:
     """Of a selection of what stands still, which is the same in all clips; empty for others."""
-    added = [one for seed in seeds for one in seed.added]
-    moving = sum(n_rows(one.rows) for one in added if one.role in ROLES)
-    if not added or moving > LEAST_MOVING * sum(n_rows(one.rows) for one in added):
+    place, added, _ = said[seeds[0]]
+    moves = np.array([one.role in ROLES for one in rows[place].sets])[rows[place].set_of]
+    if not added.any() or (added & moves).sum() > LEAST_MOVING * added.sum():
         return ()
-    is_meant = rows.is_picked(Picked(tuple(one for one in added if one.role not in ROLES)))
-    is_meant &= ~rows.is_picked(Picked(tuple(one for seed in seeds for one in seed.removed)))
-    sets = _packed(rows, np.flatnonzero(is_meant))
+    still = tuple(one for seed in seeds for one in seed.added if one.role not in ROLES)
+    is_meant = rows[place].is_picked(Picked(still)) & ~moves
+    is_meant &= ~rows[place].is_picked(Picked(tuple(one for seed in seeds for one in seed.removed)))
+    sets = _packed(rows[place], np.flatnonzero(is_meant))
     return tuple(ObjectInClip(one.clip.start, one.clip.stop, sets, ((one.clip.start, one.clip.stop),)) for one in clips)
 
 

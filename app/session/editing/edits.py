@@ -19,6 +19,7 @@ from app.session.editing.lost_edits import LostEdits
 from app.session.editing.selection import NOTHING_SELECTED, Selection
 from engine.editing.actions import Delete, Hide
 from engine.editing.reach import reach_of_edit
+from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import ProjectError
 
 
@@ -36,6 +37,11 @@ class Selects(Protocol):
 
     @property
     def selection(self) -> Selection: ...
+
+    @property
+    def seen_from(self) -> SeenFrom | None:
+        """The picture in which all of it was selected; None where it was not in one picture."""
+        ...
 
     def select(self, selection: Selection) -> None:
         """Select this and nothing else."""

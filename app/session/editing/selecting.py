@@ -26,6 +26,7 @@ from app.session.editing.selection_commands import (
     SelectAll,
     SelectAnchor,
     SelectByAttribute,
+    SelectInPicture,
     SelectionCommand,
 )
 from app.session.editing.selection_status import SelectionStatus
@@ -116,6 +117,7 @@ class ProjectSelecting(SessionPart):
         self.on_found: Callable[[], None] = nothing
         self._shown = shown
         self._before: Selection | None = None
+        self._seen_from: SeenFrom | None = None
         self._waiting: deque[tuple[SelectionCommand, GaussianArrays, AnchorValues | None]] = deque()
         self._running: _Find | None = None
         self._numbers = itertools.count(1)
@@ -200,9 +202,20 @@ class ProjectSelecting(SessionPart):
             self._take(self._before)
 
     def _take_found(self, work: _Find, found: np.ndarray) -> None:
-        self._take(selection_after(self.selection, work.command, work.ground, found))
+        command, before = work.command, self._seen_from
+        self._take(selection_after(self.selection, command, work.ground, found))
+        view = command.view if isinstance(command, SelectInPicture) else None
+        is_alone = view is not None and command.how.mode == "replace"
+        is_same = view is not None and before is not None and _is_same_view(view, before)
+        self._seen_from = view if is_alone or is_same else None
+
+    @property
+    def seen_from(self) -> SeenFrom | None:
+        """The picture in which all of the selection was selected; None where it was not in one picture."""
+        return self._seen_from
 
     def _take(self, selection: Selection) -> None:
+        self._seen_from = None
         if selection != self.selection:
             self._before, self.selection = self.selection, selection
             self._revision += 1
@@ -328,6 +341,10 @@ class ProjectSelecting(SessionPart):
     def _residuals_of(self, attribute: str) -> AnchorValues | None:
         column = ATTRIBUTES[attribute].column
         return self._shown.anchor_values(column) if column else None
+
+
+def _is_same_view(a: SeenFrom, b: SeenFrom) -> bool:
+    return a.size == b.size and np.array_equal(a.world_to_camera, b.world_to_camera) and np.array_equal(a.K, b.K)
 
 
 def _prepare() -> None:

@@ -41,7 +41,7 @@ from app.session.objects.object_commands import (
 from app.session.part import SessionPart
 from engine.capture.exclusions import PaintedMask
 from engine.editing.reach import ClipAnchors, unsearched
-from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
+from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject, SeedView
 from engine.errors import ProjectError
 
 Find = Callable[[OpenedProject, SceneObject, Callable[[float, float], None]], tuple[ObjectInClip, ...]]
@@ -164,7 +164,9 @@ class Objects(SessionPart):
                 hint="Go to the frame in which it was selected, or select here.",
             )
         sets = here.target().sets
-        return clip, ObjectSeed(frame_index, sets) if adds else ObjectSeed(frame_index, removed=sets)
+        view = self._selecting.seen_from
+        seen = None if view is None else SeedView.of(view)
+        return clip, ObjectSeed(frame_index, sets if adds else (), () if adds else sets, seen)
 
     def _leave_out(self, one: SceneObject) -> None:
         """Find out on a thread what training must not see; the step is made then."""

@@ -231,3 +231,26 @@ def test_where_selected_ones_are_seen(selecting: ProjectSelecting, shown: MadeSh
     assert (row + 0.5) / share.shape[0] == pytest.approx(0.5, abs=0.02)
     assert (column + 0.5) / share.shape[1] == pytest.approx(0.5, abs=0.02)
     assert selecting.share(gaussians, from_above(11.0), 0) is None  # another view, another map
+
+
+def test_it_is_known_in_which_picture_somebody_has_selected(selecting: ProjectSelecting) -> None:
+    view, other = from_above(), from_above(21.0)
+    strip = Rectangle(45.0, 0.0, 75.0, 99.0)
+    for command, expected in (
+        (SelectInPicture(strip, view), view),
+        (SelectInPicture(strip, from_above(), How("add")), view),
+        (SelectInPicture(strip, other, How("subtract")), None),
+        (SelectInPicture(strip, other), other),
+        (GrowSelection(1.5), None),
+        (SelectInPicture(strip, other), other),
+        (SelectVolume(BALL), None),
+        (SelectInPicture(strip, view, How("add")), None),
+        (SelectInPicture(strip, view), view),
+        (ClearSelection(), None),
+    ):
+        selecting.apply(command)
+        settle(selecting)
+        found = selecting.seen_from
+        assert (found is None) == (expected is None), command
+        if found is not None and expected is not None:
+            assert np.array_equal(found.world_to_camera, expected.world_to_camera)
