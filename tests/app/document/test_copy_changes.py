@@ -12,6 +12,7 @@ import pytest
 from msgspec import structs
 
 from app.document.changes import copy_changes as change
+from app.document.changes.object_changes import object_named
 from app.document.project_document import ProjectDocument
 from app.document.storing.document_patch import document_difference, document_with
 from app.document.storing.plain_patch import PatchError
@@ -105,8 +106,8 @@ def test_numbers_that_no_copy_has_are_refused() -> None:
         with pytest.raises(ProjectError, match="no copy 5"):
             attempt()
     with pytest.raises(ProjectError, match="no object called 'three'"):
-        change.object_named(BASE, "three")
-    assert change.object_named(BASE, " two ") == OBJECTS[1]
+        object_named(BASE, "three")
+    assert object_named(BASE, " two ") == OBJECTS[1]
 
 
 @pytest.mark.parametrize("n", [0, -3])

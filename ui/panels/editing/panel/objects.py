@@ -104,6 +104,8 @@ def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, one: SceneO
     ui.mark(f"objects.row{one.object_id}")
     if is_chosen and imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.f2, False):
         tool.rename(one)
+    if not imgui.is_item_visible() and tool.renamed != one.object_id:  # scrolled away
+        return
     high, draw = imgui.get_item_rect_max(), imgui.get_window_draw_list()
     color = (*one.color, 1.0)
     draw.add_rect_filled(ImVec2(low.x + 4, low.y + 10), ImVec2(low.x + SWATCH, low.y + 28), theme.u32(color), 3)
