@@ -20,6 +20,7 @@ from engine.model.clip_model import ClipModel
 from engine.model.decoder import Decoder
 from engine.model.field import SpatioTemporalField
 from tests.engine.editing.edited_clips import names_of
+from tests.objects_truth.correcting import correction
 from tests.objects_truth.measuring import ClipFigures, clip_figures, shown
 from tests.objects_truth.oracle import find_oracle, picked_rows
 from tests.objects_truth.scene import CLIP_LENGTH, SCENARIOS, make_object_scene, object_names
@@ -184,3 +185,18 @@ def test_scenes_keep_their_promises() -> None:
     assert 0.1 < max(ways) < 0.35
     with pytest.raises(ValueError, match="no scene called"):
         make_object_scene("dancing")
+
+
+def test_a_correction_adds_what_is_missing(balls: EditedClip, truth: ObjectsTruth) -> None:
+    seed = correction(balls, {"cam": VIEW}, truth, "left", Picked(()))
+    assert not seed.removed
+    assert seed == lasso_seed(balls, {"cam": VIEW}, truth, "left", seed.frame_index)
+
+
+def test_a_correction_removes_what_is_too_much(balls: EditedClip, truth: ObjectsTruth) -> None:
+    both = Picked(picked_rows(balls, of_role(balls, "moving", "residual")))
+    seed = correction(balls, {"cam": VIEW}, truth, "left", both)
+    assert not seed.added
+    is_removed = balls.rows.is_picked(Picked(seed.removed))
+    assert is_removed[of_role(balls, "residual")].mean() > 0.3
+    assert not is_removed[of_role(balls, "moving")].any()

@@ -4,12 +4,15 @@
     python -m tests.benchmarks.bench_objects PROJECT MASKS                  # what the best possible picks reach
     python -m tests.benchmarks.bench_objects PROJECT MASKS --find 5         # selected in frame 5, found by the program
     python -m tests.benchmarks.bench_objects PROJECT MASKS --find 5 --from cam03 --object person_a
+    python -m tests.benchmarks.bench_objects PROJECT MASKS --find 5 --from cam03 --corrections 2
     python -m tests.benchmarks.bench_objects PROJECT MASKS --edit 3
     python -m tests.benchmarks.bench_objects PROJECT tests/objects_truth/basketball_boxes.json
+    python -m tests.benchmarks.bench_objects --all out/objects           # writes, trains, finds all generated ones
 
 Masks are those that `--write` leaves next to each capture, or made from volumes in the held-out cameras. Without
 `--find` and `--edit` picks come from the masks themselves (the oracle): no picks of one label per Gaussian and clip do
-much better. `--find` selects the object with lassos in one frame, in all evaluated cameras or in that of `--from`.
+much better. `--find` selects what is visible in lassos in one frame, in all evaluated cameras or in that of `--from`;
+each of `--corrections` then adds what is missing, or removes what is too much, with one lasso in the worst clip.
 "Left" is the share of the object that still shows something moving after deletion, "others lost" the share of the other
 objects that goes with it. The notes are what the object's pixels are made of, or how sure the program is of a clip.
 """
@@ -17,44 +20,39 @@ objects that goes with it. The notes are what the object's pixels are made of, o
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from app.cli.cli import main as clipgstream
 from app.evaluation.headless import TrainedProject, open_trained
 from app.project.opening.project_access import open_project
-from engine.editing.clip_rows import named_sets
 from engine.editing.edit import ObjectTarget, Picked
 from engine.editing.edited_clip import EditedClip
 from engine.editing.effects import at_moment
-from engine.editing.scene_object import SceneObject
 from engine.editing.selection.seen_from import SeenFrom
-from engine.objects.finding import SearchedClip, find_object
 from engine.storage.json_files import json_text
+from tests.benchmarks.objects_summary import Found, PicksOf, Row, edited_clip, measured, searches, summary
 from tests.benchmarks.options import ending_on_bad_input
 from tests.documents.table import table
-from tests.objects_truth.measuring import ClipFigures, clip_figures, views_of
+from tests.objects_truth.measuring import ClipFigures
 from tests.objects_truth.oracle import find_oracle, picked_rows
 from tests.objects_truth.scene import SCENARIOS, make_object_scene
-from tests.objects_truth.selecting import lasso_seed
 from tests.objects_truth.truth import ObjectsTruth, read_truth, write_object_capture
 from tests.objects_truth.volumes import read_volumes, truth_in_volumes
 
-PicksOf = Callable[[EditedClip, dict[str, SeenFrom]], tuple[Picked, str]]
-"""The picks of a clip, and a note for the table."""
+FRAME, CAMERA, N_CORRECTIONS = 4, "cam03", 2
+"""Where objects of generated captures are selected, and how often they are corrected."""
 
-
-def edited_clips(opened: TrainedProject) -> Iterator[tuple[EditedClip, float]]:
-    """The trained clips of a project, and the near plane of each."""
-    for clip_index in opened.trained:
-        trained = opened.load(clip_index)
-        named = named_sets(trained.model, opened.header(clip_index), opened.project.settings.reference_clip)
-        yield EditedClip(trained.model, trained.clip, named), trained.base.header.near_plane
+TRAINING = {"long": ("--preset", "toy", "--set", "gaussians_per_anchor=8", "--set", "passes=6")}
+"""Options of the training, by scenario; none by default."""
+EVERY = {"long": 2}
+"""Of that many frames one is measured, by scenario; of the others, all."""
 
 
 def oracle_of(truth: ObjectsTruth, name: str) -> PicksOf:
@@ -64,25 +62,6 @@ def oracle_of(truth: ObjectsTruth, name: str) -> PicksOf:
         oracle = find_oracle(edited, views, truth, name)
         roles = ", ".join(f"{role} {weight:.2f}" for role, weight in oracle.weights.items())
         return Picked(picked_rows(edited, oracle.is_object)), roles
-
-    return picks
-
-
-def found_of(opened: TrainedProject, truth: ObjectsTruth, name: str, frame_index: int, camera: str | None) -> PicksOf:
-    """The picks that the program finds from a selection in one frame; see `lasso_seed`."""
-    clips = {edited.clip.clip_index: (edited, near) for edited, near in edited_clips(opened)}
-    searched = [SearchedClip(edited.clip, lambda edited=edited: edited) for edited, _ in clips.values()]
-    edited, near = next(found for found in clips.values() if found[0].clip.start <= frame_index < found[0].clip.stop)
-    views = views_of(truth, opened.rig, near=near)
-    chosen = views if camera is None else {camera: views[camera]}
-    began_s = time.perf_counter()
-    seed = lasso_seed(edited, chosen, truth, name, frame_index)
-    found = find_object(SceneObject(0, name, seeds=(seed,)), searched)
-    print(f"{name}: searched in {time.perf_counter() - began_s:.1f} s", file=sys.stderr)
-
-    def picks(edited: EditedClip, views: dict[str, SeenFrom]) -> tuple[Picked, str]:
-        in_clip = next(one for one in found if one.start == edited.clip.start)
-        return Picked(in_clip.sets), f"{in_clip.confidence:.2f} {in_clip.doubt}"
 
     return picks
 
@@ -104,22 +83,12 @@ def truth_of(path: Path, opened: TrainedProject) -> ObjectsTruth:
     """Masks from their folder, or for a project from a file of volumes."""
     if path.suffix != ".json":
         return read_truth(path)
-    views, clips = {}, list(edited_clips(opened))
+    views, clips = {}, [edited_clip(opened, i) for i in opened.trained]
     for camera in opened.project.settings.holdout:
         i = opened.rig.names.index(camera)
         width, height = (int(side) for side in opened.rig.image_sizes[i])
         views[camera] = SeenFrom(opened.rig.world_to_camera[i], opened.rig.Ks[i], width, height, clips[0][1])
     return truth_in_volumes((clip for clip, _ in clips), views, read_volumes(path))
-
-
-def measured(
-    opened: TrainedProject, truth: ObjectsTruth, name: str, picks_of: PicksOf
-) -> Iterator[tuple[ClipFigures, str]]:
-    """Clip by clip."""
-    for edited, near in edited_clips(opened):
-        views = views_of(truth, opened.rig, near=near)
-        picked, note = picks_of(edited, views)
-        yield clip_figures(edited, views, truth, name, picked), note
 
 
 def mean_iou(figures: list[ClipFigures]) -> float:
@@ -141,6 +110,52 @@ def report(found: list[tuple[ClipFigures, str]]) -> str:
     return table(header, rows) + f"\nmean IoU {100 * mean_iou([clip for clip, _ in found]):.1f} %"
 
 
+def found_and_said(
+    opened: TrainedProject,
+    truth: ObjectsTruth,
+    name: str,
+    frame_index: int,
+    *,
+    seen_from: str | None,
+    n_corrections: int,
+    every: int = 1,
+) -> Iterator[Found]:
+    """As `searches`, and prints a table of each."""
+    for found in searches(
+        opened, truth, name, frame_index=frame_index, seen_from=seen_from, n_corrections=n_corrections, every=every
+    ):
+        how = f"selected in frame {frame_index}, {found.n_corrections} corrections, searched in {found.search_s:.1f} s"
+        print(f"{name}, {how}\n{report(found.clips)}", flush=True)
+        yield found
+
+
+def write_scenario(folder: Path, scenario: str) -> Path:
+    """Write a generated capture and its masks; returns its folder."""
+    write_object_capture(folder / scenario, folder / f"{scenario}-masks", make_object_scene(scenario))
+    return folder / scenario
+
+
+def found_in_scenario(folder: Path, scenario: str) -> Iterator[Row]:
+    """Find the objects of a generated capture, which is written and trained first where that has not been done.
+
+    Raises:
+        SystemExit: The training failed.
+    """
+    capture, project = folder / scenario, folder / f"{scenario}-project"
+    if not (capture / "cameras.json").is_file():
+        write_scenario(folder, scenario)
+    with contextlib.redirect_stdout(sys.stderr):
+        code = clipgstream(["train", str(capture), "--project", str(project), *TRAINING.get(scenario, ())])
+    if code:
+        sys.exit(code)
+    opened, truth = open_trained(open_project(project, is_writable=False)), read_truth(folder / f"{scenario}-masks")
+    for name in truth.objects:
+        found = found_and_said(
+            opened, truth, name, FRAME, seen_from=CAMERA, n_corrections=N_CORRECTIONS, every=EVERY.get(scenario, 1)
+        )
+        yield scenario, name, list(found)
+
+
 def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.1f}"
 
@@ -158,35 +173,57 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--from", dest="seen_from", metavar="CAMERA", help="select it as seen from there only")
     parser.add_argument("--edit", type=int, metavar="ID", help="measure the picks of this edit of the project")
     parser.add_argument("--json", type=Path, help="also write all figures here")
+    parser.add_argument("--title", help="of the capture, for the last table")
+    parser.add_argument("--corrections", type=int, default=0, metavar="N", help="correct it so many times")
+    parser.add_argument(
+        "--all", type=Path, metavar="FOLDER", help="generated scenes, whatever of them is missing there"
+    )
     options = parser.parse_args(argv)
     if options.write:
         for scenario in SCENARIOS:
-            folder = options.write / scenario
-            write_object_capture(folder, options.write / f"{scenario}-masks", make_object_scene(scenario))
-            print(folder)
+            print(write_scenario(options.write, scenario))
+        return
+    if options.all:
+        print(summary([row for scenario in SCENARIOS for row in found_in_scenario(options.all, scenario)]))
         return
     if options.project is None or options.masks is None:
-        parser.error("name a project and its masks, or --write FOLDER")
+        parser.error("name a project and its masks, or --write FOLDER, or --all FOLDER")
     with ending_on_bad_input():
         opened = open_trained(open_project(options.project, is_writable=False))
         truth = truth_of(options.masks, opened)
         document: dict[str, Any] = {}
+        rows: list[Row] = []
         for name in (options.object,) if options.object else truth.objects:
-            how, picks_of = "oracle", oracle_of(truth, name)
             if options.find is not None:
-                how, picks_of = (
-                    f"selected in frame {options.find}",
-                    found_of(opened, truth, name, options.find, options.seen_from),
+                found = list(
+                    found_and_said(
+                        opened,
+                        truth,
+                        name,
+                        options.find,
+                        seen_from=options.seen_from,
+                        n_corrections=options.corrections,
+                    )
                 )
-            elif options.edit is not None:
+                rows.append((options.title or opened.project.folder.name, name, found))
+                document[name] = [_written(one.clips) for one in found]
+                continue
+            how, picks_of = "oracle", oracle_of(truth, name)
+            if options.edit is not None:
                 how, picks_of = f"edit {options.edit}", edit_of(opened, options.edit)
             if picks_of is None:
                 parser.error(f"edit {options.edit} does not act on picked Gaussians or an object")
-            found = list(measured(opened, truth, name, picks_of))
-            print(f"{name}, {how}\n{report(found)}", flush=True)
-            document[name] = [asdict(clip) | {"iou": clip.iou, "note": note} for clip, note in found]
+            clips = list(measured(opened, truth, name, picks_of))
+            print(f"{name}, {how}\n{report(clips)}", flush=True)
+            document[name] = _written(clips)
+    if rows:
+        print(summary(rows))
     if options.json:
         options.json.write_text(json_text(document, indent=1) + "\n", encoding="utf-8")
+
+
+def _written(clips: list[tuple[ClipFigures, str]]) -> list[dict[str, Any]]:
+    return [asdict(clip) | {"iou": clip.iou, "note": note} for clip, note in clips]
 
 
 if __name__ == "__main__":

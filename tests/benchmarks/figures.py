@@ -84,6 +84,9 @@ class Printed:
 
 
 _TRAIN_SAMPLE = "clipgstream train SAMPLE --project DIR --clips 0:2"
+_TRAIN_HALF = f"clipgstream train BASKETBALL --scale 0.5 --project DIR --clips 0:4 --holdout {HOLDOUT}"
+_SHARED = {_TRAIN_SAMPLE: "sample", _TRAIN_HALF: "objects-basketball"}
+"""Trainings that several tables begin with, and in whose folder the project is."""
 _OF_THE_PAPER = (
     "decoder-new,residual-none,residual-full,inherit-trainable,inherit-trainable-residual-full,field-continue,"
     "independent,schedule-inherited"
@@ -162,6 +165,22 @@ TABLES: dict[str, Clips | Printed] = {
         seeds=(0,),
     ),
     "mending": Printed("mending", ("python -m tests.benchmarks.bench_mending OUT",), seeds=(0,)),
+    "objects": Printed(
+        "objects of generated captures", ("python -m tests.benchmarks.bench_objects --all OUT",), which=-1, seeds=(0,)
+    ),
+    "objects-basketball": Printed(
+        "objects of the basketball",
+        (
+            _TRAIN_HALF,
+            "python -m tests.benchmarks.bench_objects DIR tests/objects_truth/basketball_boxes.json "
+            "--title basketball --find 4 --from 30 --corrections 2",
+        ),
+        which=-1,
+        seeds=(0,),
+    ),
+    "objects-drawing": Printed(
+        "frames with edits, objects and copies", (_TRAIN_HALF, "python -m tests.benchmarks.bench_edits DIR"), which=-1
+    ),
     "kernels": Printed("kernels", ("clipgstream bench --full --out OUT --quiet",), is_long=False),
     "steps": Printed("training steps", ("clipgstream bench --full --out OUT --quiet",), which=1, is_long=False),
     "ablation-sample": _ablation("sample, this program's scheme", "SAMPLE --set passes=4", seeds=(0, 1, 2)),
@@ -224,7 +243,8 @@ def main() -> None:
         folder = arguments.out / folder_name(name)
         folder.mkdir(parents=True, exist_ok=True)
         places = {"SAMPLE": str(SAMPLE), "BASKETBALL": str(arguments.basketball), "OUT": str(folder)}
-        trained = arguments.out / "sample" if isinstance(what, Printed) and _TRAIN_SAMPLE in what.commands else folder
+        first = what.commands[0]
+        trained = arguments.out / _SHARED[first] if first in _SHARED else folder
         places |= {"DIR": str(trained / "project"), "FILE": str(folder / "figures.json")}
         places |= {"CAPTURE": str(folder / "capture"), "LATER": f"{arguments.basketball}_later"}
         common = {"commit": commit, "machine": _machine(), "remark": arguments.remark}

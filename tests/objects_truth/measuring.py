@@ -77,7 +77,7 @@ def views_of(truth: ObjectsTruth, rig: CameraRig, *, near: float) -> dict[str, S
 
 
 def clip_figures(
-    edited: EditedClip, views: dict[str, SeenFrom], truth: ObjectsTruth, name: str, picked: Picked
+    edited: EditedClip, views: dict[str, SeenFrom], truth: ObjectsTruth, name: str, picked: Picked, *, every: int = 1
 ) -> ClipFigures:
     """Measure picks in one clip.
 
@@ -87,18 +87,20 @@ def clip_figures(
         truth: Of the capture.
         name: Of the object.
         picked: Its Gaussians.
+        every: So many frames lie from one that is looked at to the next.
     """
     deletion, label = Effects.made([Effect(picked, Delete())]), truth.label(name)
     is_picked = edited.rows.is_picked(picked)
     sums, lowest = np.zeros(7, np.int64), []
-    for frame_index, whole in moments(edited):
+    for frame_index, whole in moments(edited, every=every):
         rest = edited.decode(edited.clip.clip_time(frame_index), deletion)
         chosen = is_picked[edited.rows.indices_of(whole.rows)]
         n_both = n_either = 0
         for camera, view in views.items():
             labels, behind = truth.labels[camera][frame_index], truth.behind[camera][label - 1, frame_index]
-            drawn = shown(whole, view, chosen) > MOST
-            moved, moves = shown(whole, view, is_moving(whole)) > MOST, shown(rest, view, is_moving(rest)) > MOST
+            seen, opacities = projected(whole, view), whole.gaussians.opacities.numpy()
+            drawn, moved = (selected_share(seen, opacities, which) > MOST for which in (chosen, is_moving(whole)))
+            moves = shown(rest, view, is_moving(rest)) > MOST
             is_true, is_other = labels == label, (labels != label) & (labels != 0) & moved
             is_clear = is_true & (behind == 0)
             counted = (is_true, drawn, is_true & drawn, is_clear, is_clear & moves, is_other, is_other & ~moves)
@@ -110,9 +112,9 @@ def clip_figures(
     return ClipFigures(edited.clip.clip_index, *(int(n) for n in sums), lowest=min(lowest, default=None))
 
 
-def moments(edited: EditedClip) -> Iterator[tuple[int, EditedGaussians]]:
-    """The frames of a clip without edits: frame_index and Gaussians."""
-    for frame_index in range(edited.clip.start, edited.clip.start + edited.clip.n_frames):
+def moments(edited: EditedClip, *, every: int = 1) -> Iterator[tuple[int, EditedGaussians]]:
+    """The frames of a clip without edits, or every second one and so on: frame_index and Gaussians."""
+    for frame_index in range(edited.clip.start, edited.clip.stop, every):
         yield frame_index, edited.decode(edited.clip.clip_time(frame_index), NO_EFFECTS)
 
 

@@ -1,4 +1,4 @@
-"""What happens in the captures: people who touch, leave, stand still, and throw a ball."""
+"""What happens in the captures: people who touch, once or again and again, leave, stand still, and throw a ball."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.lab.synthetic.scene import Part, SyntheticScene, make_room, placed, sti
 from app.lab.synthetic.textures import rgb
 from engine.camera.rig import CameraRig
 from tests.long_captures.scene import CONTRAST, FOCAL, PAINT
-from tests.objects_truth.people import Clothes, hand, make_person, walk
+from tests.objects_truth.people import Clothes, Walk, hand, make_person, walk
 
 SIZE = (160, 120)
 """Width and height of every picture."""
@@ -31,6 +31,8 @@ OCHRE = Clothes("b07a3c", "8c3c34", "3c4660", "6b4a2c")
 """Warm shirts of both, and the same trousers: colour alone does not tell them apart."""
 BALL_RADIUS = 0.085
 """Scene units."""
+WAY_FRAMES = 25
+"""What somebody who walks to and fro needs for one way."""
 
 Scenario = Callable[[], tuple[list[Part], int]]
 """The moving parts, and the number of frames."""
@@ -91,11 +93,30 @@ def throwing() -> tuple[list[Part], int]:
     return [*people, Part("ball", meshes.sphere(BALL_RADIUS, n_around=32), _ball, ball, is_moving=True)], 40
 
 
+def long() -> tuple[list[Part], int]:
+    """Two walk to and fro and pass each other six times, arms into each other, over fifteen clips."""
+    a, b = _to_and_fro(n_ways=6, side=1.0), _to_and_fro(n_ways=6, side=-1.0)
+    return [*make_person("person_a", a, RED, seed=3), *make_person("person_b", b, OCHRE, seed=5)], 6 * WAY_FRAMES
+
+
+def _to_and_fro(*, n_ways: int, side: float) -> Walk:
+    """Ways along x and back, each begun with a turn; side: 1 or -1, of y = 0, and which way the first goes."""
+    rows = []
+    for i in range(n_ways):
+        along, start = side * (-1.0) ** i, WAY_FRAMES * i
+        rows += [
+            (start + after, along * x, side * y, -90.0 * along)
+            for after, x, y in ((3, -0.8, 0.42), (11, -0.25, 0.22), (17, 0.25, 0.22), (WAY_FRAMES, 0.8, 0.42))
+        ]
+    return walk(*rows)
+
+
 SCENARIOS: dict[str, Scenario] = {
     "touching": touching,
     "leaving": leaving,
     "pausing": pausing,
     "throwing": throwing,
+    "long": long,
 }
 """By name."""
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from engine.editing.edited_clip import EditedClip
-from engine.editing.scene_object import ObjectSeed
+from engine.editing.scene_object import ObjectSeed, SeedView
 from engine.editing.selection.in_picture import under_mask
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.visibility import seen_rows
@@ -25,7 +25,7 @@ def lasso_seed(
 
     Args:
         edited: The clip of the frame.
-        views: Those in which it is selected, by camera.
+        views: Those in which it is selected, by camera; the search is told of a single one.
         truth: Of the capture.
         name: Of the object.
         frame_index: The frame.
@@ -38,4 +38,5 @@ def lasso_seed(
         seen = projected(found, view)
         lasso = binary_dilation(mask, iterations=SLACK_PX) if mask.any() else mask
         is_chosen[index[under_mask(seen, lasso) & seen_rows(seen, opacities)]] = True
-    return ObjectSeed(frame_index, picked_rows(edited, is_chosen))
+    view = SeedView.of(next(iter(views.values()))) if len(views) == 1 else None
+    return ObjectSeed(frame_index, picked_rows(edited, is_chosen), view=view)
