@@ -31,6 +31,7 @@ from app.playback.modes.view_modes import COLOR  # noqa: E402
 from app.project.project_picture import fitted  # noqa: E402
 from app.project.recents import RecentProject  # noqa: E402
 from app.session.captures.calibration_page import CalibrationPage, VideoFacts  # noqa: E402
+from app.session.objects.object_commands import MakeObject  # noqa: E402
 from app.session.projects.preferences import PreferencesFile  # noqa: E402
 from app.session.projects.project_commands import OpenCapture  # noqa: E402
 from app.session.projects.settings import Settings  # noqa: E402
@@ -211,6 +212,27 @@ def draw_palette(stage: Stage) -> None:
     stage.studio.settle(4)
 
 
+def draw_objects(stage: Stage) -> None:
+    """What moves in the left half of the picture, as an object: its outline, its lane and its row in the panel."""
+    stage.session.dispatch(LookThrough(0))
+    stage.show_trained(5)
+    rect = stage.pilot.rects["viewport.rendered"]
+    stage.pilot.key(key.R)
+    stage.pilot.drag((rect.x0 + 2, rect.y0 + 2), (rect.center[0], rect.y1 - 2))
+    stage.wait(lambda: stage.session.selection.n_gaussians > 0, "something is selected")
+    stage.session.dispatch(MakeObject("person"))
+    stage.studio.settle(2)
+    stage.wait(lambda: stage.session.objects.searched is None, "the object is found")
+    stage.pilot.key(key.ESCAPE)
+    stage.pilot.move(*rect.center)
+    ui = stage.studio.frame.ui
+    ui.objects.choose(stage.session.edits.objects[-1].object_id)
+    ui.editing.wanted_section = "objects"
+    outlines = stage.studio.frame.viewport.scene.objects
+    stage.wait(lambda: not outlines.is_empty, "the outline is drawn")
+    stage.rest()
+
+
 def draw_preferences(stage: Stage) -> None:
     """Keys of one's own."""
     stage.show_trained()
@@ -278,6 +300,7 @@ SCREENS = (
     Screen("flicker", draw_flicker),
     Screen("modes", draw_modes),
     Screen("palette", draw_palette),
+    Screen("objects", draw_objects, size=(1080, 700)),
     Screen("preferences", draw_preferences, is_in_documents=False),
     Screen("light", draw_main, theme="light"),
     Screen("small", draw_main, size=(900, 600), is_in_documents=False),

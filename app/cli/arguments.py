@@ -68,12 +68,14 @@ class PlainParser(argparse.ArgumentParser):
         end = "" if message.endswith("?") else "."
         self.exit(EXIT_BAD_INPUT, printable(f"{self.prog}: {message}{end} See `{self.prog} --help`.") + "\n")
 
-    def options_of(self, command: str | None) -> list[str]:
-        """Options of a subcommand, or of this parser where there is none, as they are written."""
+    def options_of(self, command: str | None, verb: str | None = None) -> list[str]:
+        """Options of a subcommand and its verb, or of this parser where there is none, as they are written."""
         parser: argparse.ArgumentParser = self
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction) and command in action.choices:
                 parser = action.choices[command]
+        if isinstance(parser, PlainParser) and verb is not None:
+            parser = parser.verbs[verb]
         return list(parser._option_string_actions)
 
 
@@ -86,9 +88,11 @@ def parse(parser: PlainParser, argv: Sequence[str] | None) -> argparse.Namespace
     options, unknown = parser.parse_known_args(argv)
     if unknown:
         command = getattr(options, "command", None)
-        known = parser.options_of(command)
+        verb = getattr(options, "verb", None)
+        known = parser.options_of(command, verb)
         near = next((found for part in unknown if part.startswith("-") and (found := suggestion(part, known))), "")
         parser.prog = f"{parser.prog} {command}" if command else parser.prog
+        parser.prog = f"{parser.prog} PROJECT {verb}" if verb else parser.prog
         parser.error(f"unrecognized arguments: {' '.join(unknown)}" + (f".{near}" if near else ""))
     return options
 

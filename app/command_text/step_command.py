@@ -21,6 +21,7 @@ from engine.editing.edit import (
     Box,
     Edit,
     Everything,
+    Fill,
     KeyedVolume,
     ObjectTarget,
     Picked,
@@ -136,7 +137,7 @@ def _changed(folder: Path, old: Edit, new: Edit) -> CommandText | None:
         return _plain(folder, word, new.edit_id, f"project.switch_edit({new.edit_id}, is_on={new.is_on})")
     statement = f"project.replace_edit({new!r})"
     names = _names([new, new.action, new.target, new.scope])
-    if new.is_on != old.is_on:  # the options of an edit do not say that
+    if new.is_on != old.is_on or new.fill != old.fill:  # the options of an edit do not say that
         return None
     arguments, stdin = _edit_arguments(new, in_full=True)
     if structs.replace(old, name=new.name) == new:
@@ -228,4 +229,6 @@ def _names(values: Sequence[Any]) -> tuple[str, ...]:
     for value in values:
         if isinstance(value, KeyedVolume):
             found += [VolumeKey.__name__, type(value.keys[0].volume).__name__]
+        if isinstance(value, Edit) and value.fill is not None:
+            found += [Fill.__name__, PickedRows.__name__]
     return tuple(found)

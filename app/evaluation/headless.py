@@ -30,6 +30,8 @@ from engine.errors import ProjectError
 
 if TYPE_CHECKING:
     from engine.backends.backend import Backend
+    from engine.editing.clip_rows import NamedSet
+    from engine.editing.edited_clip import EditedClip
     from engine.metrics.clips.trained_clip import TrainedClip
 
 TRAIN_SCHEMA = 1
@@ -262,6 +264,19 @@ class TrainedProject:
             if last.header.field and model.field is not None:
                 model.attach_field(read_field(last).requires_grad_(requires_grad=False))
         return TrainedClip(self.clips[clip_index], model, base, state.drift)
+
+    def named_sets(self, trained: TrainedClip) -> dict[str, NamedSet]:
+        """The sets of Gaussians of a loaded clip, by what edits and objects call them. Raises as `header` does."""
+        from engine.editing.clip_rows import named_sets
+
+        reference_index = 0 if self.reference is None else self.reference.header.clip_index
+        return named_sets(trained.model, self.header(trained.clip.clip_index), reference_index)
+
+    def edited(self, trained: TrainedClip) -> EditedClip:
+        """A loaded clip as edits find it. Raises as `header` does."""
+        from engine.editing.edited_clip import EditedClip
+
+        return EditedClip(trained.model, trained.clip, self.named_sets(trained))
 
 
 def open_trained(project: Project, capture: Capture | None = None) -> TrainedProject:

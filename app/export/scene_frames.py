@@ -162,16 +162,13 @@ class SceneFrames:
 
     def _load(self, clip: Clip) -> _Loaded:
         if clip.clip_index not in self._loaded:
-            from engine.editing.clip_rows import named_sets
             from engine.metrics.clips.features_apart import with_features
 
             while len(self._loaded) >= (MAX_LOADED if self._edits.copies else 1):
                 self._loaded.popitem(last=False)
             use_threads(self._n_threads)
             loaded = self.opened.load(clip.clip_index)
-            header = self.opened.header(clip.clip_index)
-            reference = self.opened.reference
-            named = named_sets(loaded.model, header, 0 if reference is None else reference.header.clip_index)
+            named = self.opened.named_sets(loaded)
             trained = replace(loaded, model=with_features(loaded.model, self._features))
             self._loaded[clip.clip_index] = _Loaded(trained, named)
         self._loaded.move_to_end(clip.clip_index)

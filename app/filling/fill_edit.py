@@ -15,7 +15,6 @@ from engine.errors import ProjectError
 if TYPE_CHECKING:
     from app.evaluation.headless import TrainedProject
     from engine.camera.rig import CameraRig
-    from engine.editing.edited_clip import EditedClip
     from engine.filling.finding import FillFigures
 
 MAX_VIEWS = 16
@@ -52,8 +51,8 @@ def fill_behind(
         base = opened.load(opened.trained[0]).base.header
         spacing, near = base.spacing, base.near_plane
     clips = [
-        FilledClip(opened.clips[clip_index], lambda clip_index=clip_index: _loaded(opened, clip_index), spacing)
-        for clip_index in opened.trained
+        FilledClip(opened.clips[index], lambda index=index: opened.edited(opened.load(index)), spacing)
+        for index in opened.trained
     ]
     views = views_of(opened.rig, set(opened.project.settings.holdout), near=near)
     fill, figures = find_fill(
@@ -74,12 +73,3 @@ def views_of(rig: CameraRig, held_out: set[str], *, near: float) -> list[SeenFro
         K[:2] *= (small / size)[:, None]
         found.append(SeenFrom(rig.world_to_camera[row].astype(np.float64), K, int(small[0]), int(small[1]), near))
     return found
-
-
-def _loaded(opened: TrainedProject, clip_index: int) -> EditedClip:
-    from engine.editing.clip_rows import named_sets
-    from engine.editing.edited_clip import EditedClip
-
-    trained, header = opened.load(clip_index), opened.header(clip_index)
-    reference_index = 0 if opened.reference is None else opened.reference.header.clip_index
-    return EditedClip(trained.model, trained.clip, named_sets(trained.model, header, reference_index))

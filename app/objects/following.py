@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from app.evaluation.headless import open_trained
-from app.objects.searching import edited_clip
 from app.project.project import Project
 from engine.capture.capture import Capture
 from engine.editing.edit import KeyedVolume, Target
@@ -54,7 +53,7 @@ def follow_in_project(
         n_done = 0
         for clip, frames in wanted:
             report(n_done, n_all)
-            edited = edited_clip(opened, clip.clip_index) if frames else None
+            edited = opened.edited(opened.load(clip.clip_index)) if frames else None
             for frame_index in frames:
                 assert edited is not None
                 yield crowd_of(one, edited, frame_index)

@@ -9,7 +9,6 @@ from typing import Any
 
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
-from app.objects.searching import edited_clip
 from engine.editing.scene_object import SceneObject
 
 LEAST_SHARE = 0.5
@@ -54,7 +53,7 @@ def object_figures(
     opened = opened.measured
     capture, rig = opened.capture, opened.capture.rig
     holdout = set(capture.camera_indices(opened.project.settings.holdout))
-    frames = {index: _seen_frames(opened, one, index) for index in clip_indices}
+    frames = {index: [*filter(one.is_seen, opened.clips[index].frame_indices())] for index in clip_indices}
     n_all, n_done = sum(len(found) * len(rig) for found in frames.values()), 0
     clips: dict[str, Any] = {}
     for index in clip_indices:
@@ -71,22 +70,13 @@ def object_figures(
     return {"object": one.name, "least_share": LEAST_SHARE, "clips": clips}
 
 
-def _seen_frames(opened: TrainedProject, one: SceneObject, clip_index: int) -> list[int]:
-    seen = []
-    for frame in opened.clips[clip_index].frame_indices():
-        found = one.in_clip(frame)
-        if found is not None and any(first <= frame < stop for first, stop in found.seen):
-            seen.append(frame)
-    return seen
-
-
 class _ClipObject:
     """An object in one loaded clip."""
 
     def __init__(self, opened: TrainedProject, one: SceneObject, clip_index: int) -> None:
         self._opened, self._one = opened, one
         self._trained = opened.load(clip_index)
-        self._edited = edited_clip(opened, clip_index)
+        self._edited = opened.edited(self._trained)
 
     def add(self, total: _Sum, camera: int, frame: int) -> None:
         """Add the pixels of one picture to a sum."""

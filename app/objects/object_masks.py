@@ -13,13 +13,12 @@ import numpy as np
 
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
-from app.objects.searching import Report, edited_clip
+from app.objects.object_figures import LEAST_SHARE
+from app.objects.searching import Report
 from engine.capture.exclusions import PaintedMask, Stroke
 from engine.editing.scene_object import SceneObject
 from engine.errors import ProjectError
 
-LEAST_SHARE = 0.5
-"""Pixels of which it makes up more than this are its own."""
 EVERY_FRAMES, MARGIN_PX = 2, 3
 """It is looked at in every so many frames; the margin is in pixels of the small picture in which it is looked."""
 PITCH_PX = 4
@@ -50,7 +49,8 @@ def object_masks(
     rig = opened.capture.rig
     found: list[PaintedMask] = []
     for number, clip in enumerate(clips):
-        trained_clip, edited = opened.load(clip.clip_index), edited_clip(opened, clip.clip_index)
+        trained_clip = opened.load(clip.clip_index)
+        edited = opened.edited(trained_clip)
         frames = _frames(one, clip.frame_indices())
         covered: list[np.ndarray | None] = [None] * len(rig)
         for place, frame in enumerate(frames):
@@ -85,11 +85,7 @@ def strokes_of(mask: np.ndarray) -> tuple[Stroke, ...]:
 
 def _frames(one: SceneObject, frames: Sequence[int] | range) -> list[int]:
     """Those in which it is, a few of them."""
-    seen = []
-    for frame in frames:
-        found = one.in_clip(frame)
-        if found is not None and found.sets and any(first <= frame < stop for first, stop in found.seen):
-            seen.append(frame)
+    seen = [frame for frame in frames if one.is_seen(frame) and one.picked(frame).sets]
     return sorted({*seen[::EVERY_FRAMES], *seen[-1:]})
 
 

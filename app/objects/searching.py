@@ -5,18 +5,15 @@ it on a thread, the command line and scripts.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import structs
 
-from app.evaluation.headless import TrainedProject, open_trained
+from app.evaluation.headless import open_trained
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from engine.capture.capture import Capture
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
-
-if TYPE_CHECKING:
-    from engine.editing.edited_clip import EditedClip
 
 Report = Callable[[float, float], None]
 """Receives how much is done, and of how much; its exceptions end the search."""
@@ -48,7 +45,7 @@ def find_in_project(
     opened = open_trained(project, capture)
     catalog = ClipCatalog(project, len(opened.clips))
     trained = [clip for clip in opened.clips if catalog[clip.clip_index].state == "trained"]
-    clips = [SearchedClip(clip, lambda index=clip.clip_index: edited_clip(opened, index)) for clip in trained]
+    clips = [SearchedClip(clip, lambda index=clip.clip_index: opened.edited(opened.load(index))) for clip in trained]
     origins = {clip.start: catalog[clip.clip_index].origin for clip in trained}
     present = {*origins.values(), *(catalog[clip.clip_index].inherits for clip in trained)} - {""}
     meant = structs.replace(one, seeds=living_seeds(one, origins, present))
@@ -73,17 +70,3 @@ def living_seeds(one: SceneObject, origins: Mapping[int, str], present: Collecti
     if nearest is None:
         return one.seeds
     return (ObjectSeed(nearest.seen[0][0], nearest.sets), *seeds)
-
-
-def edited_clip(opened: TrainedProject, clip_index: int) -> EditedClip:
-    """A finished clip, loaded, as edits find it.
-
-    Raises:
-        ProjectError: It is not trained, or damaged.
-    """
-    from engine.editing.clip_rows import named_sets
-    from engine.editing.edited_clip import EditedClip
-
-    trained, header = opened.load(clip_index), opened.header(clip_index)
-    reference = 0 if opened.reference is None else opened.reference.header.clip_index
-    return EditedClip(trained.model, trained.clip, named_sets(trained.model, header, reference))

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from app.document.changes.copy_changes import copy_with, object_named
+from app.document.changes.copy_changes import copy_with
+from app.document.changes.object_changes import object_named
 from app.document.project_document import ProjectDocument
 from app.session.duplicating.copy_commands import (
     ChangeCopy,
@@ -21,7 +22,7 @@ from engine.editing.edit import EVERYWHERE, Scope
 from engine.editing.effects import EditStack
 from engine.editing.scene_object import SceneObject
 from engine.errors import ProjectError
-from engine.text import shown
+from engine.text import one_line, shown
 
 if TYPE_CHECKING:
     from app.evaluation.headless import TrainedProject
@@ -51,7 +52,7 @@ class ObjectCopying:
         """Show an object once more, or several times, each farther by the same step.
 
         Args:
-            name: Of the object.
+            name: Of the object, or its number as text.
             n_times: How many copies.
             values: See `object_copy`.
         Returns:
@@ -77,7 +78,7 @@ class ObjectCopying:
         """Fill rows with copies of an object, which itself stands at the corner.
 
         Args:
-            name: Of the object.
+            name: Of the object, or its number as text.
             n_across, n_along: How many stand in each direction, the object counted.
             across, along: From one to the next, scene units.
             step_frames: So much later is each than the one before.
@@ -114,7 +115,7 @@ class ObjectCopying:
         """A copy as a value, which is not in the document yet.
 
         Args:
-            name: Of the object.
+            name: Of the object, or its number as text.
             by: How far off it is, scene units.
             quat, scale: How it is turned, wxyz, and its size.
             pivot: What it is turned and scaled about; None for the middle of the object at the anchor frame.
@@ -182,7 +183,7 @@ class ObjectCopying:
         if not which or not found:
             names = list(dict.fromkeys(copy.group or copy.name for copy in self.copies))
             more = "..." if len(names) > 8 else ""
-            hint = f"There are {', '.join(names[:8])}{more}." if names else "The project has no copies."
+            hint = f"There are {', '.join(map(one_line, names[:8]))}{more}." if names else "The project has no copies."
             raise ProjectError(f"There is no copy and no group of copies called {shown(which)}.", hint=hint)
         return found
 

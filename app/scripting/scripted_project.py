@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from app.document.changes.edit_changes import edit_with
+from app.document.changes.object_changes import object_with
 from app.document.changes.reach_words import check_acts, reach_note
 from app.document.changes.timing_changes import segments_of, time_edit_called, timing_changed
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
@@ -44,7 +45,7 @@ from app.training.service import Launch
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.editing.actions import Action
-from engine.editing.edit import EVERYWHERE, Edit, Everything, Picked, Scope, Target, Volume
+from engine.editing.edit import EVERYWHERE, Edit, Everything, ObjectTarget, Picked, Scope, Target, Volume
 from engine.editing.reach import ClipAnchors, Reach, reach_of_edit
 from engine.errors import EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
@@ -250,6 +251,8 @@ class ScriptedProject(ScriptedObjects, ObjectCopying):
         """
         chosen, inverts = action_called(action, values)
         target = Everything() if target is None else target
+        if isinstance(target, ObjectTarget):
+            object_with(self.document, target.object_id)
         command = AddEdit(chosen, target, scope, is_inverted=is_inverted != inverts, name=name)
         made = changed(self.document, command).document.edits[-1]
         reach = reach_of_edit(made, self.anchors, self.document.objects)
@@ -318,6 +321,7 @@ class ScriptedProject(ScriptedObjects, ObjectCopying):
 
         self._check_open()
         self._project.check_writable()
+        edit_with(self.document, edit_id)
         tell = (lambda done, total: None) if on_progress is None else on_progress
         filled, figures = fill_behind(self.open_trained(), self.document.stack(), edit_id, tell)
         self._carry_out(ChangeEdit(filled, verb=FILL_VERB))

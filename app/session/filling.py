@@ -96,10 +96,7 @@ class Filling(SessionPart):
 
     def _failed(self, error: Exception) -> None:
         self._job = None
-        if isinstance(error, EngineError):
-            self._notices.add_error(FAILED, error)
-        else:
-            self._notices.add_failure(FAILED, error)
+        self._notices.add_failure(FAILED, error)
 
     def _stop(self) -> None:
         if self._job is not None:

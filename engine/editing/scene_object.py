@@ -149,6 +149,11 @@ class SceneObject(Struct, frozen=True, forbid_unknown_fields=True):
         found = self.in_clip(frame)
         return Picked(() if found is None else found.sets)
 
+    def is_seen(self, frame: float) -> bool:
+        """Whether it was found at a moment."""
+        found = self.in_clip(frame)
+        return found is not None and any(first <= frame < stop for first, stop in found.seen)
+
     @property
     def bounds(self) -> set[int]:
         """Frames from which on other Gaussians are it."""

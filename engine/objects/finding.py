@@ -34,8 +34,8 @@ Report = Callable[[int, int], None]
 """Told how many clips are done, of how many; its exceptions end the search."""
 
 
-_Said = tuple[int, np.ndarray, np.ndarray]
-"""The place of a seed's clip among all, and the Gaussians of it that belong to the object, and that do not."""
+_Said = tuple[int, np.ndarray, np.ndarray, np.ndarray | None]
+"""The place of a seed's clip among all, and its Gaussians that belong to the object, that do not, and that were seen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +79,10 @@ def find_object(
     search = ObjectSearch(grounds)
     for seed in seeded:
         place, *flags = said[seed]
-        added, removed = (flag[grounds[place].parts.index] for flag in flags)
-        search.take(place, seed.frame_index, added, removed)
+        added, removed, seen = (None if flag is None else flag[grounds[place].parts.index] for flag in flags)
+        assert added is not None
+        assert removed is not None
+        search.take(place, seed.frame_index, added, removed, seen)
     report(len(clips), len(clips))
     return tuple(map(_result, rows, grounds))
 
@@ -92,11 +94,12 @@ def _holds(clip: Clip, seed: ObjectSeed) -> bool:
     return clip.start <= seed.frame_index < clip.stop
 
 
-def _said(edited: EditedClip, seed: ObjectSeed) -> tuple[np.ndarray, np.ndarray]:
-    """Which Gaussians of a clip were meant, of those that were added and removed. [n] bool each"""
+def _said(edited: EditedClip, seed: ObjectSeed) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Which Gaussians of a clip were meant, of those that were added and removed, and which could be seen where that is
+    known. [n] bool each"""
     added, removed = (edited.rows.is_picked(Picked(sets)) for sets in (seed.added, seed.removed))
     if seed.view is None:
-        return added, removed
+        return added, removed, None
     found = edited.decode(edited.clip.clip_time(seed.frame_index))
     gaussians, view = found.gaussians, seed.view.view()
     arrays = (host_array(tensor) for tensor in (gaussians.means, gaussians.quats, gaussians.scales))
@@ -104,8 +107,9 @@ def _said(edited: EditedClip, seed: ObjectSeed) -> tuple[np.ndarray, np.ndarray]
     is_seen[edited.rows.indices_of(found.rows)] = seen_rows(
         project_gaussians(*arrays, view), host_array(gaussians.opacities)
     )
-    added, removed = (flags & is_seen if (flags & is_seen).any() else flags for flags in (added, removed))
-    return added, removed
+    if not ((added | removed) & is_seen).any():  # selected through something, as through a wall
+        return added, removed, None
+    return added & is_seen, removed & is_seen, is_seen
 
 
 def _standing_still(
@@ -115,7 +119,7 @@ def _standing_still(
     clips: Sequence[SearchedClip],
 ) -> tuple[ObjectInClip, ...]:
     """Of a selection of what stands still, which is the same in all clips; empty for others."""
-    place, added, _ = said[seeds[0]]
+    place, added, *_ = said[seeds[0]]
     moves = np.array([one.role in ROLES for one in rows[place].sets])[rows[place].set_of]
     if not added.any() or (added & moves).sum() > LEAST_MOVING * added.sum():
         return ()

@@ -19,6 +19,8 @@ from engine.objects.returning import returned
 SAID, UNSAID, BEFORE = 1.0, 0.4, 0.3
 """Weight of parts that somebody has selected, of those that were not selected along with them, and of what was known
 of a clip before it was corrected. Parts at the border of a clip weigh 1 at most."""
+SEEN, UNSEEN = 1.0, 0.12
+"""Weight of parts that were not selected, where the picture is known: those that were seen in it, and others."""
 CORRECTED = 3.0
 """Weight of a correction against the same."""
 COLOR = 0.3
@@ -70,16 +72,25 @@ class ObjectSearch:
         self._seeded: list[int] = []
         self._known_as: tuple[Appearance, Appearance] | None = None  # the object, and what else moves
 
-    def take(self, place: int, frame_index: int, added: np.ndarray, removed: np.ndarray) -> None:
+    def take(
+        self,
+        place: int,
+        frame_index: int,
+        added: np.ndarray,
+        removed: np.ndarray,
+        seen: np.ndarray | None = None,
+    ) -> None:
         """Take in what somebody has said of a clip, and carry it on, in both directions.
 
         Args:
             place: Of the clip among the grounds.
             frame_index: The frame that was looked at.
             added, removed: Parts that belong to the object, and that do not. [N] bool
+            seen: Parts that could be selected in the picture that was looked at; None where that is not known.
         """
         ground = self._grounds[place]
-        said, weight = added.astype(np.float64), UNSAID * _shown(ground.parts, frame_index)
+        unsaid = UNSAID if seen is None else np.where(seen, SEEN, UNSEEN)
+        said, weight = added.astype(np.float64), unsaid * _shown(ground.parts, frame_index)
         if self._seeded:  # a correction: what it leaves out stays as it was
             said, weight = ground.values.copy(), np.full(len(added), BEFORE)
             said[added] = 1.0

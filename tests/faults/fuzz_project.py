@@ -25,9 +25,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from msgspec import Struct, to_builtins
+from msgspec import Struct, structs, to_builtins
 
 from engine.backends.table import backend_called
+from engine.editing.actions import Delete, Hide, Transform
+from engine.editing.copies.object_copy import ObjectCopy, OnPath
+from engine.editing.edit import Edit, KeyedVolume, ObjectTarget, Prism, Sphere, VolumeKey
+from tests.app.document.documents import random_fill, random_timing
 from tests.faults.mutate import damaged_bytes, damaged_json, put_odd_file
 from tests.faults.tally import Case, Outcome, fuzz_main, judge, start_memory, take_outside, watch_files
 
@@ -72,7 +76,8 @@ def make_project(folder: Path) -> None:
     rows = (PickedRows(0, "abc", "moving", pack_rows(np.arange(0, 90, 3))),)
     found = (ObjectInClip(0, N_FRAMES, rows, ((0, 3),), 0.7, "touching", "abc"),)
     objects = (SceneObject(1, "ball", seeds=(ObjectSeed(1, rows, rows),), clips=found, stop=3),)
-    project.change(replace(project.document, regions=regions, camera_paths=paths, objects=objects), "mark")
+    plain = {"regions": regions, "camera_paths": paths, "objects": objects}
+    project.change(replace(project.document, **plain, **_edited_things()), "mark")
     project.close()
     project.clip_path(0).parent.mkdir()
     write_compact_clip(project.clip_path(0), reference)
@@ -89,6 +94,24 @@ def make_project(folder: Path) -> None:
         for row in _figure_rows():
             figures.add(row)
     Settings(folder / "user" / "settings.json").add_recent(RecentProject(str(folder), "nowhere", "a"))
+
+
+def _edited_things() -> dict[str, Any]:
+    """Edits with volumes that have keys, a fill, copies of an object, and a take that is edited in time."""
+    rng = random.Random(2)
+    keys = tuple(VolumeKey(float(frame), Sphere((0.0, frame, 0.0), 1.0)) for frame in (0, 3))
+    prism = Prism((0.0, 0.0, 1.0), (1.0, 2.0, 3.0), ((-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)))
+    behind = Edit(1, "", ObjectTarget(1), Delete())
+    edits = (
+        structs.replace(behind, fill=random_fill(behind, rng)),
+        Edit(2, "", KeyedVolume(keys), Hide()),
+        Edit(3, "", KeyedVolume((VolumeKey(0.5, prism),)), Transform((1.0, 0.0, 0.0))),
+    )
+    copies = (
+        ObjectCopy(1, "ball 1", 1, Transform((1.0, 0.0, 0.0)), 2.5, -0.5, outside="loop", group="ball group 1"),
+        ObjectCopy(2, "ball 2", 1, is_in_place=True, carried_by=OnPath("turntable"), stop=3),
+    )
+    return {"edits": edits, "copies": copies, "timing": random_timing(rng)}
 
 
 def _states() -> tuple[Any, Any]:

@@ -21,7 +21,7 @@ def job_words(job: JobStatus | None, now_s: float) -> str:
     if job is None:
         return "Starting"
     spent_s, left_s = job.elapsed_s(now_s), job.eta_s(now_s)
-    parts = [job.message or "Starting", f"{100 * job.done:.0f} %" if job.done > 0 else ""]
+    parts = [job.message or ("" if job.done > 0 else "Starting"), f"{100 * job.done:.0f} %" if job.done > 0 else ""]
     parts += ["" if spent_s is None else duration_text(spent_s)]
     parts += ["" if left_s is None else f"about {duration_text(left_s)} left"]
     return ", ".join(filter(None, parts))

@@ -15,7 +15,6 @@ from app.document.project_document import ProjectDocument
 from engine.camera.rotations import quats_of_turns, turns_of_quats
 from engine.editing.actions import Transform, Vector
 from engine.editing.copies.object_copy import MAX_COPIES, ObjectCopy, OnObject, OnPath
-from engine.editing.scene_object import SceneObject
 from engine.errors import ProjectError
 from engine.storage.typed_json import EntryError, to_type
 from engine.text import shown
@@ -33,20 +32,6 @@ def copy_with(document: ProjectDocument, copy_id: int) -> ObjectCopy:
         more = "..." if len(known) > 12 else ""
         hint = f"Copies are {', '.join(known[:12])}{more}." if known else "The project has no copies."
         raise ProjectError(f"There is no copy {copy_id}.", hint=hint)
-    return found
-
-
-def object_named(document: ProjectDocument, name: str) -> SceneObject:
-    """The object of that name, capital letters or not.
-
-    Raises:
-        ProjectError: There is none.
-    """
-    found = next((one for one in document.objects if one.name.casefold() == name.strip().casefold()), None)
-    if found is None:
-        known = ", ".join(one.name for one in document.objects[:8]) + ("..." if len(document.objects) > 8 else "")
-        hint = f"Objects are {known}." if known else "The project has no objects; make one first."
-        raise ProjectError(f"There is no object called {shown(name)}.", hint=hint)
     return found
 
 
@@ -68,7 +53,7 @@ def add_copies(document: ProjectDocument, copies: Iterable[ObjectCopy]) -> Proje
     names = {one.object_id: one.name for one in document.objects}
     added = []
     for number, copy in enumerate(copies, first):
-        name = copy.name.strip() or f"{names.get(copy.object_id, 'copy')} {number}"
+        name = copy.name.strip() or f"{names.get(copy.object_id, 'object')} copy {number}"
         added.append(_checked(document, structs.replace(copy, copy_id=number, name=name)))
     return replace(document, copies=(*document.copies, *added))
 
@@ -112,8 +97,8 @@ def stepped(copy: ObjectCopy, n: int, group: str = "") -> list[ObjectCopy]:
     Raises:
         ProjectError: A value gets out of range.
     """
-    if n < 1:
-        raise ProjectError(f"{n} copies cannot be made.", hint="Make at least one.")
+    if not 1 <= n <= MAX_COPIES:
+        raise ProjectError(f"{n} copies cannot be made.", hint=f"Make 1 to {MAX_COPIES}.")
     turn = turns_of_quats(_unit(copy.transform.quat))
     found = []
     for k in range(1, n + 1):

@@ -21,7 +21,7 @@ def fill_text(edit: Edit) -> str:
     parts += (
         [f"takes {_count(n_traces)} away that {'was' if n_traces == 1 else 'were'} a trace of it"] if n_traces else []
     )
-    return " and ".join(parts) or "nothing had to be filled"
+    return ", and ".join(parts) or "nothing had to be filled"
 
 
 def _count(n: int) -> str:

@@ -21,7 +21,7 @@ from engine.editing.picks import pack_rows, unpack_rows
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from engine.errors import ProjectError
 from engine.storage.typed_json import EntryError, to_type
-from engine.text import shown
+from engine.text import one_line, shown
 
 MAX_OBJECTS = 200
 PALETTE: tuple[Vector, ...] = (
@@ -63,7 +63,7 @@ def object_named(document: ProjectDocument, name: str) -> SceneObject:
     for one in document.objects:
         if str(one.object_id) == wanted:
             return one
-    raise ProjectError(f"There is no object {shown(wanted)}.", hint=_known(document))
+    raise ProjectError(f"There is no object called {shown(wanted)}.", hint=_known(document))
 
 
 def add_object(
@@ -91,6 +91,7 @@ def add_object(
     # a number that a removed object had is not used again while edits or steps of the history may mean that
     used = [edit.target.object_id for edit in document.edits if isinstance(edit.target, ObjectTarget)]
     object_id = max([object_id, *(number + 1 for number in used)])
+    _check_free(document, name.strip(), None)
     made = SceneObject(object_id, name.strip() or _free_name(document), color or _free_color(document), (seed,))
     return _with(document, (*document.objects, _checked(_shown_at_once(made, seed, within))))
 
@@ -126,7 +127,9 @@ def rename_object(document: ProjectDocument, object_id: int, name: str) -> Proje
     """
     if not name.strip():
         raise ProjectError("An object needs a name.")
-    return _replaced(document, structs.replace(object_with(document, object_id), name=name.strip()))
+    one = object_with(document, object_id)
+    _check_free(document, name.strip(), object_id)
+    return _replaced(document, structs.replace(one, name=name.strip()))
 
 
 def recolour_object(document: ProjectDocument, object_id: int, color: Vector) -> ProjectDocument:
@@ -258,6 +261,12 @@ def _corrected(sets: tuple[PickedRows, ...], seed: ObjectSeed) -> tuple[PickedRo
     return tuple(found.values())
 
 
+def _check_free(document: ProjectDocument, name: str, object_id: int | None) -> None:
+    """Check that no object has a name but that of a number."""
+    if any(one.name.casefold() == name.casefold() and one.object_id != object_id for one in document.objects):
+        raise ProjectError(f"Another object is called {shown(name)}.", hint="Choose another name.")
+
+
 def _free_name(document: ProjectDocument) -> str:
     taken = {one.name.casefold() for one in document.objects}
     return next(name for n in range(1, MAX_OBJECTS + 2) if (name := f"object {n}") not in taken)
@@ -270,5 +279,5 @@ def _free_color(document: ProjectDocument) -> Vector:
 
 
 def _known(document: ProjectDocument) -> str:
-    names = [one.name for one in document.objects[:20]] + (["..."] if len(document.objects) > 20 else [])
+    names = [one_line(one.name) for one in document.objects[:20]] + (["..."] if len(document.objects) > 20 else [])
     return f"Objects are {', '.join(names)}." if names else "The project has no objects."

@@ -10,7 +10,7 @@ from engine.editing.edit import Scope
 from engine.editing.reach import Frames, Reach
 from engine.errors import ProjectError
 
-VOLUME_HINT = "A box or sphere acts in all clips."
+VOLUME_HINT = "An object made of it acts in all clips, and so does a box or sphere."
 MAX_RUNS = 3
 
 

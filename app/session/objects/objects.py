@@ -42,7 +42,7 @@ from app.session.part import SessionPart
 from engine.capture.exclusions import PaintedMask
 from engine.editing.reach import ClipAnchors, unsearched
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject, SeedView
-from engine.errors import EngineError, ProjectError
+from engine.errors import ProjectError
 
 Find = Callable[[OpenedProject, SceneObject, Callable[[float, float], None]], tuple[ObjectInClip, ...]]
 Mask = Callable[[OpenedProject, SceneObject, Callable[[float, float], None]], tuple[PaintedMask, ...]]
@@ -184,7 +184,7 @@ class Objects(SessionPart):
                 self._document.change(after, f"train without {one.name}")
 
         def failed(error: Exception) -> None:
-            self._tell(f"{one.name} cannot be left out of training", error)
+            self._notices.add_failure(f"{one.name} cannot be left out of training", error)
 
         self._jobs.start(name, work, done, failed, can_cancel=True)
 
@@ -261,13 +261,7 @@ class Objects(SessionPart):
     def _failed(self, error: Exception) -> None:
         title = f"{'An object' if self._searched is None else self._searched.name} could not be found"
         self._give_up()
-        self._tell(title, error)
-
-    def _tell(self, title: str, error: Exception) -> None:
-        if isinstance(error, EngineError):
-            self._notices.add_error(title, error)
-        else:
-            self._notices.add_failure(title, error)
+        self._notices.add_failure(title, error)
 
     def _give_up(self) -> None:
         if self._searched is not None and (wanted := self._wanted(self._searched)) is not None:

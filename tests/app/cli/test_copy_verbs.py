@@ -81,7 +81,7 @@ def test_copies_are_switched_and_removed_one_by_one_or_as_a_group(run, folder):
     assert run("edit", folder, "copies", "--on", 2)[0] == 0
     assert [copy.is_on for copy in copies(folder)] == [False, True, False, True]
     assert run("edit", folder, "copies", "--remove", "alone")[1].startswith(
-        f"{folder}: 3 copies\n    1  one 1: of one, in"
+        f"{folder}: 3 copies\n    1  one copy 1: of one, in"
     )
     assert run("edit", folder, "--undo")[0] == 0
     assert len(copies(folder)) == 4

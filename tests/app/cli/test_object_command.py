@@ -79,9 +79,9 @@ def test_the_whole_life_of_an_object(run, folder):
         (("add", "ball", "--at", 99, *BALL), "There is no frame 99"),
         (("add", "--at", 1, *BALL), "add needs a name."),
         (("add", "ball", "--at", 1, *BALL, "--remove"), "--remove is given with add."),
-        (("find", "cat"), "There is no object 'cat'. Objects are dog."),
-        (("correct", "cat", "--at", 1, *BALL), "There is no object 'cat'. Objects are dog."),
-        (("remove", "7"), "There is no object '7'. Objects are dog."),
+        (("find", "cat"), "There is no object called 'cat'. Objects are dog."),
+        (("correct", "cat", "--at", 1, *BALL), "There is no object called 'cat'. Objects are dog."),
+        (("remove", "7"), "There is no object called '7'. Objects are dog."),
         (("rename", "dog"), "rename needs a value."),
         (("rename", "dog", " "), "An object needs a name."),
         (("span", "dog", "5"), "'5' is not a range A:B."),
@@ -141,7 +141,7 @@ def test_a_verb_is_an_option(run, empty, arguments, action, is_inverted):
         (("--by", 1), "--by does not go with an edit without a verb."),
         (("delete", "--hide"), "are given together"),
         (("delete", "--undo"), "--undo is given with what an edit does."),
-        (("delete", "--object", "cat"), "There is no object 'cat'. The project has no objects."),
+        (("delete", "--object", "cat"), "There is no object called 'cat'. The project has no objects."),
         (("paint",), "'paint' is not a verb. Verbs are hide, "),
         (("delete", "it"), "delete is followed by 'it', which is not an option of it."),
         (("trim", "--over", 2), "--over does not go with trim."),
@@ -171,7 +171,7 @@ def test_scripts_do_the_same(folder):
         corrected = project.correct_object("ball", 4, removed=picked)
         assert len(corrected.seeds) == 2
         project.recolour_object("ball", (1.0, 0.0, 0.0))
-        with pytest.raises(ProjectError, match="There is no object 'cat'"):
+        with pytest.raises(ProjectError, match="There is no object called 'cat'"):
             project.find_object("cat")
         with pytest.raises(KeyboardInterrupt):
             project.find_object("ball", on_progress=_interrupt)

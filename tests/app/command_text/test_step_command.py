@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import random
 import subprocess
 import sys
 from dataclasses import replace
@@ -24,9 +25,10 @@ from app.project.project import Project
 from app.scripting import scripted_project
 from engine.capture.exclusions import ExcludedFrames, Exclusions
 from engine.editing.actions import Delete, Hide
-from engine.editing.edit import Edit, Everything, Sphere
+from engine.editing.edit import Edit, Everything, Scope, Sphere
 from engine.gate.regions import GateRegion
 from tests.app.command_text.documents import EDITS, HARD_NAMES, NAMES, STACKS
+from tests.app.document.documents import random_fill
 from tests.app.made_projects import make_project
 
 TELL = "import json, sys; print(json.dumps([sys.argv[1:], sys.stdin.read()]))"
@@ -121,6 +123,16 @@ def test_a_changed_stack(project, monkeypatch, tmp_path, stack, edit, which, pla
     ):
         said = check(project, before, replace(before, edits=tuple(after_edits)), monkeypatch, tmp_path)
         assert not said or option is None or option in said
+
+
+def test_an_edit_with_a_fill(project, monkeypatch, tmp_path):
+    plain = Edit(1, "", Sphere((0.0, 0.0, 0.0), 1.0), Delete())
+    filled = structs.replace(plain, fill=random_fill(plain, random.Random(3)))
+    later = structs.replace(filled, scope=Scope(0, 1))
+    document = held(project)
+    for before, after, option in ((plain, filled, "--put"), (filled, later, "--replace"), (later, plain, "--put")):
+        documents = (replace(document, edits=(edit,)) for edit in (before, after))
+        assert option in check(project, *documents, monkeypatch, tmp_path)
 
 
 @pytest.mark.slow

@@ -18,10 +18,13 @@ from app.document.storing.stored_document import plain_document
 from engine.camera.path_presets import turntable
 from engine.capture.exclusions import Exclusions, PaintedMask, Stroke
 from engine.editing.actions import Delete, Expose, Hide, Recolor, Transform
-from engine.editing.edit import Box, Edit, KeyedVolume, Picked, PickedRows, Prism, Scope, Sphere, VolumeKey
+from engine.editing.copies.object_copy import ObjectCopy, OnObject, OnPath
+from engine.editing.edit import Box, Edit, Fill, KeyedVolume, Picked, PickedRows, Prism, Scope, Sphere, VolumeKey
+from engine.editing.fills.fill import FillGaussians, fill_key, packed_fill
 from engine.editing.picks import pack_rows
 from engine.editing.scene_object import ObjectInClip, ObjectSeed, SceneObject
 from engine.gate.regions import sphere_region
+from engine.timing.segment import Segment
 
 SETTINGS = ProjectSettings(capture="somewhere", fingerprint="abc", holdout=("1",), overrides={"passes": 6.0})
 EMPTY = ProjectDocument(SETTINGS)
@@ -57,7 +60,7 @@ def random_events(
 
 
 def _random_change(document: ProjectDocument, rng: random.Random, number: int) -> tuple[str, ProjectDocument, Any]:
-    kind = rng.randrange(11)
+    kind = rng.randrange(13)
     edits = document.edits
     new_id = max((edit.edit_id for edit in edits), default=-1) + 1
     x, y, z = (rng.uniform(-3, 3) for _ in range(3))
@@ -87,8 +90,16 @@ def _random_change(document: ProjectDocument, rng: random.Random, number: int) -
         return "paint", replace(document, exclusions=excluded), "brush"
     if kind == 10:
         seed = ObjectSeed(number, (PickedRows(0, "abc", "moving", pack_rows(np.arange(rng.randrange(1, 9)))),))
-        made = SceneObject(number, f"object {number}", seeds=(seed,))
+        object_id = max((one.object_id for one in document.objects), default=0) + 1  # also after another start
+        made = SceneObject(object_id, f"object {object_id}", seeds=(seed,))
         return "make an object", replace(document, objects=(*document.objects, made)[-3:]), None
+    if kind == 11:
+        return "change the time", replace(document, timing=random_timing(rng)), None
+    if kind == 12:
+        carried = rng.choice((None, OnPath("path 1"), OnObject(number)))
+        copy_id = max((one.copy_id for one in document.copies), default=0) + 1
+        copy = ObjectCopy(copy_id, f"copy {copy_id}", rng.randrange(9), Transform((x, y, z)), x, y, carried_by=carried)
+        return "duplicate", replace(document, copies=(*document.copies, copy)[-4:]), ("copy", number // 9)
     if kind == 8:
         world = World((0.0, 0.0, rng.choice((1.0, -1.0))), abs(x) + 0.5) if x > 0 else World()
         return "turn the world", replace(document, world=world), None
@@ -104,6 +115,28 @@ def _clips(rng: random.Random) -> tuple[ObjectInClip, ...]:
     return tuple(ObjectInClip(10 * i, 10 * i + 10, sets, ((10 * i, 10 * i + 7),), rng.random()) for i in range(3))
 
 
+def random_timing(rng: random.Random) -> tuple[Segment, ...]:
+    """Up to four segments of all kinds."""
+    first = rng.randrange(20)
+    kinds = (
+        Segment(first, first + 9),
+        Segment(first, first + 9, 0.5, 1.0 + rng.random(), "smooth", 0.1, 0.9, is_reversed=True),
+        Segment(first, first + 1, n_frozen=30),
+        Segment(first, first + 9, repeats=3, crossfade_frames=2),
+    )
+    return tuple(rng.choices(kinds, k=rng.randrange(5)))
+
+
+def random_fill(edit: Edit, rng: random.Random) -> Fill:
+    """What shows behind an edit; for half of them made for another one."""
+    n = rng.randrange(5)
+    column = np.full((n, 3), rng.random() + 0.1, np.float32)
+    turns = np.tile(np.array([1, 0, 0, 0], np.float32), (n, 1))
+    found = FillGaussians(column, turns, column, column[:, 0], column, column[:, 0] > 0.5)
+    traces = (PickedRows(0, "abc", "static", pack_rows(np.arange(n + 1))),)
+    return Fill(fill_key(edit) if rng.random() < 0.5 else "other", traces, packed_fill(found))
+
+
 def _edited(edit: Edit, rng: random.Random) -> Edit:
     first = rng.randrange(20)
     prism = Prism((rng.random(), 0.0, 0.0), (1.0, 2.0, rng.random() + 0.1), ((-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)))
@@ -111,6 +144,7 @@ def _edited(edit: Edit, rng: random.Random) -> Edit:
     change = rng.choice(
         (
             {"is_on": not edit.is_on},
+            {"fill": random_fill(edit, rng)},
             {"name": f"name {rng.random()}"},
             {"scope": Scope(first, first + 5, rng.random() < 0.5)},
             {"target": Box((rng.random(), -0.0, 0.0), (1, 2, 3)), "is_inverted": True},

@@ -12,6 +12,7 @@ import pytest
 from msgspec import structs
 
 from app.document.changes import copy_changes as change
+from app.document.changes.object_changes import object_named
 from app.document.project_document import ProjectDocument
 from app.document.storing.document_patch import document_difference, document_with
 from app.document.storing.plain_patch import PatchError
@@ -34,7 +35,7 @@ COPY = ObjectCopy(0, "", 1, Transform((1.0, 0.0, 0.5), TURN, 2.0), shift_frames=
 
 def test_new_copies_have_numbers_and_names_of_their_own() -> None:
     document = change.add_copies(BASE, [COPY, structs.replace(COPY, object_id=2, name="mine")])
-    assert [(copy.copy_id, copy.name) for copy in document.copies] == [(1, "one 1"), (2, "mine")]
+    assert [(copy.copy_id, copy.name) for copy in document.copies] == [(1, "one copy 1"), (2, "mine")]
     document = change.add_copies(change.remove_copies(document, [1]), [COPY])
     assert [copy.copy_id for copy in document.copies] == [2, 3]
     assert BASE.copies == ()
@@ -105,8 +106,8 @@ def test_numbers_that_no_copy_has_are_refused() -> None:
         with pytest.raises(ProjectError, match="no copy 5"):
             attempt()
     with pytest.raises(ProjectError, match="no object called 'three'"):
-        change.object_named(BASE, "three")
-    assert change.object_named(BASE, " two ") == OBJECTS[1]
+        object_named(BASE, "three")
+    assert object_named(BASE, " two ") == OBJECTS[1]
 
 
 @pytest.mark.parametrize("n", [0, -3])

@@ -18,7 +18,7 @@ CLIPS = (
 )
 STILL, MOVING = (RowSet("ref", 0, "static"), 100), (RowSet("ref", 0, "moving"), 20)
 ONE = RowSet("one", 1, "residual"), 50
-HINT = " A box or sphere acts in all clips."
+HINT = " An object made of it acts in all clips, and so does a box or sphere."
 
 
 def note(*picked: tuple[RowSet, int], scope: Scope = EVERYWHERE, is_inverted: bool = False) -> str:

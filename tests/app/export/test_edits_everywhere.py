@@ -301,7 +301,7 @@ def test_an_object_is_written_alone_whatever_edits_there_are(opened: TrainedProj
     assert [len(page.frame(frame)["means"]) > 0 for frame in range(6)] == there
     with pytest.raises(ProjectError) as caught:
         export_player(opened, PlayerJob(tmp_path / "cat.html", object="cat"), ignore)
-    assert "There is no object 'cat'" in str(caught.value)
+    assert "There is no object called 'cat'" in str(caught.value)
     project.history = DocumentHistory(replace(project.document, objects=()))
 
 

@@ -44,7 +44,7 @@ def test_every_step_has_a_name_and_goes_back_and_forth(session):
         "crowd of 3: one",
         "switch off 3 copies",
         "change copy: one 1",
-        "remove copy: one 5",
+        "remove copy: one copy 5",
         "remove 3 copies",
     )
     assert [copy.group for copy in session.edits.copies] == ["one group 1", "one group 2", "one group 2"]

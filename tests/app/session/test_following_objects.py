@@ -112,7 +112,7 @@ def test_the_command_line_does_the_same(run, folder):
         (("hide", "--edit", 1), "--edit is given without follow."),
         (("follow", "--object", "ball", "--edit", 1, "--on", 1), "--on is given with follow."),
         (("follow", "--object", "ball", "--edit", 1, "--frame", 2), "is given with frames"),
-        (("follow", "--object", "cat", "--edit", 1), "There is no object 'cat'"),
+        (("follow", "--object", "cat", "--edit", 1), "There is no object called 'cat'"),
         (("follow", "--object", "ball", "--edit", 7), "There is no edit 7"),
     ):
         code, _, err = run("edit", folder, *arguments)

@@ -169,3 +169,12 @@ def test_the_same_seed_gives_the_same_object() -> None:
         ObjectSearch(grounds).take(0, 2, said(grounds[0], of[0], side=0.5), nobody(grounds[0]))
         results.append(np.concatenate([ground.values for ground in grounds]))
     assert np.array_equal(results[0], results[1])
+
+
+def test_what_was_hidden_is_asked_of_what_it_hangs_together_with() -> None:
+    """A third of a thing is seen and selected: the rest of it, which was not seen, belongs to it; others do not."""
+    grounds, of = grounds_of([Thing(lambda frame: (0, 0, 0)), Thing(lambda frame: (1, 0, 0))], 1)
+    seen = said(grounds[0], of[0], side=0.7)
+    none = nobody(grounds[0])
+    ObjectSearch(grounds).take(0, 0, seen, none, seen | (of[0] == 1))
+    assert found(grounds[0], of[0]) == (1.0, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -192,6 +193,19 @@ def test_flying_leaves_a_camera_and_letters_in_a_text_field_do_not_fly(pilot: Pi
     assert np.array_equal(pilot.session.view.eye, eye)
 
 
+def test_a_letter_that_outlasts_its_ctrl_does_not_fly_until_it_is_pressed_again(pilot: Pilot) -> None:
+    pilot.session.view.look(2)
+    with held(pilot, "Ctrl"):
+        pilot.studio.window.dispatch_event("on_key_press", key.D, 0)
+        pilot.draw(2)
+    pilot.draw(5)
+    assert pilot.session.view.look_through == 2
+    pilot.studio.window.dispatch_event("on_key_release", key.D, 0)
+    pilot.draw(2)
+    hold(pilot, key.D, 5)
+    assert pilot.session.view.look_through is None
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_while_one_flies_a_button_looks_around(pilot: Pilot, preset: str) -> None:
     pilot.studio.frame.ui.navigation.preset_name = preset
@@ -209,7 +223,7 @@ def test_while_one_flies_a_button_looks_around(pilot: Pilot, preset: str) -> Non
 def test_no_action_wants_the_keys_that_fly() -> None:
     taken = {parsed.chord for action in ACTIONS for parsed in map(parse_key, action.keys)}
     for letter in FLY_KEYS:
-        for is_shift, is_alt in ((False, False), (True, False), (False, True)):
+        for is_shift, is_alt in itertools.product((False, True), repeat=2):
             assert (letter, False, is_shift, is_alt) not in taken
 
 

@@ -94,7 +94,7 @@ def test_the_take_is_played_with_a_key_or_a_button(panel: Pilot) -> None:
 
 def test_segments_of_the_same_frames_lie_below_each_other() -> None:
     take = (Segment(0, 10), Segment(5, 15), Segment(12, 20), Segment(6, 8), Segment(6, 9), Segment(30, 31))
-    assert levels_of(take) == [0, 1, 0, 2, MAX_LEVELS - 1, 0]
+    assert levels_of(take) == (0, 1, 0, 2, MAX_LEVELS - 1, 0)
 
 
 def test_a_cross_fade_is_no_longer_than_it_can_be() -> None:

@@ -17,6 +17,8 @@ def test_a_job_tells_stage_share_time_and_time_left():
     assert times(JobStatus("Calibrating", began_s=100.0), 102.0) == ["0:02"]
     half = JobStatus("Calibrating", 0.4, "Key points", began_s=100.0)
     assert "40 %" in job_words(half, 132.0)
+    assert job_words(JobStatus("Finding"), 0.0) == "Starting"
+    assert job_words(JobStatus("Finding", 0.25), 0.0) == "25 %", "it has started"
     assert times(half, 132.0) == ["0:32", "0:48"]
     assert times(JobStatus("Calibrating", 0.01, "Key points", 100.0), 145.0) == ["0:45"], "too early to tell"
     assert times(JobStatus("Saving", 0.5, "0003"), 145.0) == []  # nobody noted when it began

@@ -30,11 +30,15 @@ class Flying:
         self._velocity = np.zeros(3)
         self.is_flying = False
         """Are keys held?"""
+        self._taken: set[str] = set()
+        """Letters that were part of something else, until they are released: Ctrl often comes up before its letter."""
 
     def follow(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> bool:
         """Move the view on by one frame. Whether it moves."""
         io, view = imgui.get_io(), session.view
-        wanted = np.zeros(3) if _are_keys_taken(ui) else _direction()
+        held = {name for name in FLY_KEYS if imgui.is_key_down(getattr(imgui.Key, name))}
+        self._taken = held if _are_keys_taken(ui) else self._taken & held
+        wanted = _direction(held - self._taken)
         was_standing = not self.is_flying and not self._velocity.any()
         self.is_flying = bool(wanted.any())
         if was_standing and not self.is_flying:
@@ -54,10 +58,9 @@ class Flying:
         return True
 
 
-def _direction() -> np.ndarray:
-    """Where the held keys lead to: to the right, up and ahead, of unit length or zero. [3]"""
-    held = [move for name, move in FLY_KEYS.items() if imgui.is_key_down(getattr(imgui.Key, name))]
-    total = np.sum(held, axis=0) if held else np.zeros(3)
+def _direction(held: set[str]) -> np.ndarray:
+    """Where held keys lead to: to the right, up and ahead, of unit length or zero. [3]"""
+    total = np.sum([FLY_KEYS[name] for name in held], axis=0) if held else np.zeros(3)
     length = float(np.linalg.norm(total))
     return total / length if length > 0.0 else total
 

@@ -146,7 +146,7 @@ def _values(options: argparse.Namespace, project: ScriptedProject) -> dict[str, 
     for option in ("by", "scale", "shift", "speed"):
         numbers = getattr(options, f"copy_{option}")
         if not all(abs(number) <= 1e12 for number in (numbers if isinstance(numbers, list | tuple) else [numbers])):
-            raise ProjectError(f"--{option} is not a finite number.")
+            raise ProjectError(f"--{option} has a number that is not finite or too large.")
     quat = (1.0, 0.0, 0.0, 0.0)
     if options.copy_rotate is not None:
         quat = _rotation(options.copy_rotate)

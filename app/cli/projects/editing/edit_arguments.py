@@ -203,7 +203,10 @@ def chosen_action(options: argparse.Namespace, target: Target) -> tuple[Action, 
         said = f"{' and '.join(flags)} are given together" if found else "No edit is given"
         raise ProjectError(f"{said}.", hint="An edit does one thing; give one of them.")
     ((kind, given),) = found
-    return _made(" with ".join(given), lambda: _action(kind, given, target)), f"--{kind.opposite}" in given
+    said_as = getattr(options, "said_as", {})  # after a verb
+    return _made(
+        " with ".join(said_as.get(flag, flag) for flag in given), lambda: _action(kind, given, target)
+    ), f"--{kind.opposite}" in given
 
 
 def _given_actions(options: argparse.Namespace) -> list[tuple[type[Action], dict[str, list[Any]]]]:

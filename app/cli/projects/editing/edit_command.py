@@ -10,7 +10,7 @@ from msgspec import structs, to_builtins
 
 from app.cli.arguments import EXIT_OK, path_argument
 from app.cli.projects.editing import fill_verb
-from app.cli.projects.editing.copy_verbs import add_copy_verbs, run_copy_verb
+from app.cli.projects.editing.copy_verbs import COPY_VERBS, add_copy_verbs, run_copy_verb
 from app.cli.projects.editing.edit_arguments import (
     add_edit_arguments,
     chosen_action,
@@ -46,12 +46,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream edit`."""
     command.add_argument("project", type=path_argument, help="project folder")
     verbs = {name: verb.meaning for name, verb in VERBS.items()} | {FOLLOW: MEANING}
-    verbs |= {name: "see below" for name in TIME_EDITS}
+    verbs |= {name: verb.help for name, verb in COPY_VERBS.items()}
+    own_help = f"options of {', '.join(COPY_VERBS)}: clipgstream edit PROJECT VERB --help"
     command.add_argument(
         "words",
         nargs="*",
         metavar="VERB",
-        help=f"what to do: {'; '.join(f'{name}: {words}' for name, words in verbs.items())}",
+        help=f"what to do: {'; '.join(f'{name}: {words}' for name, words in verbs.items())}; "
+        f"{', '.join(TIME_EDITS)}: see time, below; {own_help}",
     )
     add_verb_arguments(command)
     add_follow_arguments(command)

@@ -63,13 +63,17 @@ def change_time(options: argparse.Namespace, words: list[str], project: Scripted
     given |= {name: getattr(options, f"time_{name}", None) for name in _OWN}
     if "places" in declared and rest:
         given["places"] = declared["places"].parse(",".join(rest))
+    elif "places" in declared:
+        raise ProjectError(f"{verb} needs the numbers of segments.", hint=f"Write for example: {verb} 2,0,1.")
     elif rest:
         raise ProjectError(f"{verb} is followed by '{rest[0]}', which is not an option of it.")
     entries = {name: value for name, value in given.items() if value is not None}
-    for name in entries:
+    for name, value in entries.items():
+        flag = _OWN[name].flags[0].name if name in _OWN and name not in _WORDS else f"--{name}"
         if name not in declared:
-            flag = _OWN[name].flags[0].name if name in _OWN else f"--{name}"
             raise ProjectError(f"{flag} does not apply to {verb}.", hint="Leave it out.")
+        if name != "frames" and name not in _WORDS and not declared[name].is_within(value):
+            raise ProjectError(f"{flag} is {value}; it has to be {declared[name].allowed}.")
     if "frames" in entries:
         chosen = parse_range(entries["frames"], project.n_frames, option="--frames", what="frames")
         entries["frames"] = (chosen.start, chosen.stop)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 
+from app.cli.projects.editing.copy_verbs import COPY_VERBS
 from app.cli.projects.editing.follow_verb import FOLLOW
 from app.document.changes.timing_changes import TIME_EDITS
 from engine.editing.actions import ACTIONS, Action
@@ -75,7 +76,9 @@ def take_verb(options: argparse.Namespace) -> None:
     name, *rest = options.words or [""]
     verb = VERBS.get(name)
     if name and verb is None:
-        raise ProjectError(f"'{name}' is not a verb.", hint=f"Verbs are {', '.join((*VERBS, FOLLOW, *TIME_EDITS))}.")
+        raise ProjectError(
+            f"'{name}' is not a verb.", hint=f"Verbs are {', '.join((*VERBS, FOLLOW, *COPY_VERBS, *TIME_EDITS))}."
+        )
     if rest:
         raise ProjectError(f"{name} is followed by '{rest[0]}', which is not an option of it.")
     check_words(options, name or "an edit without a verb", "" if verb is None else verb.word)
@@ -103,6 +106,7 @@ def take_verb(options: argparse.Namespace) -> None:
     if getattr(options, _field(verb.flag[2:])):
         raise ProjectError(f"--{verb.word} and {verb.flag} are given together.", hint="Give one of them.")
     setattr(options, _field(verb.flag[2:]), values)
+    options.said_as = {verb.flag: f"{name} --{verb.word}"}
 
 
 def check_words(options: argparse.Namespace, verb: str, allowed: str) -> None:

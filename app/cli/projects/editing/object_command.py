@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import re
 from typing import Any
 
-from app.cli.arguments import EXIT_OK, path_argument
+from app.cli.arguments import EXIT_OK, parse_range, path_argument
 from app.cli.projects.editing.edit_arguments import add_pick_arguments, chosen_picks
 from app.cli.terminal.progress import ProgressLine
 from app.document.changes.object_words import confidence_text, runs_within, seen_text
@@ -85,9 +84,10 @@ def _check_options(options: argparse.Namespace) -> None:
 def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
     line = ProgressLine(is_quiet=options.quiet or options.json)
     name = options.name
+    said = one_line(name)
 
     def tell(done: float) -> None:
-        line.update(f"{'Masking' if options.act == 'train' else 'Finding'} {name}", done)
+        line.update(f"{'Masking' if options.act == 'train' else 'Finding'} {said}", done)
 
     match options.act:
         case "add":
@@ -103,7 +103,8 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
         case "rename":
             project.rename_object(name, options.value)
         case "span":
-            project.set_object_span(name, *_span(options.value))
+            project.object(name)  # before its frames
+            project.set_object_span(name, *_span(options.value, project.n_frames))
         case "train":
             if options.value not in ("on", "off"):
                 raise ProjectError(f"'{options.value}' is neither on nor off.")
@@ -113,11 +114,9 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
     line.finish()
 
 
-def _span(text: str) -> tuple[int, int | None]:
-    found = re.fullmatch(r"\s*(\d{0,9})\s*:\s*(\d{0,9})\s*", text)
-    if found is None:
-        raise ProjectError(f"'{text}' is not a range A:B.")
-    return int(found[1] or 0), int(found[2]) if found[2] else None
+def _span(text: str, n_frames: int) -> tuple[int, int | None]:
+    found = parse_range(text, n_frames, option="span", what="frames")
+    return found.start, None if text.strip().endswith(":") else found.stop
 
 
 def describe_objects(project: ScriptedProject) -> dict[str, Any]:

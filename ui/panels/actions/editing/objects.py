@@ -62,7 +62,7 @@ ACTIONS = (
         "Add selection to object",
         EDIT,
         _of_chosen(lambda object_id: CorrectObject(object_id, adds=True)),
-        keys=("Alt+A",),
+        keys=("Alt+I",),
         lacks=_cannot_correct,
     ),
     Action(
@@ -70,7 +70,7 @@ ACTIONS = (
         "Remove selection from object",
         EDIT,
         _of_chosen(lambda object_id: CorrectObject(object_id, adds=False)),
-        keys=("Alt+Shift+A",),
+        keys=("Alt+Shift+I",),
         lacks=_cannot_correct,
     ),
     Action(

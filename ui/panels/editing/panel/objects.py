@@ -104,6 +104,8 @@ def _draw_row(session: SessionView, dispatch: Dispatch, ui: UiState, one: SceneO
     ui.mark(f"objects.row{one.object_id}")
     if is_chosen and imgui.is_window_focused() and imgui.is_key_pressed(imgui.Key.f2, False):
         tool.rename(one)
+    if not imgui.is_item_visible() and tool.renamed != one.object_id:  # scrolled away
+        return
     high, draw = imgui.get_item_rect_max(), imgui.get_window_draw_list()
     color = (*one.color, 1.0)
     draw.add_rect_filled(ImVec2(low.x + 4, low.y + 10), ImVec2(low.x + SWATCH, low.y + 28), theme.u32(color), 3)
@@ -152,9 +154,9 @@ def _draw_chosen(session: SessionView, dispatch: Dispatch, ui: UiState, one: Sce
     job = job_of(session, one)
     rows = (
         ("Add selection", "add", CorrectObject(one.object_id, adds=True), can_edit and has_selection,
-         "What is selected in this frame belongs to it as well (Alt+A)"),
+         "What is selected in this frame belongs to it as well (Alt+I)"),
         ("Remove selection", "subtract", CorrectObject(one.object_id, adds=False), can_edit and has_selection,
-         "What is selected in this frame does not belong to it (Alt+Shift+A)"),
+         "What is selected in this frame does not belong to it (Alt+Shift+I)"),
         ("Find again", "find", FindObject(one.object_id), can_edit and job is None,
          "Looks for it in all clips again"),
         ("Select", "select", SelectObject(one.object_id), True,

@@ -39,6 +39,8 @@ def draw_target(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
 def _target_words(session: SessionView, ui: UiState) -> tuple[str, str]:
     """What new edits act on, and a remark on it."""
     status, (volume, words) = session.selection, meant(session, ui)
+    if status.is_busy:
+        return (words or "Nothing is selected"), "Selecting ..."
     if isinstance(volume, ObjectTarget):
         return words, "The chosen object"
     if volume is not None:

@@ -121,11 +121,10 @@ def _note(session: SessionView, one: SceneObject, frame_index: int) -> str:
     clip = one.in_clip(frame_index)
     if clip is None:
         return f"{name}: not in this frame"
-    return f"{name}: {_clip_words(clip, frame_index)}"
+    return f"{name}: {_clip_words(clip, is_seen=one.is_seen(frame_index))}"
 
 
-def _clip_words(clip: ObjectInClip, frame_index: int) -> str:
-    is_seen = any(first <= frame_index < stop for first, stop in clip.seen)
+def _clip_words(clip: ObjectInClip, *, is_seen: bool) -> str:
     words = [f"{'here' if is_seen else 'not here'} in frames {clip.start}-{clip.stop - 1}"]
     words += [f"{100 * clip.confidence:.0f} % sure"]
     words += [doubt_text(clip)] if clip.doubt else []

@@ -4,6 +4,8 @@ chooses it.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from imgui_bundle import imgui
 
 from app.document.changes.timing_changes import segment_words
@@ -19,17 +21,19 @@ MAX_LEVELS = 3
 """Segments that play the same frames lie in so many levels; more of them cover each other."""
 
 
-def levels_of(segments: tuple[Segment, ...]) -> list[int]:
-    """The level of each segment: those that play the same frames lie below each other as far as there is room."""
+@lru_cache(maxsize=4)
+def levels_of(segments: tuple[Segment, ...]) -> tuple[int, ...]:
+    """The level of each segment: those that play the same frames lie below each other as far as there is room. Asked
+    for in every frame of the window."""
+    levels: list[list[Segment]] = [[] for _ in range(MAX_LEVELS - 1)]
     found: list[int] = []
-    for place, one in enumerate(segments):
-        taken = {
-            found[other]
-            for other in range(place)
-            if segments[other].first < one.stop and one.first < segments[other].stop
-        }
-        found.append(min(next(level for level in range(len(segments)) if level not in taken), MAX_LEVELS - 1))
-    return found
+    for one in segments:
+        is_free = (all(other.stop <= one.first or one.stop <= other.first for other in level) for level in levels)
+        level = next((level for level, free in enumerate(is_free) if free), MAX_LEVELS - 1)
+        found.append(level)
+        if level < len(levels):
+            levels[level].append(one)
+    return tuple(found)
 
 
 def draw_take_lane(stage: TimelineStage, session: SessionView) -> None:
