@@ -35,7 +35,7 @@ Report = Callable[[int, int], None]
 
 
 _Said = tuple[int, np.ndarray, np.ndarray, np.ndarray | None]
-"""The place of a seed's clip among all, and its Gaussians that belong to the object, that do not, and that were seen."""
+"""The place of a seed's clip among all, and its Gaussians that belong to the object, that do not, that were seen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,10 @@ def find_object(
         assert removed is not None
         search.take(place, seed.frame_index, added, removed, seen)
     report(len(clips), len(clips))
-    return tuple(map(_result, rows, grounds))
+    results = []
+    for place, (of, ground) in enumerate(zip(rows, grounds, strict=True)):
+        results.append(_result(of, ground, [flags[1:3] for flags in said.values() if flags[0] == place]))
+    return tuple(results)
 
 
 # ---------------------------------------------------------------- pieces
@@ -102,11 +105,11 @@ def _said(edited: EditedClip, seed: ObjectSeed) -> tuple[np.ndarray, np.ndarray,
         return added, removed, None
     found = edited.decode(edited.clip.clip_time(seed.frame_index))
     gaussians, view = found.gaussians, seed.view.view()
-    arrays = (host_array(tensor) for tensor in (gaussians.means, gaussians.quats, gaussians.scales))
-    is_seen = np.zeros(edited.rows.n, bool)
-    is_seen[edited.rows.indices_of(found.rows)] = seen_rows(
-        project_gaussians(*arrays, view), host_array(gaussians.opacities)
+    means, quats, scales, opacities = map(
+        host_array, (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities)
     )
+    is_seen = np.zeros(edited.rows.n, bool)
+    is_seen[edited.rows.indices_of(found.rows)] = seen_rows(project_gaussians(means, quats, scales, view), opacities)
     if not ((added | removed) & is_seen).any():  # selected through something, as through a wall
         return added, removed, None
     return added & is_seen, removed & is_seen, is_seen
@@ -139,7 +142,8 @@ def _packed(rows: ClipRows, indices: np.ndarray) -> tuple[PickedRows, ...]:
     )
 
 
-def _result(rows: ClipRows, ground: SearchGround) -> ObjectInClip:
+def _result(rows: ClipRows, ground: SearchGround, said: Sequence[tuple[np.ndarray, np.ndarray]]) -> ObjectInClip:
+    """What was found in a clip. said: Gaussians of it that somebody has added and removed."""
     parts = ground.parts
     is_in = ground.values > 0.5
     if not is_in.any():
@@ -150,7 +154,7 @@ def _result(rows: ClipRows, ground: SearchGround) -> ObjectInClip:
     return ObjectInClip(
         parts.start,
         parts.stop,
-        _packed(rows, np.concatenate([parts.index[is_in], _faint(rows, parts, is_in)])),
+        _packed(rows, np.concatenate([parts.index[is_in], _faint(rows, parts, is_in, said)])),
         _runs(parts.frames, there, parts.stop),
         round(min(max(ground.surety, 0.0), 1.0), 3),
         doubt,
@@ -163,14 +167,21 @@ def _touching(ground: SearchGround, is_in: np.ndarray) -> float:
     return float(inside[:, ~is_in].sum() / whole) if whole > 0 else 0.0
 
 
-def _faint(rows: ClipRows, parts: MovingParts, is_in: np.ndarray) -> np.ndarray:
-    """Gaussians too faint to be followed, of anchors whose others all belong to the object. [n] int64"""
+def _faint(
+    rows: ClipRows, parts: MovingParts, is_in: np.ndarray, said: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> np.ndarray:
+    """Gaussians too faint to be followed: of anchors that mostly belong to the object, and as was said. [n] int64"""
     k = rows.gaussians_per_anchor
     anchors, place = np.unique(parts.anchor, return_inverse=True)
     share = np.bincount(place, is_in) / np.bincount(place)
     whole = anchors[share > 0.5]
-    every = (whole[:, None] * k + np.arange(k)).reshape(-1)
-    return np.setdiff1d(every, parts.index)
+    chosen = np.zeros(rows.n, bool)
+    chosen[(whole[:, None] * k + np.arange(k)).reshape(-1)] = True
+    moves = np.array([one.role in ROLES for one in rows.sets])[rows.set_of]
+    for added, removed in said:
+        chosen = (chosen | (added & moves)) & ~removed
+    chosen[parts.index] = False
+    return np.flatnonzero(chosen)
 
 
 def _runs(frames: Sequence[int], there: np.ndarray, stop: int) -> tuple[tuple[int, int], ...]:

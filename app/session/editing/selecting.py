@@ -204,10 +204,9 @@ class ProjectSelecting(SessionPart):
     def _take_found(self, work: _Find, found: np.ndarray) -> None:
         command, before = work.command, self._seen_from
         self._take(selection_after(self.selection, command, work.ground, found))
-        view = command.view if isinstance(command, SelectInPicture) else None
-        is_alone = view is not None and command.how.mode == "replace"
-        is_same = view is not None and before is not None and _is_same_view(view, before)
-        self._seen_from = view if is_alone or is_same else None
+        if isinstance(command, SelectInPicture):
+            is_same = before is not None and _is_same_view(command.view, before)
+            self._seen_from = command.view if is_same or command.how.mode == "replace" else None
 
     @property
     def seen_from(self) -> SeenFrom | None:

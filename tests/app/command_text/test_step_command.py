@@ -131,8 +131,8 @@ def test_an_edit_with_a_fill(project, monkeypatch, tmp_path):
     later = structs.replace(filled, scope=Scope(0, 1))
     document = held(project)
     for before, after, option in ((plain, filled, "--put"), (filled, later, "--replace"), (later, plain, "--put")):
-        documents = (replace(document, edits=(edit,)) for edit in (before, after))
-        assert option in check(project, *documents, monkeypatch, tmp_path)
+        old, new = (replace(document, edits=(edit,)) for edit in (before, after))
+        assert option in check(project, old, new, monkeypatch, tmp_path)
 
 
 @pytest.mark.slow
