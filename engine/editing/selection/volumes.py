@@ -7,7 +7,8 @@ import numpy as np
 from engine.camera.rotations import matrices_of
 from engine.editing.edit import Prism, Sphere, Volume
 from engine.editing.selection.in_picture import EXTENT_SIGMAS
-from engine.editing.volumes.prisms import in_outline, in_prism, own_points, widths_at
+from engine.editing.volumes.outlines import in_outline
+from engine.editing.volumes.prisms import in_prism, own_points, widths_at
 
 
 def in_volume(

@@ -11,7 +11,7 @@ from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.shapes import brush_mask, lasso_mask
 from engine.editing.selection.share import selected_share
 from engine.editing.selection.visibility import seen_rows
-from engine.editing.volumes.prisms import in_outline
+from engine.editing.volumes.outlines import in_outline
 
 
 def warm_up() -> None:

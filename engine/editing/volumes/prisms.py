@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 from msgspec import structs
-from numba import njit
 
 from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rotations import matrices_of, quats_of
@@ -20,6 +19,8 @@ LOW, MARGIN = 0.02, 0.1
 
 def in_prism(prism: Prism, points: np.ndarray) -> np.ndarray:
     """Points in a prism; one that is not finite is not. points: Scene units. [N, 3]; returns [N] bool"""
+    from engine.editing.volumes.outlines import in_outline  # compiled; the window itself does without
+
     own = own_points(prism, points)
     with np.errstate(invalid="ignore"):
         is_in = np.all(np.abs(own) <= 1.0, axis=1, keepdims=True)[:, 0]
@@ -47,12 +48,6 @@ def widths_at(prism: Prism, depths: np.ndarray) -> np.ndarray:
 def axes_of_prism(prism: Prism) -> np.ndarray:
     """Its axes as columns. [3, 3]"""
     return matrices_of(np.asarray(prism.quat) / np.linalg.norm(prism.quat))
-
-
-def in_outline(points: np.ndarray, outline: tuple[tuple[float, float], ...] | np.ndarray) -> np.ndarray:
-    """Points [N, 2] that a closed polygon goes around. [N] bool"""
-    corners = np.ascontiguousarray(outline, np.float64)
-    return _in_outline(np.ascontiguousarray(points, np.float64), corners)
 
 
 def with_depth(prism: Prism, center: Vector, half_depth: float) -> Prism:
@@ -124,6 +119,8 @@ def depths_under(
     Returns:
         Along the ray through the middle of the line, with some room, scene units; None where nothing is under it.
     """
+    from engine.editing.volumes.outlines import in_outline
+
     corners = np.asarray(pixels, np.float64)
     seen = to_camera(np.asarray(means, np.float64), view.world_to_camera)
     with np.errstate(invalid="ignore"):
@@ -183,23 +180,3 @@ def _bends(line: np.ndarray, tolerance: float) -> np.ndarray:
             kept[middle] = True
             parts += [(first, middle), (middle, last)]
     return kept
-
-
-@njit(cache=True, nogil=True)
-def _in_outline(points, corners):
-    found = np.zeros(len(points), np.bool_)
-    n = len(corners)
-    for row in range(len(points)):
-        x, y, winding = points[row, 0], points[row, 1], 0
-        for i in range(n):
-            j = i + 1 if i + 1 < n else 0
-            x0, y0, x1, y1 = corners[i, 0], corners[i, 1], corners[j, 0], corners[j, 1]
-            if (y0 <= y) == (y1 <= y):
-                continue
-            side = (x1 - x0) * (y - y0) - (x - x0) * (y1 - y0)
-            if y1 > y0 and side > 0.0:
-                winding += 1
-            elif y1 < y0 and side < 0.0:
-                winding -= 1
-        found[row] = winding != 0
-    return found

@@ -24,13 +24,12 @@ OBJECTS = (SceneObject(1, "one", clips=(ObjectInClip(4, 14, SETS),)), SceneObjec
 @pytest.fixture
 def panel(open_pilot) -> Pilot:
     """With the section open."""
-    pilot = open_pilot(size=(1280, 1300))
+    pilot = open_pilot(size=(1280, 1900))
     session = pilot.session
     session.content = replace(session.content, objects=OBJECTS)
     session.edits = edits_status(session.content)
     pilot.studio.frame.ui.show_edit("copies")
-    pilot.draw(4)
-    pilot.draw(3)
+    pilot.draw(7)
     return pilot
 
 
@@ -82,10 +81,9 @@ def test_an_object_gets_a_speed_of_its_own_and_keys_duplicate(panel: Pilot) -> N
 
 
 def test_without_an_object_the_section_says_what_to_do(open_pilot) -> None:
-    pilot = open_pilot(size=(1280, 1300))
+    pilot = open_pilot(size=(1280, 1900))
     pilot.studio.frame.ui.show_edit("copies")
-    pilot.draw(4)
-    pilot.draw(3)
+    pilot.draw(7)
     assert "copies.duplicate" not in pilot.rects
     pilot.key(key.D, modifiers=(CTRL, SHIFT))
     assert pilot.sent(DuplicateObject) == []
