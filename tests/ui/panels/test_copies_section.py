@@ -37,7 +37,7 @@ def test_a_copy_is_made_chosen_changed_switched_and_removed(panel: Pilot) -> Non
     panel.click("copies.duplicate")
     panel.draw(3)
     (copy,) = panel.session.edits.copies
-    assert (copy.object_id, copy.name) == (1, "one 1")
+    assert (copy.object_id, copy.name) == (1, "one copy 1")
     assert panel.studio.frame.ui.copies.chosen == 1
     panel.click("copies.in place")
     assert panel.session.edits.copies[0].is_in_place

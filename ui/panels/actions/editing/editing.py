@@ -124,7 +124,14 @@ ACTIONS = (
     ),
     Action("edit.unhide", "Unhide what was hidden last", EDIT, _show_again, keys=("Alt+H",), lacks=_no_edits),
     Action("edit.outside", "Edit everything outside the drawn volume", EDIT, _outside, keys=("Shift+I",)),
-    Action("edit.next_scope", "Change the scope of new edits", EDIT, _next_scope, keys=("Shift+U",)),
+    Action(
+        "edit.next_scope",
+        "Change the scope of new edits",
+        EDIT,
+        _next_scope,
+        keys=("Shift+U",),
+        menu="Edit/Scope of new edits",
+    ),
     *(
         Action(
             f"scope.{choice}",
