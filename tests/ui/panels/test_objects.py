@@ -98,8 +98,8 @@ def test_the_chosen_object_is_corrected_looked_for_and_removed(panel: Pilot) -> 
     panel.draw(2)
     panel.click("objects.add")
     panel.click("objects.subtract")
-    panel.key(key.A, modifiers=(ALT,))
-    panel.key(key.A, modifiers=(ALT, SHIFT))
+    panel.key(key.I, modifiers=(ALT,))
+    panel.key(key.I, modifiers=(ALT, SHIFT))
     assert panel.sent(CorrectObject) == [CorrectObject(1, adds=adds) for adds in (True, False, True, False)]
     panel.click("objects.find")
     panel.click("objects.select")
