@@ -213,14 +213,16 @@ def draw_palette(stage: Stage) -> None:
 
 
 def draw_objects(stage: Stage) -> None:
-    """What moves in the left half of the picture, as an object: its outline, its lane and its row in the panel."""
+    """The sculpture of the sample as an object: its outline, its lane and its row in the panel."""
     stage.session.dispatch(LookThrough(0))
     stage.show_trained(5)
     rect = stage.pilot.rects["viewport.rendered"]
     stage.pilot.key(key.R)
-    stage.pilot.drag((rect.x0 + 2, rect.y0 + 2), (rect.center[0], rect.y1 - 2))
+    width, height = rect.x1 - rect.x0, rect.y1 - rect.y0
+    left, top = rect.x0 + 0.33 * width, rect.y0 + 0.2 * height
+    stage.pilot.drag((left, top), (left + 0.2 * width, top + 0.42 * height))
     stage.wait(lambda: stage.session.selection.n_gaussians > 0, "something is selected")
-    stage.session.dispatch(MakeObject("person"))
+    stage.session.dispatch(MakeObject("sculpture"))
     stage.studio.settle(2)
     stage.wait(lambda: stage.session.objects.searched is None, "the object is found")
     stage.pilot.key(key.ESCAPE)
