@@ -8,6 +8,7 @@ moves, and in StillPart.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Self, get_args
 
 from msgspec import Meta, Struct, structs
@@ -277,3 +278,9 @@ def check_quat(quat: Quat) -> None:
     length = math.sqrt(sum(number * number for number in quat))
     if not abs(length - 1.0) <= 1e-3:
         raise ValueError(f"the quaternion {quat} is not a rotation: its length is {length:g}")
+
+
+def vector_of(values: Iterable[float]) -> Vector:
+    """Three numbers, of an array for instance, as a value of documents. [3]"""
+    x, y, z = (float(value) for value in values)
+    return x, y, z

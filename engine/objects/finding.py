@@ -78,11 +78,9 @@ def find_object(
         return still
     search = ObjectSearch(grounds)
     for seed in seeded:
-        place, *flags = said[seed]
-        added, removed, seen = (None if flag is None else flag[grounds[place].parts.index] for flag in flags)
-        assert added is not None
-        assert removed is not None
-        search.take(place, seed.frame_index, added, removed, seen)
+        place, added, removed, seen = said[seed]
+        index = grounds[place].parts.index
+        search.take(place, seed.frame_index, added[index], removed[index], None if seen is None else seen[index])
     report(len(clips), len(clips))
     results = []
     for place, (of, ground) in enumerate(zip(rows, grounds, strict=True)):

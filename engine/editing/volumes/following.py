@@ -8,7 +8,7 @@ another one only where it becomes clearly smaller, so that it does not tremble.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,7 +17,7 @@ from msgspec import structs
 
 from engine.camera.rotations import inverse_quats, matrices_of, quat_product, quats_of, turns_of_quats
 from engine.capture.clip import Clip
-from engine.editing.actions import Quat, Vector
+from engine.editing.actions import Quat, vector_of
 from engine.editing.edit import Box, KeyedVolume, Prism, Sphere, Volume, VolumeKey
 from engine.editing.edited_clip import EditedClip
 from engine.editing.scene_object import SceneObject
@@ -143,7 +143,7 @@ def _around(crowd: Crowd, like: Volume | None, quat: Quat) -> Volume | None:
     if isinstance(like, Sphere):
         center = np.array([weighted_quantiles(column, weights, (0.5,))[0] for column in means.T])
         (radius,) = weighted_quantiles(np.linalg.norm(means - center, axis=1), weights, (1.0 - LOW,))
-        return Sphere(_vector(center), max((1.0 + MARGIN) * radius, 1e-9))
+        return Sphere(vector_of(center), max((1.0 + MARGIN) * radius, 1e-9))
     turned = _box(means, weights, np.array(quat))
     if isinstance(like, Prism):
         return structs.replace(like, center=turned.center)
@@ -158,7 +158,7 @@ def _box(means: np.ndarray, weights: np.ndarray, quat: np.ndarray) -> Box:
     halves = (0.5 + MARGIN) * (ends[:, 1] - ends[:, 0])
     halves = np.maximum(halves, max(LEAST_SHARE * float(halves.max()), 1e-9))
     w, x, y, z = (float(value) for value in quat / np.linalg.norm(quat))
-    return Box(_vector(axes @ ends.mean(axis=1)), _vector(halves), (w, x, y, z))
+    return Box(vector_of(axes @ ends.mean(axis=1)), vector_of(halves), (w, x, y, z))
 
 
 def _main_quat(means: np.ndarray, weights: np.ndarray, within: Box, near: np.ndarray) -> np.ndarray:
@@ -179,8 +179,3 @@ def _main_quat(means: np.ndarray, weights: np.ndarray, within: Box, near: np.nda
             if (likeness := abs(float(quat @ near))) > best:
                 found, best = quat, likeness
     return found
-
-
-def _vector(values: Sequence[float] | np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

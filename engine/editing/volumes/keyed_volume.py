@@ -14,7 +14,7 @@ from msgspec import structs
 
 from engine.camera.key_curves import along_curve, tangents_of
 from engine.camera.rotations import inverse_quats, quat_product, quats_of_turns, turns_of_quats
-from engine.editing.actions import Quat, Vector
+from engine.editing.actions import Quat, vector_of
 from engine.editing.edit import (
     MIN_SPACING_FRAMES,
     Box,
@@ -111,12 +111,12 @@ class _Curves:
     def at(self, piece: int, frame: float) -> Volume:
         """The volume at a frame of a piece."""
         share = (frame - self._times[piece]) / self._lengths[piece]
-        center, sizes = _vector(self._centers.at(piece, share)), np.exp(self._sizes.at(piece, share))
+        center, sizes = vector_of(self._centers.at(piece, share)), np.exp(self._sizes.at(piece, share))
         volume = self._volumes[piece]
         if isinstance(volume, Sphere):
             return Sphere(center, float(sizes[0]))
         quat = quat_product(self._quats[piece], quats_of_turns(share * self._turns[piece]))
-        changed = structs.replace(volume, center=center, half_sizes=_vector(sizes), quat=_quat(quat))
+        changed = structs.replace(volume, center=center, half_sizes=vector_of(sizes), quat=_quat(quat))
         if isinstance(changed, Prism) and self._apexes is not None:
             return structs.replace(changed, apex=float(np.exp(self._apexes.at(piece, share))[0]))
         return changed
@@ -141,11 +141,6 @@ def _curves(keyed: KeyedVolume) -> _Curves:
 
 def _sizes(volume: Volume) -> tuple[float, ...]:
     return (volume.radius,) if isinstance(volume, Sphere) else volume.half_sizes
-
-
-def _vector(values: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
 
 
 def _quat(values: np.ndarray) -> Quat:

@@ -53,6 +53,9 @@ def test_failures_are_notices(session):
     session.filling._fill = fail
     session.dispatch(FillBehind(1))
     poll_until(session, lambda: len(session.notices) > 0)
+    (notice,) = session.notices
+    assert "Nothing is trained." in f"{notice.title} {notice.detail}"
+    assert session.edits.edits[0].fill is None
 
 
 def test_only_what_takes_something_away_is_filled(session):

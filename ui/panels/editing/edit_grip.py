@@ -16,7 +16,7 @@ from app.playback.views.scene_axes import rig_radius
 from app.session.editing.edit_commands import SetScaleByLength, SetUpByGround, Undo
 from app.session.editing.selection_commands import InvertSelection, SelectVolume
 from app.session.session_view import SessionView
-from engine.editing.actions import Transform, Vector
+from engine.editing.actions import Transform, vector_of
 from ui.panels.editing.edit_subject import Subject, subject_of
 from ui.panels.picture.pointer import Pointer
 from ui.panels.state import Dispatch, Rect, UiState
@@ -146,15 +146,10 @@ class EditGrip:
 
 def _given(session: SessionView, tool: EditTool) -> SetUpByGround | SetScaleByLength:
     """The command from enough points."""
-    points = [_vector(point) for point in tool.points]
+    points = [vector_of(point) for point in tool.points]
     if tool.asking == "length":
         return SetScaleByLength(points[0], points[1], tool.length_m)
-    return SetUpByGround((points[0], points[1], points[2]), _vector(session.rig.centers.mean(axis=0)))
-
-
-def _vector(values: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+    return SetUpByGround((points[0], points[1], points[2]), vector_of(session.rig.centers.mean(axis=0)))
 
 
 def select_drawn(dispatch: Dispatch, ui: UiState) -> None:

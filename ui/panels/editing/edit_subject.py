@@ -11,7 +11,7 @@ from app.session.editing.edit_commands import ChangeEdit
 from app.session.editing.selection import Selection
 from app.session.editing.selection_commands import InvertSelection
 from app.session.session_view import SessionView
-from engine.editing.actions import Transform, Vector
+from engine.editing.actions import Transform, Vector, vector_of
 from engine.editing.edit import Edit, ObjectTarget, Prism, Sphere, Volume
 from engine.editing.volumes.keyed_volume import with_volume
 from engine.editing.volumes.prisms import widths_at
@@ -88,9 +88,9 @@ def meant(session: SessionView, ui: UiState) -> tuple[Meant, str]:
 def pivot_of(session: SessionView, target: Meant) -> Vector:
     """Where a movement turns about: the middle of the things it moves, as shown. Scene units"""
     if isinstance(target, Volume):
-        return _vector(middle_of(target))
+        return vector_of(middle_of(target))
     means = _means(session, target)
-    return _vector(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
+    return vector_of(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
 
 
 def bounds_of(session: SessionView, target: Meant) -> tuple[Vector, Vector] | None:
@@ -104,7 +104,7 @@ def bounds_of(session: SessionView, target: Meant) -> tuple[Vector, Vector] | No
         if not len(means):
             return None
         low, high = means.min(axis=0), means.max(axis=0)
-    return (_vector(low), _vector(high)) if (high > low).all() else None
+    return (vector_of(low), vector_of(high)) if (high > low).all() else None
 
 
 def _reach(volume: Volume) -> float | np.ndarray:
@@ -129,8 +129,3 @@ def _means(session: SessionView, target: ObjectTarget | None) -> np.ndarray:
         is_meant = Selection.of_target(one.picked(session.timeline.frame_index)).mask(gaussians.rows)
     means = gaussians.means[is_meant]
     return means[np.isfinite(means).all(axis=1)]
-
-
-def _vector(values: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

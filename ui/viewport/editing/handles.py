@@ -15,7 +15,7 @@ from msgspec import structs
 from app.playback.views.pointing import pixel_ray, point_beside
 from engine.camera.projection import focal_px, to_camera, to_pixels
 from engine.camera.rotations import matrices_of, quat_product, quats_of_turns
-from engine.editing.actions import Quat, Transform, Vector
+from engine.editing.actions import Quat, Transform, vector_of
 from engine.editing.edit import Box, Prism, Sphere, Volume
 from engine.editing.volumes.prisms import with_depth
 
@@ -218,8 +218,8 @@ def _dragged_along(
         center = np.array(thing.center) + handle.sign * (wanted - size) / 2.0 * direction
         sides = (halves[0], halves[1], halves[2])
         if isinstance(thing, Prism) and thing.apex is not None and handle.axis == 2:
-            return with_depth(thing, _vector(center), halves[2])
-        return structs.replace(thing, center=_vector(center), half_sizes=sides)
+            return with_depth(thing, vector_of(center), halves[2])
+        return structs.replace(thing, center=vector_of(center), half_sizes=sides)
     if isinstance(thing, Sphere):
         wanted = thing.radius + handle.sign * along
         return Sphere(
@@ -288,8 +288,8 @@ def _factor(thing: Thing, lens: HandleView, start: tuple[float, float], stop: tu
 
 def _moved(thing: Thing, way: np.ndarray) -> Thing:
     if isinstance(thing, Transform):
-        return structs.replace(thing, translation=_vector(np.add(thing.translation, way)))
-    return structs.replace(thing, center=_vector(np.add(thing.center, way)))
+        return structs.replace(thing, translation=vector_of(np.add(thing.translation, way)))
+    return structs.replace(thing, center=vector_of(np.add(thing.center, way)))
 
 
 def _turned(thing: Thing, turn: np.ndarray) -> Thing:
@@ -324,8 +324,3 @@ def _distance(pixels: np.ndarray, is_seen: np.ndarray, at: np.ndarray) -> float:
 def _matrix(quat: Quat) -> np.ndarray:
     values = np.array(quat)
     return matrices_of(values / np.linalg.norm(values))
-
-
-def _vector(values: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

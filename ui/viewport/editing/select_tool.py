@@ -24,6 +24,7 @@ from app.session.editing.selection_commands import (
 )
 from engine.camera.projection import to_camera
 from engine.camera.rotations import quats_of
+from engine.editing.actions import vector_of
 from engine.editing.edit import Box, Prism, Sphere, Volume
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
@@ -202,7 +203,7 @@ class SelectTool:
         if self.kind == "sphere":
             (ax, ay), (bx, by) = self.points[0], self.points[-1]
             radius = float(np.hypot(bx - ax, by - ay)) * density * depth / float(np.sqrt(view.K[0, 0] * view.K[1, 1]))
-            return Sphere(_vector(center), radius) if radius > 0.0 else None
+            return Sphere(vector_of(center), radius) if radius > 0.0 else None
         corner = _on_plane(view, self.points[-1], low, density, center, up)
         if corner is None:
             return None
@@ -213,7 +214,7 @@ class SelectTool:
             return None
         height = 0.5 * self.box_height * max(width, length)
         middle = center + 0.5 * (corner - center) + STANDING_SHARE * height * axes[:, 1]
-        return Box(_vector(middle), (width / 2, height, length / 2), standing_quat(view.world_to_camera, up))
+        return Box(vector_of(middle), (width / 2, height, length / 2), standing_quat(view.world_to_camera, up))
 
     def prism_under(self, view: SeenFrom, low: tuple[float, float], density: float, depths_of: Depths) -> Prism | None:
         """The prism of the loop; None where it is too small, or nothing is under it. Arguments as of `command`."""
@@ -246,7 +247,7 @@ class SelectTool:
         if self.kind == "flood":
             if self.surface is None:
                 return None
-            return SelectFlood(_vector(self.surface), self.near_share * spacing, self.color_tolerance, how)
+            return SelectFlood(vector_of(self.surface), self.near_share * spacing, self.color_tolerance, how)
         if self.kind == "prism":
             volume = self.prism_under(view, low, density, depths_of)
         else:
@@ -282,8 +283,3 @@ def standing_quat(world_to_camera: np.ndarray, up: np.ndarray) -> tuple[float, f
     """Turns the axes of a box so that it stands upright and faces a view. wxyz"""
     w, x, y, z = (float(value) for value in quats_of(_standing_axes(world_to_camera, up)))
     return w, x, y, z
-
-
-def _vector(place: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in place)
-    return x, y, z

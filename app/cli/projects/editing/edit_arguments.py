@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 from msgspec import Struct
 
 from app.scripting.scripted_project import ScriptedProject
-from engine.editing.actions import ACTIONS, Action, Quat, Vector
+from engine.editing.actions import ACTIONS, Action, Quat, vector_of
 from engine.editing.edit import Box, Everything, KeyedVolume, ObjectTarget, Picked, Prism, Scope, Sphere, Target
 from engine.editing.volumes.keyed_volume import volume_at
 from engine.errors import ProjectError
@@ -172,15 +172,15 @@ def chosen_picks(options: argparse.Namespace, project: ScriptedProject) -> tuple
 def _volume(options: argparse.Namespace) -> Everything | Box | Sphere:
     if options.box is not None:
         a, b = options.box[:3], options.box[3:]
-        center = _vector((x + y) / 2 for x, y in zip(a, b, strict=True))
-        half_sizes = _vector(abs(x - y) / 2 for x, y in zip(a, b, strict=True))
+        center = vector_of((x + y) / 2 for x, y in zip(a, b, strict=True))
+        half_sizes = vector_of(abs(x - y) / 2 for x, y in zip(a, b, strict=True))
         return _made("--box", lambda: Box(center, half_sizes))
     if options.turned_box is not None:
         numbers = options.turned_box
         quat = _quat(numbers[6:])
-        return _made("--turned-box", lambda: Box(_vector(numbers[:3]), _vector(numbers[3:6]), quat))
+        return _made("--turned-box", lambda: Box(vector_of(numbers[:3]), vector_of(numbers[3:6]), quat))
     if options.sphere is not None:
-        return _made("--sphere", lambda: Sphere(_vector(options.sphere[:3]), options.sphere[3]))
+        return _made("--sphere", lambda: Sphere(vector_of(options.sphere[:3]), options.sphere[3]))
     return Everything()
 
 
@@ -268,11 +268,6 @@ def _count(option: str, number: int) -> int:
     if not 0 <= number < 2**31:
         raise ProjectError(f"{option} is {number}; frames are counted from 0.")
     return number
-
-
-def _vector(numbers: Iterable[float]) -> Vector:
-    x, y, z = numbers
-    return x, y, z
 
 
 def _quat(numbers: list[float]) -> Quat:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from app.session.duplicating.copy_commands import DuplicateObject, MakeCrowd
 from app.session.duplicating.placing import ObjectPlace, place_of
 from app.session.session_view import SessionView
-from engine.editing.actions import Transform, Vector
+from engine.editing.actions import Transform, Vector, vector_of
 from engine.editing.copies.object_copy import ObjectCopy, span_of
 from engine.editing.scene_object import SceneObject
 from ui.panels.state import Dispatch, UiState
@@ -21,7 +19,7 @@ FASTER = 2.0
 def duplicate(session: SessionView, dispatch: Dispatch, ui: UiState, found: SceneObject) -> None:
     """A copy next to an object, in the picture to its right."""
     place = _place(session, found)
-    by = (0.0, 0.0, 0.0) if place is None else _vector(GAP * place.widths[0] * place.axes[0])
+    by = (0.0, 0.0, 0.0) if place is None else vector_of(GAP * place.widths[0] * place.axes[0])
     _make(session, dispatch, ui, DuplicateObject(_copy(session, found, by, place)))
 
 
@@ -41,7 +39,7 @@ def make_crowd(session: SessionView, dispatch: Dispatch, ui: UiState, found: Sce
         steps: list[Vector] = [(tool.spacing, 0.0, 0.0), (0.0, 0.0, tool.spacing)]
     else:
         width = tool.spacing * float(place.widths.max())
-        steps = [_vector(width * axis) for axis in place.axes]
+        steps = [vector_of(width * axis) for axis in place.axes]
     copy = _copy(session, found, (0.0, 0.0, 0.0), place)
     crowd = MakeCrowd(copy, tool.n_across, tool.n_along, steps[0], steps[1], tool.step_frames)
     _make(session, dispatch, ui, crowd)
@@ -54,7 +52,7 @@ def _make(session: SessionView, dispatch: Dispatch, ui: UiState, command: Duplic
 
 
 def _copy(session: SessionView, found: SceneObject, by: Vector, place: ObjectPlace | None) -> ObjectCopy:
-    pivot = (0.0, 0.0, 0.0) if place is None else _vector(place.middle)
+    pivot = (0.0, 0.0, 0.0) if place is None else vector_of(place.middle)
     anchor = float(session.timeline.frame_index)
     return ObjectCopy(0, "", found.object_id, Transform(by, pivot=pivot), anchor_frame=anchor)
 
@@ -64,8 +62,3 @@ def _place(session: SessionView, found: SceneObject) -> ObjectPlace | None:
     source = None if gaussians is None else gaussians.source.frame_index
     frame = session.timeline.frame_index if source is None else source
     return place_of(gaussians, found, frame, view.pose().rotation, view.up)
-
-
-def _vector(values: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

@@ -13,7 +13,7 @@ from app.document.changes.reach_words import reach_note
 from app.session.editing.edit_commands import ChangeEdit, FillBehind, RenameEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, choice_of, chosen_scope, extent_text
 from app.session.session_view import SessionView
-from engine.editing.actions import Action, Delete, Hide, Transform, Vector
+from engine.editing.actions import Action, Delete, Hide, Transform, Vector, vector_of
 from engine.editing.edit import MAX_NAME_CHARACTERS, Box, Edit, Prism, Scope, Sphere, Volume
 from engine.editing.volumes.keyed_volume import volume_of, with_volume
 from engine.setting import Setting, settings_of
@@ -173,11 +173,11 @@ def _draw_volume(ui: UiState, volume: Volume) -> Volume | None:
             speed = SPEED_SHARE * max(half_sizes)
             found = numbers(ui, "center", "Centre", center, speed=speed, low=-FAR, high=FAR)
             if found is not None:
-                changed = structs.replace(changed, center=_vector(found))
+                changed = structs.replace(changed, center=vector_of(found))
             sizes = tuple(2.0 * half for half in half_sizes)
             found = numbers(ui, "size", "Size", sizes, speed=speed, low=LEAST_SIZE, high=FAR)
             if found is not None:
-                changed = structs.replace(changed, half_sizes=_vector([value / 2.0 for value in found]))
+                changed = structs.replace(changed, half_sizes=vector_of([value / 2.0 for value in found]))
             turned = turn_fields(ui, "box turn", quat)
             if turned is not None:
                 changed = structs.replace(changed, quat=turned)
@@ -185,7 +185,7 @@ def _draw_volume(ui: UiState, volume: Volume) -> Volume | None:
             speed = SPEED_SHARE * radius
             found = numbers(ui, "center", "Centre", center, speed=speed, low=-FAR, high=FAR)
             if found is not None:
-                changed = structs.replace(changed, center=_vector(found))
+                changed = structs.replace(changed, center=vector_of(found))
             found = numbers(ui, "radius", "Radius", [radius], speed=speed, low=LEAST_SIZE, high=FAR)
             if found is not None:
                 changed = structs.replace(changed, radius=found[0])
@@ -238,9 +238,4 @@ def _color_field(ui: UiState, one: Setting, value: Vector) -> Vector | None:
     ui.mark(f"edits.{one.name}")
     if imgui.is_item_activated():
         ui.editing.begin_gesture()
-    return _vector([min(max(part, 0.0), 1.0) for part in color]) if is_changed else None
-
-
-def _vector(values: tuple[float, ...] | list[float]) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+    return vector_of([min(max(part, 0.0), 1.0) for part in color]) if is_changed else None

@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 
 from app.session.editing.selection_commands import SelectAnchor, SelectVolume
 from app.session.session_view import SessionView
+from engine.editing.actions import vector_of
 from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import SelectMode
 from engine.editing.volumes.prisms import depths_under
@@ -90,7 +91,7 @@ class SelectGrip:
         mode, tool.points, tool.surface = tool.held_mode, [], None
         if tool.kind in ("rectangle", "lasso", "prism") and not pointer.is_beyond_click():
             place = pick(*pointer.pressed_at)  # a click means an anchor
-            command = None if place is None else SelectAnchor(_vector(place), tool.how(mode))
+            command = None if place is None else SelectAnchor(vector_of(place), tool.how(mode))
         if command is not None:
             dispatch(command)
 
@@ -104,11 +105,6 @@ def _depths(session: SessionView, view: SeenFrom, pixels: np.ndarray) -> tuple[f
     """From where to where the shown Gaussians under a loop reach; None where there are none."""
     gaussians = session.shown_gaussians()
     return None if gaussians is None else depths_under(pixels, gaussians.means, gaussians.opacities, view)
-
-
-def _vector(place: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in place)
-    return x, y, z
 
 
 def _needs_surface(tool: SelectTool) -> bool:
