@@ -20,13 +20,14 @@ def train_job(
     is_window_open: bool = True,
     live_view: str = "live",
     n_beside: int = 1,
+    claim: str = "",
 ) -> TrainJob:
     """The job of training a clip.
 
     Args:
         holdout: Camera indices never trained on.
         overrides: Settings of this clip; those of the project when None.
-        n_beside: See TrainJob.
+        n_beside, claim: See TrainJob.
     """
     settings, document = project.settings, project.document
     overrides = dict(settings.overrides if overrides is None else overrides)
@@ -49,4 +50,5 @@ def train_job(
         is_window_open=is_window_open,
         live_view=live_view,
         n_beside=n_beside,
+        claim=claim,
     )

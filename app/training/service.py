@@ -341,6 +341,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.live_view,
             n_beside=n_beside,
+            claim=self.claims.token,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)
         if refused is not None:

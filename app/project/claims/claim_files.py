@@ -3,13 +3,15 @@
 A claim is a file that was not there before, which every file system, also a network's, gives to one process only. Its
 content is the token of its holder. When a holder has died, the claim is not changed but surpassed: by a file of the
 next number, which again only one process can make. The highest number counts. A holder that had only been slow finds
-a higher one and gives up. Whoever releases a claim removes it together with all below it, lowest first.
+a higher one, or another token under its own number, and gives up. Whoever releases a claim removes it together with all
+below it, lowest first.
 """
 
 from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +20,7 @@ from app.project.clips.clip_names import PROGRAM_NAME
 from engine.storage.files import read_bytes
 
 CLAIMS = "claims"
-_CLAIM = re.compile(r"(?P<key>[\d-]{4,19})\.(?P<number>\d{4,9})")
+_CLAIM = re.compile(r"(?P<key>[0-9-]{4,19})\.(?P<number>[0-9]{4,9})")
 _HOLDER = re.compile(r"holder-(?P<token>[0-9a-f]{32})\.json")
 _MAX_TOKEN_BYTES = 64
 
@@ -49,23 +51,33 @@ def holder_path(folder: Path, token: str) -> Path:
     return folder / CLAIMS / f"holder-{token}.json"
 
 
-def list_claims(folder: Path) -> dict[str, ClaimFile]:
-    """The claim that counts of every claimed clip, by key. folder: Of the project. Raises OSError but for no folder."""
+def claim_names(folder: Path) -> list[str]:
+    """Names of all files of claims; none without their folder. folder: Of the project. Raises OSError."""
+    try:
+        return os.listdir(folder / CLAIMS)
+    except FileNotFoundError:
+        return []
+
+
+def list_claims(folder: Path, names: Iterable[str] | None = None) -> dict[str, ClaimFile]:
+    """The claim that counts of every claimed clip, by key. folder: Of the project. names: Of all files, as listed just
+    now; listed here when None, which raises OSError."""
     found: dict[str, ClaimFile] = {}
-    for key, number in _numbered(folder):
+    for key, number in _numbered(claim_names(folder) if names is None else names):
         if key not in found or found[key].number < number:
             found[key] = ClaimFile(folder, key, number)
     return found
 
 
-def list_holders(folder: Path) -> list[str]:
-    """Tokens of all that have a file. folder: Of the project."""
-    return [match["token"] for name in _names(folder) if (match := _HOLDER.fullmatch(name))]
+def list_holders(folder: Path, names: Iterable[str] | None = None) -> list[str]:
+    """Tokens of all that have a file. folder, names: As of `list_claims`."""
+    listed = claim_names(folder) if names is None else names
+    return [match["token"] for name in listed if (match := _HOLDER.fullmatch(name))]
 
 
-def newest_claim(folder: Path, key: str) -> ClaimFile | None:
-    """The claim of a clip that counts; None without one. folder: Of the project."""
-    numbers = [number for other, number in _numbered(folder) if other == key]
+def newest_claim(folder: Path, key: str, names: Iterable[str] | None = None) -> ClaimFile | None:
+    """The claim of a clip that counts; None without one. folder, names: As of `list_claims`."""
+    numbers = [number for other, number in _numbered(claim_names(folder) if names is None else names) if other == key]
     return ClaimFile(folder, key, max(numbers)) if numbers else None
 
 
@@ -81,12 +93,14 @@ def make_claim(claim: ClaimFile, token: str) -> bool:
     except FileExistsError:
         return False
     try:
-        os.write(descriptor, token.encode("ascii"))
+        try:
+            os.write(descriptor, token.encode("ascii"))
+        finally:
+            os.close(descriptor)  # where a disk of the network says that it is full
     except OSError:
-        claim.path.unlink(missing_ok=True)
+        with suppress(OSError):
+            claim.path.unlink(missing_ok=True)
         raise
-    finally:
-        os.close(descriptor)
     newest = newest_claim(claim.folder, claim.key)
     if newest is not None and newest.number > claim.number:
         with suppress(OSError):
@@ -97,19 +111,14 @@ def make_claim(claim: ClaimFile, token: str) -> bool:
 
 def remove_claim(claim: ClaimFile) -> None:
     """Remove a claim and all that count less, lowest first. Never fails; what the disk refuses counts as dead later."""
-    numbers = sorted(number for key, number in _numbered(claim.folder) if key == claim.key)
-    for number in [*(number for number in numbers if number < claim.number), claim.number]:
+    numbers = {claim.number}
+    with suppress(OSError):
+        numbers |= {number for key, number in _numbered(claim_names(claim.folder)) if key == claim.key}
+    for number in sorted(number for number in numbers if number <= claim.number):
         with suppress(OSError):
             ClaimFile(claim.folder, claim.key, number).path.unlink(missing_ok=True)
 
 
-def _numbered(folder: Path) -> list[tuple[str, int]]:
-    found = (_CLAIM.fullmatch(name) for name in _names(folder))
+def _numbered(names: Iterable[str]) -> list[tuple[str, int]]:
+    found = (_CLAIM.fullmatch(name) for name in names)
     return [(match["key"], int(match["number"])) for match in found if match and PROGRAM_NAME.fullmatch(match["key"])]
-
-
-def _names(folder: Path) -> list[str]:
-    try:
-        return os.listdir(folder / CLAIMS)
-    except FileNotFoundError:
-        return []
