@@ -111,12 +111,14 @@ def make_claim(claim: ClaimFile, token: str) -> bool:
 
 def remove_claim(claim: ClaimFile) -> None:
     """Remove a claim and all that count less, lowest first. Never fails; what the disk refuses counts as dead later."""
-    numbers = {claim.number}
-    with suppress(OSError):
-        numbers |= {number for key, number in _numbered(claim_names(claim.folder)) if key == claim.key}
-    for number in sorted(number for number in numbers if number <= claim.number):
+    below: list[ClaimFile] = []
+    if claim.number > 1:  # else there is nothing to list
         with suppress(OSError):
-            ClaimFile(claim.folder, claim.key, number).path.unlink(missing_ok=True)
+            numbers = (number for key, number in _numbered(claim_names(claim.folder)) if key == claim.key)
+            below = [ClaimFile(claim.folder, claim.key, number) for number in sorted(numbers) if number < claim.number]
+    for one in [*below, claim]:
+        with suppress(OSError):
+            one.path.unlink(missing_ok=True)
 
 
 def _numbered(names: Iterable[str]) -> list[tuple[str, int]]:
