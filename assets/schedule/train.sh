@@ -6,6 +6,7 @@ PYTHON=@python@
 CAPTURE=@capture@
 PROJECT=@project@
 JOBS=${JOBS:-1}
+[ "$JOBS" = 1 ] || export NUMBA_NUM_THREADS=$((($(getconf _NPROCESSORS_ONLN) + JOBS - 1) / JOBS))
 
 if [ $# = 1 ]; then # one clip; prints its number if it has to be tried again later
     for try in 1 2 3; do # one that failed resumes from its checkpoint
@@ -14,10 +15,9 @@ if [ $# = 1 ]; then # one clip; prints its number if it has to be tried again la
         [ $code = 1 ] || break
     done
     case $code in
-    0) exit ;;
-    75) echo "$1" ;;  # being trained by another computer
-    1) exit 1 ;;      # others may do better
-    *) exit 255 ;;    # bad input, or interrupted: xargs stops
+    75) echo "$1" ;; # being trained by another computer
+    0 | 1) exit $code ;;
+    *) exit 255 ;; # bad input, or interrupted: xargs stops
     esac
     exit
 fi
