@@ -8,11 +8,13 @@ import contextlib
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
+    EXIT_NOT_READY,
     EXIT_OK,
     fail,
     parse_range,
 )
 from app.cli.chosen_project import add_project_arguments, open_for_training, project_to_plan, what_goes
+from app.cli.single_clip import train_single_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.document.storing.document_file import PROJECT_FILE
@@ -31,6 +33,13 @@ from engine.training.config import parse_overrides
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream train`."""
     add_project_arguments(command)
+    command.add_argument(
+        "--clip",
+        type=int,
+        metavar="K",
+        help="train this clip only, beside other processes and computers that train others; does nothing if it is "
+        f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it",
+    )
     command.add_argument(
         "--again",
         action="store_true",
@@ -63,6 +72,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     if options.plan:
         return _plan(options)
+    if options.clip is not None:
+        return train_single_clip(options, launch)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)

@@ -96,7 +96,9 @@ def write_job(path: Path, text: str, *, is_replacing: bool) -> None:
     """
     if path.exists() and not is_replacing:
         raise ProjectError(
-            "There is a file of this name already.", hint="Replace it with --replace, or choose another --out.", path=path
+            "There is a file of this name already.",
+            hint="Replace it with --replace, or choose another --out.",
+            path=path,
         )
     with checked_path(path, what="The job") as unfinished:
         unfinished.write_text(text, encoding="utf-8", newline="\n")
@@ -116,6 +118,7 @@ def _text(path: Path | str) -> str:
 def _joined(indices: Sequence[int], form: str, separator: str) -> str:
     """Ascending numbers as runs: 1-4,7,9-12 for the form "{}-{}"."""
     runs = [
-        [index for _, index in run] for _, run in groupby(enumerate(indices), lambda numbered: numbered[1] - numbered[0])
+        [index for _, index in run]
+        for _, run in groupby(enumerate(indices), lambda numbered: numbered[1] - numbered[0])
     ]
     return separator.join(form.format(run[0], run[-1]) if len(run) > 1 else str(run[0]) for run in runs)

@@ -59,7 +59,7 @@ with open(path("done-" + clip), "a") as done:
 end(0)
 """
 
-NAME = "it's 50%j \"of\" $HOME\n{{x}} é"
+NAME = 'it\'s 50%j "of" $HOME\n{{x}} é'
 """A name of a folder that every quoting has to survive."""
 
 
