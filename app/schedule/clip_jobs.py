@@ -29,7 +29,7 @@ class ClipJobs:
         sources: The other clips that are not trained yet, in ascending order.
         n_cpus: Cores of each job: as many as the forecast of its time is for, within MOST_CPUS.
         memory_mb: Memory of each job; the forecast, and a quarter more, and that of the process that waits for it.
-        reference_s, source_s: Time limits, in whole minutes: three times the forecast, since nodes may be slower, and ten
+        reference_s, source_s: Time limits, in whole minutes: three times the forecast, since computers differ, and ten
             minutes for a first start, which compiles.
         is_time_known: Whether they come from forecasts; else they are UNKNOWN_LIMIT_S.
         skipped: Clips that are damaged, or need one that is.

@@ -117,8 +117,6 @@ def _text(path: Path | str) -> str:
 
 def _joined(indices: Sequence[int], form: str, separator: str) -> str:
     """Ascending numbers as runs: 1-4,7,9-12 for the form "{}-{}"."""
-    runs = [
-        [index for _, index in run]
-        for _, run in groupby(enumerate(indices), lambda numbered: numbered[1] - numbered[0])
-    ]
+    numbered = groupby(enumerate(indices), lambda pair: pair[1] - pair[0])
+    runs = [[index for _, index in run] for _, run in numbered]
     return separator.join(form.format(run[0], run[-1]) if len(run) > 1 else str(run[0]) for run in runs)

@@ -94,11 +94,9 @@ class SlurmHere:
 
     def _jobs(self) -> list[dict[str, str]]:
         """What SLURM says of every job and task."""
-        return [
-            dict(pair.partition("=")[::2] for pair in line.split())
-            for line in self.call("scontrol", "--oneliner", "show", "jobs").splitlines()
-            if line.startswith("JobId=")
-        ]
+        lines = self.call("scontrol", "--oneliner", "show", "jobs").splitlines()
+        pairs = ([pair.partition("=") for pair in line.split()] for line in lines if line.startswith("JobId="))
+        return [{name: value for name, _, value in job} for job in pairs]
 
 
 @contextmanager
