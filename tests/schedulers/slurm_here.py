@@ -74,7 +74,7 @@ class SlurmHere:
             for job in self._jobs()
         }
 
-    def wait(self, is_so: Callable[[], bool], *, deadline_s: float = DEADLINE_S) -> None:
+    def wait(self, is_so: Callable[[], object], *, deadline_s: float = DEADLINE_S) -> None:
         """Until something is so; fails after a deadline. What SLURM would begin again in two minutes begins in two
         seconds; any sooner, it would still refuse the job as one that was ended."""
         until_s = time.monotonic() + deadline_s

@@ -15,9 +15,13 @@ import pytest
 
 from tests.schedulers.stand_in import calls, scheduled, times_trained
 
+needs_openjd = pytest.mark.skipif(
+    importlib.util.find_spec("openjd") is None or importlib.util.find_spec("openjd.cli") is None,
+    reason="openjd-cli is not installed",
+)
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(importlib.util.find_spec("openjd.cli") is None, reason="openjd-cli is not installed"),
+    needs_openjd,
     pytest.mark.skipif(sys.platform == "win32", reason="the stand-in is a script for POSIX"),
 ]
 OPENJD = [sys.executable, "-P", "-m", "openjd"]
