@@ -55,7 +55,7 @@ COMMANDS = {
     "schedule": Command(
         "write a job for SLURM, OpenJD or a shell that trains the clips on many computers",
         "app.cli.schedule_command",
-        "Nothing was written.",
+        "No job was written.",
         has_backend=True,
     ),
     "eval": Command(

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 
 from app.cli.arguments import EXIT_OK, parse_range, path_argument
-from app.cli.chosen_project import add_project_arguments, open_for_training
+from app.cli.chosen_project import add_project_arguments, open_for_training, project_to_plan
 from app.cli.terminal.progress import ProgressLine
 from app.command_text.quoting import shell_line
 from app.plan.planning import memory_text
 from app.plan.speed import step_time
+from app.project.opening.project_access import is_project, read_settings
 from app.schedule.clip_jobs import ClipJobs, clip_jobs
 from app.schedule.job_files import SCHEDULERS, job_text, write_job
 from app.training.service import Launch
@@ -32,19 +33,20 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream schedule: make the project, write its job, say how to submit it. Returns the exit code."""
     line = ProgressLine()
     scheduler = SCHEDULERS[options.scheduler]
-    project, capture = open_for_training(options, line.say)
-    try:
-        chosen = parse_range(options.clips, len(project.clips(capture.n_frames)), option="--clips", what="clips")
-        jobs = clip_jobs(project, capture, chosen, step_time)
-        if jobs is None:
-            line.say("Nothing to schedule: the clips are trained.")
-            return EXIT_OK
-        folders = (options.capture.absolute(), options.project.absolute())
-        text = job_text(scheduler, jobs, capture=folders[0], project=folders[1])
-        path = (options.out or options.project / scheduler.file).absolute()
-        write_job(path, text, is_replacing=options.replace)
-    finally:
+    planned, capture = project_to_plan(options)  # bad input leaves no project behind
+    chosen = parse_range(options.clips, len(planned.clips(capture.n_frames)), option="--clips", what="clips")
+    jobs = clip_jobs(planned, capture, chosen, step_time)
+    capture.close()
+    if jobs is None:
+        line.say("Nothing to schedule: the clips are trained.")
+        return EXIT_OK
+    text = job_text(scheduler, jobs, capture=options.capture.absolute(), project=options.project.absolute())
+    if not is_project(options.project) or read_settings(options.project) != planned.settings:
+        project, capture = open_for_training(options, line.say)
+        capture.close()
         project.close()
+    path = (options.out or options.project / scheduler.file).absolute()
+    write_job(path, text, is_replacing=options.replace)
     for sentence in _said(jobs):
         line.say(sentence)
     print(shell_line([*scheduler.submit, str(path)], is_windows=False))

@@ -61,7 +61,7 @@ def clip_jobs(project: Project, capture: Capture, chosen: range, step_time: Step
         raise ProjectError(
             f"With these settings, each of the {len(clips)} clips follows the one before, so that no two can be "
             "trained at once.",
-            hint="Train them in one job with `clipgstream train`, or choose field=own and start=reference.",
+            hint="Train them one after the other with `clipgstream train`, or choose field=per_clip and start=scratch.",
             path=project.folder,
         )
     catalog = ClipCatalog(project, len(clips))

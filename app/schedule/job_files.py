@@ -97,7 +97,7 @@ def write_job(path: Path, text: str, *, is_replacing: bool) -> None:
     if path.exists() and not is_replacing:
         raise ProjectError(
             "There is a file of this name already.",
-            hint="Replace it with --replace, or choose another --out.",
+            hint="Add --replace, or choose another --out.",
             path=path,
         )
     with checked_path(path, what="The job") as unfinished:

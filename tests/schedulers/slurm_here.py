@@ -43,7 +43,7 @@ PartitionName=main Nodes=ALL Default=YES
 
 
 def why_no_slurm() -> str:
-    """Why there can be no cluster here; empty where there can."""
+    """Why no cluster can be started here; empty where one can."""
     missing = [name for name in ("slurmctld", "slurmd", "sbatch") if shutil.which(name) is None]
     if missing:
         return f"{', '.join(missing)} not found; apt-get install slurm-wlm brings them"
@@ -71,7 +71,7 @@ class SlurmHere:
         """State of every job and task, by names such as "1" and "2_3"."""
         return {
             f"{job['ArrayJobId']}_{job['ArrayTaskId']}" if "ArrayJobId" in job else job["JobId"]: job["JobState"]
-            for job in self._jobs()
+            for job in self.jobs()
         }
 
     def wait(self, is_so: Callable[[], object], *, deadline_s: float = DEADLINE_S) -> None:
@@ -81,7 +81,7 @@ class SlurmHere:
         hurried: set[tuple[str, str]] = set()
         while not is_so():
             assert time.monotonic() < until_s, self.states()
-            for job in self._jobs():
+            for job in self.jobs():
                 start = (job["JobId"], job["Restarts"])
                 if job["JobState"] == "PENDING" and job["Reason"] == "BeginTime" and start not in hurried:
                     self.call("scontrol", "update", f"JobId={job['JobId']}", "StartTime=now+2seconds")
@@ -92,7 +92,7 @@ class SlurmHere:
         """Until the states of all jobs are among these."""
         self.wait(lambda: set(self.states().values()) <= set(states), deadline_s=deadline_s)
 
-    def _jobs(self) -> list[dict[str, str]]:
+    def jobs(self) -> list[dict[str, str]]:
         """What SLURM says of every job and task."""
         lines = self.call("scontrol", "--oneliner", "show", "jobs").splitlines()
         pairs = ([pair.partition("=") for pair in line.split()] for line in lines if line.startswith("JobId="))

@@ -79,6 +79,7 @@ def test_slurm_trains_the_sample_though_a_job_is_killed(tmp_path, capsys):
         os.kill(killed, signal.SIGKILL)
         cluster.wait_for(("COMPLETED", "FAILED", "CANCELLED"), deadline_s=DEADLINE_S)
         assert cluster.states() == {"1": "COMPLETED", "2_1": "COMPLETED"}
+        assert [job["Restarts"] for job in cluster.jobs()] == ["0", "1"]
     assert trained(project) == [0, 1]
 
 
