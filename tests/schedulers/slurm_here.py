@@ -134,6 +134,7 @@ def slurm_here(folder: Path, *, n_cpus: int = 2) -> Iterator[SlurmHere]:
                 daemon.wait(timeout=DEADLINE_S)
             except subprocess.TimeoutExpired:
                 daemon.kill()
+                daemon.wait()
 
 
 def _wait_for_node(cluster: SlurmHere, folder: Path) -> None:

@@ -70,3 +70,4 @@ def test_ten_thousand_clips_are_one_step(tmp_path):
     _, job = scheduled("openjd", tmp_path, n_clips=10_000)
     found = json.loads(openjd("summary", job, "--output", "json").stdout)
     assert found["total_tasks"] == 10_000
+    assert found["steps"][1]["dependencies"] == [{"step_name": "Reference"}]

@@ -38,8 +38,11 @@ def test_two_computers_share_the_clips(tmp_path):
     project, job = impatient(tmp_path, n_clips=12)
     (project / "slow-0").write_text("0.5")  # so that the second computer has to wait
     (project / "fail-5").write_text("1")
-    computers = [started(job), started(job, JOBS="2")]
-    assert [computer.wait(DEADLINE_S) for computer in computers] == [0, 0]
+    (project / "fail-7").write_text("75 75")
+    first, second = started(job), started(job, JOBS="2")
+    assert second.wait(DEADLINE_S) == 0
+    assert times_trained(project, 12) == [1] * 12  # none leaves before all is done
+    assert first.wait(DEADLINE_S) == 0
     assert times_trained(project, 12) == [1] * 12
     assert 75 in calls(project, 0)
     assert 1 in calls(project, 5)
