@@ -7,6 +7,29 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
+class RunningClip:
+    """A clip in training.
+
+    Attributes:
+        state: starting, preparing, running, paused or stopping.
+        step, n_steps: Optimiser steps.
+        steps_per_s: Smoothed rate; 0 when unknown.
+        eta_s: Seconds until it is finished; None when unknown.
+        stage: The present stage, as shown to the user.
+        held_out_psnr: Of a few held-out pictures, dB; None when not measured.
+    """
+
+    clip_index: int
+    state: str = "starting"
+    step: int = 0
+    n_steps: int = 0
+    steps_per_s: float = 0.0
+    eta_s: float | None = None
+    stage: str = ""
+    held_out_psnr: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class TrainingStatus:
     """The training as a whole, derived from queue, worker and last event.
 
@@ -30,6 +53,7 @@ class TrainingStatus:
         next_clip_index: The clip that TrainNextClip would train; None when all are trained.
         resume_step: The step that it would continue from; None when it would start from the beginning.
         queue: Clips that wait.
+        trainings: All clips in training, in the order in which they began.
     """
 
     state: str = "idle"
@@ -52,6 +76,7 @@ class TrainingStatus:
     next_clip_index: int | None = None
     resume_step: int | None = None
     queue: tuple[int, ...] = ()
+    trainings: tuple[RunningClip, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ class TrainingService:
         self.queue = TrainQueue()
         self.runs: dict[int, ClipRun] = {}
         self.last: ClipRun | None = None
-        self.live_view = "live"
+        self.live_view = "live" if is_window_open else "off"  # nobody looks
         self.is_ending_after = False
         self.curves = CurveReader() if curves is None else curves
         self._owns_curves = curves is None

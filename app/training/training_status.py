@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from app.status import ClipStatus, TrainingStatus
+from app.status import ClipStatus, RunningClip, TrainingStatus
+from app.training.clip_run import ClipRun
 from app.training.curves import Curves
 from app.training.messages import ClipTrained
 from app.training.service import TrainingService
@@ -51,6 +52,20 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
         next_clip_index=upcoming,
         resume_step=None if upcoming is None else service.catalog[upcoming].resume_step,
         queue=tuple(service.queue),
+        trainings=tuple(map(_running_clip, service.runs.values())),
+    )
+
+
+def _running_clip(run: ClipRun) -> RunningClip:
+    return RunningClip(
+        run.clip_index,
+        run.state,
+        step=run.step,
+        n_steps=run.n_steps,
+        steps_per_s=run.last_step.steps_per_s if run.last_step is not None and run.state == "running" else 0.0,
+        eta_s=run.eta_s,
+        stage=run.stage.stage,
+        held_out_psnr=run.held_out_psnr,
     )
 
 

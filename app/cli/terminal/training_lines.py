@@ -1,28 +1,35 @@
-"""A training on the command line: its status as a progress line, its events and outcomes as plain lines."""
+"""Trainings on the command line: their status as progress lines, their events and outcomes as plain lines."""
 
 from __future__ import annotations
 
-from app.cli.terminal.progress import ProgressLine
+from collections.abc import Sequence
+
+from app.cli.terminal.progress import ProgressLine, ProgressRow
 from app.evaluation.headless import ClipOutcome
 from app.plan.planning import begin_text, compared_text, plan_clip
+from app.plan.side_by_side import SequencePlan, sequence_s
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.psnr_words import psnr_words
-from app.status import TrainingStatus
-from app.training.messages import Event, StageReported, WarningRaised
+from app.spans import spans_text
+from app.status import RunningClip, TrainingStatus
+from app.training.messages import StageReported, WarningRaised
+from app.training.service import ClipEvent
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
 from engine.text import duration_text
+from engine.training.plan.forecast import median_of
 from engine.training.plan.plan import StepTime, TrainingPlan
+
+MAX_FAILURES = 10
+"""Failed clips whose reasons are repeated in the end."""
 
 
 def show_status(line: ProgressLine, status: TrainingStatus) -> None:
     """Show where a training is."""
     if status.state == "running":
-        parts = [f"step {status.step}/{status.n_steps}"]
-        if status.steps_per_s:
-            parts += [f"{status.steps_per_s:.1f} steps/s", f"{duration_text(status.eta_s)} left"]
+        parts = _step_parts(status)
         if status.loss_history:
             parts.append(f"loss {status.loss_history[-1][1]:.4f}")
         if status.gradient_norm is not None:
@@ -35,19 +42,28 @@ def show_status(line: ProgressLine, status: TrainingStatus) -> None:
         line.update(f"Clip {status.clip_index}: {stage}", status.progress, "")
 
 
-def show_event(line: ProgressLine, event: Event) -> None:
-    """Print a training's reports other than its progress."""
-    match event:
+def _step_parts(training: TrainingStatus | RunningClip) -> list[str]:
+    parts = [f"step {training.step}/{training.n_steps}"]
+    if training.steps_per_s:
+        parts += [f"{training.steps_per_s:.1f} steps/s", f"{duration_text(training.eta_s)} left"]
+    return parts
+
+
+def show_event(line: ProgressLine, event: ClipEvent, *, has_others: bool = False) -> None:
+    """Print a training's reports other than its progress. has_others: Whether clips train next to it."""
+    clip_index, reported = event
+    name = f"Clip {clip_index}: " if has_others else ""
+    match reported:
         case StageReported(message=message) if message:
-            line.say(f"  {message}")
+            line.say(f"  {name}{message}")
         case WarningRaised(title=title, detail=detail, hint=hint):
-            line.say(". ".join(part for part in (title, detail, hint) if part))
+            line.say(name + ". ".join(part for part in (title, detail, hint) if part))
         case _:
             pass
 
 
-def show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
-    """Say how a clip ended."""
+def show_outcome(line: ProgressLine, outcome: ClipOutcome, *, is_only: bool = False) -> None:
+    """Say how a clip ended. is_only: Whether it is the only one, whose failure ends everything and is said there."""
     psnr = outcome.held_out_psnr
     figure = "" if psnr is None else f", {psnr_words(psnr, is_whole=outcome.held_out_whole)}"
     if outcome.state == "skipped":
@@ -55,6 +71,24 @@ def show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
     elif outcome.state == "trained":
         took = duration_text(outcome.seconds)
         line.say(f"Clip {outcome.clip_index} is trained: {outcome.step:,} steps in {took}{figure}")
+    elif outcome.state == "failed" and not is_only:
+        line.say(f"Clip {outcome.clip_index} failed: {outcome.message}")
+
+
+def failure_text(outcomes: Sequence[ClipOutcome]) -> str:
+    """What failed of a training that has ended, and the clips that were not begun because of it; a line each."""
+    lost = [outcome for outcome in outcomes if outcome.state in ("failed", "damaged")]
+    lines = []
+    for outcome in lost[:MAX_FAILURES]:
+        name = f"Clip {outcome.clip_index}: " if len(lost) > 1 and outcome.state == "failed" else ""
+        lines.append(name + " ".join(part for part in (outcome.message, outcome.hint) if part))
+    if len(lost) > MAX_FAILURES:
+        more = sorted(outcome.clip_index for outcome in lost[MAX_FAILURES:])
+        lines.append(f"Not trained, either, for reasons given above or in their logs: clip {spans_text(more)}.")
+    for cause in dict.fromkeys(outcome.left_out_by for outcome in outcomes if outcome.left_out_by is not None):
+        left = sorted(outcome.clip_index for outcome in outcomes if outcome.left_out_by == cause)
+        lines.append(f"Not begun, because clip {cause} is not finished: clip {spans_text(left)}.")
+    return "\n".join(lines)
 
 
 class PlanLines:
@@ -80,15 +114,14 @@ class PlanLines:
     ) -> None:
         self._line, self._project, self._capture, self._is_quiet = line, project, capture, is_quiet
         self._catalog, self._step_time = catalog, step_time
-        self._plan: TrainingPlan | None = None
+        self._plans: dict[int, TrainingPlan] = {}
 
     def begin(self, clip: Clip) -> None:
         """A clip is about to be trained. A plan that cannot be made is left out: training says why."""
-        self._plan = None
         if self._is_quiet:
             return
         try:
-            self._plan = plan_clip(
+            plan = self._plans[clip.clip_index] = plan_clip(
                 self._project,
                 self._capture,
                 clip,
@@ -97,12 +130,70 @@ class PlanLines:
             )
         except EngineError:
             return
-        for text in begin_text(self._plan):
+        for text in begin_text(plan):
             self._line.say(text)
 
     def end(self, outcome: ClipOutcome) -> None:
         """Its training has ended."""
-        if outcome.state == "trained" and self._plan is not None:
-            text = compared_text(self._plan, self._project)
+        plan = self._plans.pop(outcome.clip_index, None)
+        if outcome.state == "trained" and plan is not None:
+            text = compared_text(plan, self._project)
             if text:
                 self._line.say(text)
+
+
+class SequenceTable:
+    """Shows clips that train side by side, one line each, and the sequence as a whole in the last one.
+
+    Args:
+        line: Where to show them.
+        project: Of the clips.
+        clips: All of the sequence, in the order of training.
+        plan: What is known of them before.
+    """
+
+    def __init__(self, line: ProgressLine, project: Project, clips: Sequence[Clip], plan: SequencePlan) -> None:
+        self._line, self._project, self._plan = line, project, plan
+        self._left = {clip.clip_index: clip for clip in clips}
+        self._n_clips = len(clips)
+        self._took_s: list[float] = []
+
+    def end(self, outcome: ClipOutcome) -> None:
+        """A clip has ended, in any way."""
+        self._left.pop(outcome.clip_index, None)
+        if outcome.state == "trained" and self._project.inherited_index(outcome.clip_index) is not None:
+            self._took_s.append(outcome.seconds)
+
+    def show(self, status: TrainingStatus) -> None:
+        """Show where all of them are."""
+        running = {row.clip_index: row for row in status.trainings}
+        rows = [ProgressRow(f"Clip {row.clip_index}", _share(row), _figures(row)) for row in running.values()]
+        n_done = self._n_clips - len(self._left)
+        eta_s = sequence_s(
+            [row.eta_s or self._expected_s(row.clip_index) for row in running.values()],
+            [self._expected_s(clip_index) for clip_index in self._left if clip_index not in running],
+            self._plan.together.n_workers,
+        )
+        share = (n_done + sum(row.done for row in rows)) / max(self._n_clips, 1)
+        parts = [f"{n_done}/{self._n_clips} clips", *([f"{duration_text(eta_s)} left"] if eta_s is not None else [])]
+        self._line.show([*rows, ProgressRow("All", share, ", ".join(parts))])
+
+    def _expected_s(self, clip_index: int) -> float | None:
+        """As long as other clips took, else as planned."""
+        clip = self._left.get(clip_index)
+        if clip is None:
+            return None
+        return median_of(self._took_s) or self._plan.expected_s(self._project, clip)
+
+
+def _share(row: RunningClip) -> float:
+    return row.step / row.n_steps if row.n_steps else 0.0
+
+
+def _figures(row: RunningClip) -> str:
+    if row.state != "running":
+        return row.stage.lower() if row.state == "preparing" and row.stage else row.state
+    parts = _step_parts(row)
+    if row.held_out_psnr is not None:
+        parts.append(psnr_words(row.held_out_psnr, is_whole=False))
+    return ", ".join(parts)
