@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
+    EXIT_NOT_READY,
     EXIT_OK,
     add_follow_links,
     fail,
@@ -16,6 +17,7 @@ from app.cli.arguments import (
     path_argument,
 )
 from app.cli.chosen_project import open_for_training, project_to_plan, what_goes
+from app.cli.single_clip import train_single_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import (
     PlanLines,
@@ -47,13 +49,18 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--project", type=path_argument, required=True, help="project folder; created if missing")
     command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
     command.add_argument(
+        "--clip",
+        type=int,
+        metavar="K",
+        help="train this clip only, beside other processes and computers that train others; does nothing if it is "
+        f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it",
+    )
+    command.add_argument(
         "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
     )
     command.add_argument(
         "--workers",
-        dest="n_workers",
         type=workers_argument,
-        default=1,
         metavar="N",
         help="train N clips side by side, on as many cores and in as much memory as there is (default: 1)",
     )
@@ -108,6 +115,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     if options.plan:
         return _plan(options)
+    if options.clip is not None:
+        return train_single_clip(options, launch)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)
@@ -121,17 +130,12 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         order = sorted(chosen, key=lambda clip_index: clip_index != first)
         catalog = ClipCatalog(project, len(clips))
         to_train = [clips[i] for i in order if options.again or is_due(catalog, i)]
-        sequence = plan_here(project, capture, to_train, catalog, options.n_workers)
+        sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
         n_workers = sequence.together.n_workers
         service = TrainingService(
-            project,
-            clips,
-            holdout=holdout,
-            launch=launch,
-            is_window_open=False,
-            catalog=catalog,
-            n_workers=n_workers,
+            project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, n_workers=n_workers
         )
+        service.set_live_view("off")
         note_kept(catalog, project, capture)
         names = ", ".join(project.settings.holdout) or "none"
         line.say(
@@ -153,7 +157,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             on_status=table.show if n_workers > 1 else lambda status: show_status(line, status),
             on_event=lambda event: show_event(line, event, has_others=n_workers > 1),
             on_outcome=lambda outcome: (
-                show_outcome(line, outcome, is_only=len(order) == 1),
+                show_outcome(line, outcome, has_others=len(order) > 1),
                 plans.end(outcome),
                 table.end(outcome),
             ),

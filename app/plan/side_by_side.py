@@ -1,4 +1,4 @@
-"""How many clips train side by side on one machine, and when the last of them is finished.
+"""How many clips train side by side on one machine: as many as its cores, and only where its memory suffices.
 
 Trainings that run side by side divide the cores. More of them than cores would take turns, which is slower than one
 after the other and takes more memory; so cores are a limit that is respected in silence but for one sentence, while
@@ -7,8 +7,7 @@ memory that does not suffice is an error: half of the trainings would end by it,
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.plan.forecasts import Kind, kind_of, plans_of_kinds
@@ -74,7 +73,7 @@ def side_by_side(
 
 
 @dataclass(frozen=True, slots=True)
-class SequencePlan:
+class PlannedClips:
     """What is known of clips before they are trained on this machine.
 
     Attributes:
@@ -93,7 +92,7 @@ class SequencePlan:
 
 def plan_here(
     project: Project, capture: Capture, clips: Sequence[Clip], catalog: ClipCatalog, n_wanted: int
-) -> SequencePlan:
+) -> PlannedClips:
     """How clips train on this machine as it is now.
 
     Args:
@@ -106,7 +105,7 @@ def plan_here(
         PreparationError: The capture does not fit the settings.
     """
     if not clips or n_wanted == 1:  # needs no forecast
-        return SequencePlan(SideBySide(1), {})
+        return PlannedClips(SideBySide(1), {})
     kinds, config = plans_of_kinds(project, capture, clips, catalog), project.settings.config()
     indices = {clip.clip_index for clip in clips}
     followers = [clip for clip in clips if not indices.isdisjoint(needed_clips(project, clip.clip_index, config))]
@@ -120,21 +119,4 @@ def plan_here(
         clip_mb=max(kinds[kind_of(project, clip, config)].memory_mb for clip in ready),
         free_mb=None if free is None else free / 1e6,
     )
-    return SequencePlan(together, kinds)
-
-
-def sequence_s(running: Iterable[float | None], waiting: Iterable[float | None], n_workers: int) -> float | None:
-    """Seconds until the last clip is finished, where the next one begins whenever one ends.
-
-    Args:
-        running: Seconds that each clip in training still takes; None where that is not known.
-        waiting: Seconds that each other one takes, in order.
-    """
-    free_at, left = list(running), list(waiting)
-    if None in free_at or None in left:
-        return None
-    ends = [0.0] * max(n_workers - len(free_at), 0) + [seconds for seconds in free_at if seconds is not None]
-    heapq.heapify(ends)
-    for seconds in left:
-        heapq.heapreplace(ends, ends[0] + (seconds or 0.0))
-    return max(ends, default=0.0)
+    return PlannedClips(together, kinds)

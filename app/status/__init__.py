@@ -24,6 +24,7 @@ from app.status.shown import (
 from app.status.training import (
     ClipStatus,
     DependencyStatus,
+    MachineStatus,
     PlanStatus,
     QueuedClip,
     QueueStatus,
@@ -52,6 +53,7 @@ __all__ = [
     "ClipStatus",
     "DependencyStatus",
     "JobStatus",
+    "MachineStatus",
     "OpeningForecast",
     "Overlays",
     "PlanStatus",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from app.cli.terminal.progress import ProgressLine, ProgressRow
 from app.evaluation.headless import ClipOutcome
+from app.plan.makespan import ends_of
 from app.plan.planning import begin_text, compared_text, plan_clip
-from app.plan.side_by_side import SequencePlan, sequence_s
+from app.plan.side_by_side import PlannedClips
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.psnr_words import psnr_words
@@ -15,6 +16,7 @@ from app.spans import spans_text
 from app.status import RunningClip, TrainingStatus
 from app.training.messages import StageReported, WarningRaised
 from app.training.service import ClipEvent
+from app.training.train_queue import needed_clips
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
@@ -62,8 +64,8 @@ def show_event(line: ProgressLine, event: ClipEvent, *, has_others: bool = False
             pass
 
 
-def show_outcome(line: ProgressLine, outcome: ClipOutcome, *, is_only: bool = False) -> None:
-    """Say how a clip ended. is_only: Whether it is the only one, whose failure ends everything and is said there."""
+def show_outcome(line: ProgressLine, outcome: ClipOutcome, *, has_others: bool = False) -> None:
+    """Say how a clip ended. has_others: Whether others may go on after a failure, which is said now, then."""
     psnr = outcome.held_out_psnr
     figure = "" if psnr is None else f", {psnr_words(psnr, is_whole=outcome.held_out_whole)}"
     if outcome.state == "skipped":
@@ -71,7 +73,7 @@ def show_outcome(line: ProgressLine, outcome: ClipOutcome, *, is_only: bool = Fa
     elif outcome.state == "trained":
         took = duration_text(outcome.seconds)
         line.say(f"Clip {outcome.clip_index} is trained: {outcome.step:,} steps in {took}{figure}")
-    elif outcome.state == "failed" and not is_only:
+    elif outcome.state == "failed" and has_others:
         line.say(f"Clip {outcome.clip_index} failed: {outcome.message}")
 
 
@@ -152,10 +154,11 @@ class SequenceTable:
         plan: What is known of them before.
     """
 
-    def __init__(self, line: ProgressLine, project: Project, clips: Sequence[Clip], plan: SequencePlan) -> None:
+    def __init__(self, line: ProgressLine, project: Project, clips: Sequence[Clip], plan: PlannedClips) -> None:
         self._line, self._project, self._plan = line, project, plan
         self._left = {clip.clip_index: clip for clip in clips}
-        self._n_clips = len(clips)
+        self._n_clips, config = len(clips), project.settings.config()
+        self._needs = {index: needed_clips(project, index, config) for index in self._left}
         self._took_s: list[float] = []
 
     def end(self, outcome: ClipOutcome) -> None:
@@ -166,28 +169,36 @@ class SequenceTable:
 
     def show(self, status: TrainingStatus) -> None:
         """Show where all of them are."""
-        running = {row.clip_index: row for row in status.trainings}
-        rows = [ProgressRow(f"Clip {row.clip_index}", _share(row), _figures(row)) for row in running.values()]
-        n_done = self._n_clips - len(self._left)
-        eta_s = sequence_s(
-            [row.eta_s or self._expected_s(row.clip_index) for row in running.values()],
-            [self._expected_s(clip_index) for clip_index in self._left if clip_index not in running],
-            self._plan.together.n_workers,
-        )
+        running = {row.clip_index: row for row in status.trainings if row.clip_index in self._left}
+        has_machines = len({row.machine for row in running.values() if row.machine}) > 1
+        rows = [
+            ProgressRow(
+                f"Clip {row.clip_index}" + (f" on {row.machine}" if has_machines and row.machine else ""),
+                row.step / row.n_steps if row.n_steps else 0.0,
+                _figures(row),
+            )
+            for row in running.values()
+        ]
+        n_done, eta_s = self._n_clips - len(self._left), self._eta_s(running)
         share = (n_done + sum(row.done for row in rows)) / max(self._n_clips, 1)
-        parts = [f"{n_done}/{self._n_clips} clips", *([f"{duration_text(eta_s)} left"] if eta_s is not None else [])]
-        self._line.show([*rows, ProgressRow("All", share, ", ".join(parts))])
+        left = "" if eta_s is None else f", {duration_text(eta_s)} left"
+        self._line.show([*rows, ProgressRow("All", share, f"{n_done}/{self._n_clips} clips{left}")])
+
+    def _eta_s(self, running: Mapping[int, RunningClip]) -> float | None:
+        """Until the last clip is finished; None while nobody can know."""
+        etas = {index: row.eta_s for index, row in running.items() if row.eta_s is not None}
+        order = [*running, *(index for index in self._left if index not in running)]
+        left_s = {index: etas.get(index, self._expected_s(index)) for index in order}
+        known_s = {index: seconds for index, seconds in left_s.items() if seconds is not None}
+        if len(known_s) < len(left_s):
+            return None
+        n_elsewhere = sum(row.is_elsewhere for row in running.values())
+        ends = ends_of(known_s, self._needs, self._plan.together.n_workers + n_elsewhere)
+        return max(ends.values(), default=0.0)
 
     def _expected_s(self, clip_index: int) -> float | None:
         """As long as other clips took, else as planned."""
-        clip = self._left.get(clip_index)
-        if clip is None:
-            return None
-        return median_of(self._took_s) or self._plan.expected_s(self._project, clip)
-
-
-def _share(row: RunningClip) -> float:
-    return row.step / row.n_steps if row.n_steps else 0.0
+        return median_of(self._took_s) or self._plan.expected_s(self._project, self._left[clip_index])
 
 
 def _figures(row: RunningClip) -> str:

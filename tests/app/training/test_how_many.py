@@ -8,7 +8,7 @@ import pytest
 
 from app.cli.cli import main
 from app.plan import side_by_side as module
-from app.plan.side_by_side import SideBySide, plan_here, sequence_s, side_by_side
+from app.plan.side_by_side import SideBySide, plan_here, side_by_side
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
 from app.training.process import ProcessWorker
@@ -73,15 +73,6 @@ def test_the_reference_clip_comes_alone_and_does_not_count(six: OpenedProject, m
     assert plan_here(six.project, six.capture, [], catalog, 8).together == SideBySide(1)
     write_trained(six, 0)
     assert plan_here(six.project, six.capture, six.clips[1:4], catalog, 2).together == SideBySide(2)
-
-
-def test_a_sequence_ends_with_its_last_clip() -> None:
-    assert sequence_s([], [10.0] * 8, 1) == 80.0
-    assert sequence_s([], [10.0] * 8, 2) == 40.0
-    assert sequence_s([3.0, 9.0], [10.0, 10.0, 10.0], 2) == 23.0, "at 3, 9 and 13 the next ones begin"
-    assert sequence_s([3.0], [], 4) == 3.0
-    assert sequence_s([None], [], 4) is None
-    assert sequence_s([3.0], [None], 4) is None
 
 
 def test_the_command_refuses_what_memory_cannot_hold_and_leaves_nothing(run, capture_folder, tmp_path, monkeypatch):

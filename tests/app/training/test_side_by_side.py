@@ -85,7 +85,6 @@ def test_each_is_paused_and_stopped_by_itself_or_all_of_them(six: OpenedProject)
 def test_live_states_are_told_apart(six: OpenedProject) -> None:
     write_trained(six, 0)
     service = make_service(six, slow_sources)
-    service.set_live_view("live")
     service.enqueue_all([1, 2])
     for _ in range(3):
         service.poll()
@@ -99,17 +98,6 @@ def test_live_states_are_told_apart(six: OpenedProject) -> None:
     service.close()
     assert not service.is_busy
     assert service.catalog[2].resume_step
-
-
-def test_nothing_is_written_for_a_window_that_is_not_there(six: OpenedProject) -> None:
-    write_trained(six, 0)
-    service = make_service(six, slow_sources)
-    service.enqueue_all([1, 2])
-    for _ in range(3):
-        service.poll()
-    assert [run.shown for run in service.runs.values()] == [None, None]
-    assert not list(six.project.folder.glob("live/*.safetensors"))
-    service.close()
 
 
 def fails_in(failing: int, error: Exception) -> MakeTraining:
