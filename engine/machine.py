@@ -45,7 +45,7 @@ def _left_in_groups(root: Path) -> Iterator[int]:
             group = place / name.strip("/")  # does not exist where a container sees its own group as the top
             for folder in (group, *group.parents):
                 if folder.is_relative_to(place):
-                    with suppress(OSError, ValueError):  # "max" is no limit
+                    with suppress(OSError, ValueError):  # "max" means without a limit
                         yield _left_in_group(folder, *names)
 
 

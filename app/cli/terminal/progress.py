@@ -55,7 +55,7 @@ class ProgressLine:
             self._draw([ProgressRow(stage, done, detail)])
 
     def show(self, rows: Sequence[ProgressRow]) -> None:
-        """Show several jobs that go on at the same time; a terminal that is too low shows the last of them."""
+        """Show several jobs that run at the same time; a terminal that is too low shows the last of them."""
         if not self._is_due(SEVERAL):
             return
         if self._is_terminal:
