@@ -1,8 +1,8 @@
 """How many clips train side by side on one machine: as many as its cores, and only where its memory suffices.
 
 Trainings that run side by side divide the cores. More of them than cores would take turns, which is slower than one
-after the other and takes more memory; so cores are a limit that is respected in silence but for one sentence, while
-memory that does not suffice is an error: half of the trainings would end by it, hours later.
+after the other and takes more memory; so there are never more than cores, with a sentence about it. Too little memory is
+an error: trainings would be killed hours later, or the machine would stand still.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def side_by_side(
     if n_wanted == 1:
         return SideBySide(1)
     if is_chain:
-        return SideBySide(1, "Clips train one after another: each continues from the one before it (start=previous).")
+        return SideBySide(1, "Clips train one after another: each continues from the one before it.")
     n_workers = min(n_wanted, max(n_cores, 1), max(n_ready, 1))
     if n_workers > 1 and free_mb is not None and n_workers * clip_mb > free_mb:
         n_fitting = max(int(free_mb // clip_mb), 1)
@@ -110,7 +110,9 @@ def plan_here(
     indices = {clip.clip_index for clip in clips}
     followers = [clip for clip in clips if not indices.isdisjoint(needed_clips(project, clip.clip_index, config))]
     ready = followers or clips  # what the reference clip comes before trains without it
-    free = free_memory_bytes() or memory_bytes()
+    free = free_memory_bytes()
+    if free is None:
+        free = memory_bytes()
     together = side_by_side(
         n_wanted,
         n_ready=len(ready),

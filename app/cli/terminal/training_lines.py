@@ -164,7 +164,7 @@ class SequenceTable:
     def end(self, outcome: ClipOutcome) -> None:
         """A clip has ended, in any way."""
         self._left.pop(outcome.clip_index, None)
-        if outcome.state == "trained" and self._project.inherited_index(outcome.clip_index) is not None:
+        if outcome.state == "trained" and self._is_source(outcome.clip_index):
             self._took_s.append(outcome.seconds)
 
     def show(self, status: TrainingStatus) -> None:
@@ -187,8 +187,10 @@ class SequenceTable:
     def _eta_s(self, running: Mapping[int, RunningClip]) -> float | None:
         """Until the last clip is finished; None while nobody can know."""
         etas = {index: row.eta_s for index, row in running.items() if row.eta_s is not None}
+        like_s = [running[index].since_s + eta_s for index, eta_s in etas.items() if self._is_source(index)]
+        typical_s = median_of(self._took_s) or median_of(like_s)
         order = [*running, *(index for index in self._left if index not in running)]
-        left_s = {index: etas.get(index, self._expected_s(index)) for index in order}
+        left_s = {index: etas.get(index, self._expected_s(index, typical_s)) for index in order}
         known_s = {index: seconds for index, seconds in left_s.items() if seconds is not None}
         if len(known_s) < len(left_s):
             return None
@@ -196,9 +198,13 @@ class SequenceTable:
         ends = ends_of(known_s, self._needs, self._plan.together.n_workers + n_elsewhere)
         return max(ends.values(), default=0.0)
 
-    def _expected_s(self, clip_index: int) -> float | None:
-        """As long as other clips took, else as planned."""
-        return median_of(self._took_s) or self._plan.expected_s(self._project, self._left[clip_index])
+    def _expected_s(self, clip_index: int, typical_s: float | None) -> float | None:
+        """How long a clip takes: as other source clips, else as planned."""
+        is_like = typical_s is not None and self._is_source(clip_index)
+        return typical_s if is_like else self._plan.expected_s(self._project, self._left[clip_index])
+
+    def _is_source(self, clip_index: int) -> bool:
+        return self._project.inherited_index(clip_index) is not None
 
 
 def _figures(row: RunningClip) -> str:
