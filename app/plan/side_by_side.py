@@ -1,8 +1,8 @@
 """How many clips train side by side on one machine: as many as its cores, and only where its memory suffices.
 
 Trainings that run side by side divide the cores. More of them than cores would take turns, which is slower than one
-after the other and takes more memory; so there are never more than cores, with a sentence about it. Too little memory is
-an error: trainings would be killed hours later, or the machine would stand still.
+after the other and takes more memory; so there are never more than cores, with a sentence about it. Too little memory
+is an error: trainings would be killed hours later, or the machine would stand still.
 """
 
 from __future__ import annotations

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import os
 from functools import partial
 
 import pytest
 
 from app.evaluation.headless import ClipOutcome, train_clips
 from app.project.opening.opened_project import OpenedProject
+from app.training.jobs import train_job
 from app.training.messages import ClipTrained
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses, training_status
+from app.training.worker import worker
 from app.training.worker.interface import MakeTraining
 from app.training.worker.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import DiskError, NonFiniteLoss
+from engine.parallel import CORES_VARIABLE, n_cores
 from tests.app.conftest import inline
 from tests.app.fakes import make_fake, make_slow, write_trained
 from tests.app.training.test_train_queue import run_out, six
@@ -162,3 +166,15 @@ def test_a_disk_that_fails_lets_no_other_clip_begin(six: OpenedProject) -> None:
 )
 def test_they_share_the_cores(cores: int, is_window_open: bool, n_beside: int, expected: int) -> None:
     assert n_training_threads(cores, is_window_open=is_window_open, n_beside=n_beside) == expected
+
+
+def test_a_worker_computes_everything_with_its_share(six: OpenedProject, monkeypatch) -> None:
+    for name in (CORES_VARIABLE, "NUMBA_NUM_THREADS"):
+        monkeypatch.setenv(name, "")  # put back afterwards
+        monkeypatch.delenv(name)
+    monkeypatch.setattr(worker, "n_cores", lambda: 8)
+    monkeypatch.setattr(worker, "use_threads", lambda n: n)
+    job = train_job(six.project, six.clips[1], is_window_open=False, n_beside=4)
+    assert worker._set_threads(job) == 2
+    assert (os.environ[CORES_VARIABLE], os.environ["NUMBA_NUM_THREADS"]) == ("2", "2")
+    assert n_cores() <= 2
