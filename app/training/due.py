@@ -11,15 +11,9 @@ from app.training.train_queue import needed_clips
 from engine.errors import ProjectError
 
 
-def is_due(catalog: ClipCatalog, clip_index: int) -> bool:
-    """Whether a clip is not finished and up to date, and can be trained. A damaged one is for the user to decide on."""
-    record = catalog[clip_index]
-    return record.state not in ("trained", "damaged") and record.blocked_by is None
-
-
 def due_clips(catalog: ClipCatalog) -> list[int]:
     """All that are due, in the order of training."""
-    return [index for index in catalog.order if is_due(catalog, index)]
+    return [index for index in catalog.order if index in catalog.due]
 
 
 def stale_clips(catalog: ClipCatalog) -> list[int]:

@@ -13,7 +13,7 @@ from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.training.clip_run import ClipRun, HandedOver, ShownState
 from app.training.curves import CurveReader
-from app.training.due import check_needed, is_due, with_needed
+from app.training.due import check_needed, with_needed
 from app.training.jobs import train_job
 from app.training.messages import (
     LIVE_VIEWS,
@@ -26,7 +26,7 @@ from app.training.messages import (
 )
 from app.training.own_settings import with_own
 from app.training.process import ProcessWorker, Worker
-from app.training.train_queue import OwnSettings, TrainQueue, drop_hopeless, needed_clips
+from app.training.train_queue import FINISHED, OwnSettings, TrainQueue, drop_hopeless, needed_clips
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import ProjectError
@@ -85,6 +85,8 @@ class TrainingService:
         self._begun: dict[int, OwnSettings] = {}  # own settings with which unfinished clips were begun
         self._dropped: list[int] = []
         self._n_runs = 0
+        self._next: int | None = None
+        self._next_of: tuple[int, ...] = ()
 
     @property
     def is_busy(self) -> bool:
@@ -141,10 +143,13 @@ class TrainingService:
         Where the queue is held, it is the first of that.
         """
         if not self.runs and self.queue:
-            return next(iter(self.queue))
-        taken = {*self.queue, *self.runs}
-        clips = (index for index in self.catalog.order if index not in taken)
-        return next((index for index in clips if is_due(self.catalog, index)), None)
+            return self.queue.first
+        of = (self.catalog.revision, self.queue.revision, self._n_runs, len(self.runs))
+        if of != self._next_of:  # asked for at every look, and clips may be thousands
+            left = self.catalog.due.difference(self.queue, self.runs)
+            first = self.catalog.order[0]
+            self._next_of, self._next = of, first if first in left else min(left, default=None)
+        return self._next
 
     @property
     def can_train_next(self) -> bool:
@@ -342,5 +347,6 @@ class TrainingService:
         if self.is_ending_after and self.queue:
             self.queue.is_held = True
         self.is_ending_after = False
-        self._dropped += self.drop_hopeless()
+        if self.catalog[clip_index].state not in FINISHED:  # else nothing has become hopeless by it
+            self._dropped += self.drop_hopeless()
         self._start_waiting()

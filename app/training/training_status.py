@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from app.project.clips.clip_catalog import ClipRecord
 from app.status import ClipStatus, TrainingStatus
 from app.training.curves import Curves
 from app.training.messages import ClipTrained
@@ -73,6 +74,8 @@ class ClipStatuses:
         self._service = service
         self._statuses: list[ClipStatus] = []
         self._made_of: tuple[object, ...] = ()
+        self._records: list[ClipRecord] = []
+        self._places: set[tuple[str, int, str]] = set()
 
     def all(self, live_counts: tuple[int, int, int] | None = None) -> list[ClipStatus]:
         """All of them.
@@ -80,16 +83,31 @@ class ClipStatuses:
         Args:
             live_counts: A clip that trains, with its inherited and own anchors, if a state of it was loaded.
         """
-        service = self._service
-        queue, runs = service.queue, service.runs
-        made_of = (service.catalog.revision, tuple(queue), tuple(runs), tuple(queue.failed))
-        if self._made_of != made_of:
-            self._statuses = [self._status(index, None) for index in range(len(service.clips))]
-            self._made_of = made_of
+        runs = self._service.runs
+        self._follow()
         for clip_index in runs:
             counts = live_counts[1:] if live_counts is not None and live_counts[0] == clip_index else None
             self._statuses[clip_index] = self._status(clip_index, counts)
         return list(self._statuses)
+
+    def _follow(self) -> None:
+        """Remake those that have changed, but for those that train."""
+        service = self._service
+        queue, runs, catalog = service.queue, service.runs, service.catalog
+        made_of = (catalog.revision, queue.revision, tuple(runs), tuple(queue.failed.items()))
+        if self._made_of == made_of:
+            return
+        places = {("waits", index, "") for index in queue} | {("trains", index, "") for index in runs}
+        places |= {("failed", index, why) for index, why in queue.failed.items()}
+        if len(self._statuses) != len(catalog):
+            self._statuses = [self._status(index, None) for index in range(len(catalog))]
+        else:
+            changed = {index for _, index, _ in places ^ self._places}
+            pairs = zip(catalog.records, self._records, strict=True)
+            changed.update(index for index, (now, then) in enumerate(pairs) if now is not then)
+            for index in changed:
+                self._statuses[index] = self._status(index, None)
+        self._made_of, self._records, self._places = made_of, list(catalog.records), places
 
     def _status(self, clip_index: int, live_counts: tuple[int, int] | None) -> ClipStatus:
         record, run, queue = self._service.catalog[clip_index], self._service.runs.get(clip_index), self._service.queue
