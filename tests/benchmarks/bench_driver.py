@@ -4,9 +4,9 @@
 
 Everything of the driver is real: the catalog, the queue, the service, `train_clips`, the lines on the terminal, and
 putting finished clips in their place. Workers and time are not: a clip takes about --clip-s seconds of a made-up
-clock, in which its worker reports every --report-s seconds and then leaves a tiny clip file. What counts is the processor time of the
-whole process less that of the pretended work, so that a slow disk does not (use /dev/shm). Memory is what the process
-holds (RSS), after each tenth of the clips.
+clock, in which its worker reports every --report-s seconds and then leaves a tiny clip file. What counts is the
+processor time of the whole process less that of the pretended work; files lie in memory where there is /dev/shm.
+Memory is what the process holds (RSS), after each tenth of the clips.
 
 Then the project is opened as the window does, and what the window makes of it is timed: states of all clips for the
 timeline, and forecasts, after a clip has ended and when nothing has changed.

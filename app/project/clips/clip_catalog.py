@@ -135,6 +135,11 @@ class ClipCatalog:
         return self._records
 
     @property
+    def finished(self) -> list[int]:
+        """Clips with a finished file that can be read, up to date or not, in order."""
+        return [index for index in range(len(self)) if self._good(index) is not None]
+
+    @property
     def n_trained(self) -> int:
         """Clips that are finished, readable and up to date."""
         return self._n_trained

@@ -10,6 +10,8 @@ import pytest
 
 from app.project.clips.clip_catalog import ClipCatalog, anchor_counts
 from app.project.project import Project
+from app.training.messages import TrainJob
+from app.training.process import Worker
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses
 from engine.capture.clip import split_clips
@@ -21,6 +23,10 @@ from tests.clip_headers import changed, header_values, write_values
 
 def states(catalog: ClipCatalog) -> list[str]:
     return [catalog[index].state for index in range(len(catalog))]
+
+
+def never(job: TrainJob, project: Project) -> Worker:
+    raise AssertionError("nothing trains here")
 
 
 def state_by_definition(project: Project, clip_index: int) -> str:
@@ -66,6 +72,50 @@ def test_every_state_is_the_one_by_definition(tmp_path: Path, seed: int) -> None
             write_header(project.checkpoint_path(index), clip_header(index, **entries, step=3))
     expected = [state_by_definition(project, index) for index in range(n_clips)]
     assert states(ClipCatalog(project, n_clips)) == expected
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_whatever_happens_it_says_what_one_made_anew_would_say(tmp_path: Path, seed: int) -> None:
+    drawn = random.Random(seed)
+    n_clips, first = 8, drawn.randrange(3)
+    overrides = {"field": "continue"} if drawn.random() < 0.6 else {}
+    project = make_project(tmp_path, reference_clip=first, overrides=overrides)
+    service = TrainingService(project, split_clips(n_clips, 1), holdout=(), launch=never)
+    catalog, statuses = service.catalog, ClipStatuses(service)
+
+    def change(index: int) -> None:
+        path = drawn.choice([project.clip_path, project.checkpoint_path])(index)
+        entries: dict[str, object] = {"fingerprint": drawn.choice([f"clip-{index}"] * 3 + ["another"])}
+        if index != first:
+            entries |= {"role": "source", "reference_fingerprint": drawn.choice([f"clip-{first}"] * 6 + ["older"])}
+            entries["previous_fingerprint"] = f"clip-{project.previous_index(index)}" if overrides else None
+        match drawn.choice(["write"] * 4 + ["remove", "spoil"]):
+            case "remove":
+                path.unlink(missing_ok=True)
+            case "spoil" if path.is_file():
+                spoil(path)
+            case _:
+                write_header(path, clip_header(index, **entries, step=drawn.randrange(6)))
+        catalog.update(index)
+
+    for _ in range(30):
+        index = drawn.randrange(n_clips)
+        change(index)
+        match drawn.choice(["wait", "leave", "fail", ""]):
+            case "wait":
+                service.queue.add(index)
+            case "leave":
+                service.queue.remove(index)
+            case "fail":
+                service.queue.failed[index] = f"reason {drawn.random()}"
+        new = ClipCatalog(project, n_clips)
+        assert catalog.records == new.records
+        assert (catalog.n_trained, catalog.has_finished_clips) == (new.n_trained, new.has_finished_clips)
+        assert catalog.due == new.due == {i for i, record in enumerate(new.records) if record.is_due}
+        assert statuses.all() == ClipStatuses(service).all()
+        free = [i for i in catalog.order if i in new.due and i not in service.queue]
+        expected = next(iter(service.queue), None) if service.queue else next(iter(free), None)
+        assert service.next_clip_index == expected
 
 
 @pytest.mark.slow
