@@ -39,7 +39,7 @@ TRAIN_SCHEMA = 1
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Worker failures caused by the input, not by the program."""
 POLL_EVERY_S, POLL_AT_LEAST_EVERY_S = 0.05, 1.0
-LOOKING_SHARE = 0.01
+LOOKING_SHARE = 0.005
 """Share of the time for looking at the workers: at hundreds of them less often."""
 STOP_TIMEOUT_S = 60.0
 """A step that changes the phase can take some seconds, and so can writing; neither is cut short."""
@@ -121,8 +121,9 @@ def train_clips(
         try:
             for clip_index, event in service.poll():
                 on_event(event)
-                if isinstance(event, ENDINGS):
-                    end(_outcome(service, runs[clip_index], event, time.monotonic() - begun.pop(clip_index)))
+                if isinstance(event, ENDINGS) and clip_index in begun:
+                    seconds = time.monotonic() - begun.pop(clip_index)
+                    end(_outcome(service, clip_index, runs.get(clip_index), event, seconds))
             on_status(training_status(service))
             took_s = time.monotonic() - looked_s
             sleep(min(max(POLL_EVERY_S, took_s / LOOKING_SHARE), POLL_AT_LEAST_EVERY_S))
@@ -137,8 +138,11 @@ def _has_room(service: TrainingService, clip_index: int, begun: Collection[int])
     return len(begun) < service.n_workers and not any(index in begun for index in needed)
 
 
-def _outcome(service: TrainingService, run: ClipRun, ending: Event, seconds: float) -> ClipOutcome:
-    clip_index, step = run.clip_index, run.step
+def _outcome(
+    service: TrainingService, clip_index: int, run: ClipRun | None, ending: Event, seconds: float
+) -> ClipOutcome:
+    """run: None of a clip that another process has trained."""
+    step = 0 if run is None else run.step
     match ending:
         case ClipTrained():
             return ClipOutcome(clip_index, "trained", ending.step, ending.held_out_psnr, seconds)

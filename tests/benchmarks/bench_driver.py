@@ -24,14 +24,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import show_event, show_outcome, show_status
 from app.evaluation.headless import ClipOutcome, train_clips
+from app.project.claims.claim_files import ClaimFile, holder_path, make_claim
+from app.project.claims.claims import Claims
+from app.project.claims.holder_record import ClipProgress, HolderRecord, write_holder
 from app.project.clips.clip_catalog import ClipCatalog
+from app.project.lock import this_process
 from app.project.opening.project_access import open_project
 from app.project.project import Project
 from app.training.due import due_clips
@@ -46,7 +50,7 @@ from app.training.messages import (
     WorkerReady,
 )
 from app.training.service import TrainingService
-from app.training.training_status import ClipStatuses
+from app.training.training_status import ClipStatuses, training_status
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from tests.app.fakes import anchor_arrays
@@ -111,7 +115,10 @@ class PretendedWorker:
         self.next_s += simulation.report_s
         share = (simulation.now_s - self.began_s) / self.clip_s
         if self.n_reports == 1:
-            return [WorkerReady(1, 1), StageReported("Reading pictures", 0.5, "")]
+            return [
+                WorkerReady(1, 1, f"render-{self.job.clip_index % 100}"),
+                StageReported("Reading pictures", 0.5, ""),
+            ]
         if share < 1.0:
             step = round(share * N_STEPS)
             report = StepReported(step, N_STEPS, 0.1, 25.0, 1000, "source", 60.0, 0.1)
@@ -190,6 +197,15 @@ def drive(project: Project, options: argparse.Namespace) -> list[Tenth]:
     return tenths
 
 
+def pretend_holder(folder: Path, index: int) -> None:
+    """A process of another computer that trains one clip."""
+    owner = replace(this_process(), host=f"render-{index}", machine="another", boot="another")
+    key, token = f"{index:04d}", f"{index:032x}"
+    record = HolderRecord(token, owner, clips={key: ClipProgress(index, "running", owner.host, step=5, n_steps=9)})
+    write_holder(holder_path(folder, token), record)
+    make_claim(ClaimFile(folder, key, 1), token)
+
+
 def timed_ms(call: Callable[[], object], n: int = 5) -> float:
     """Processor time of a call, the least of some."""
     times = []
@@ -209,7 +225,15 @@ def look(folder: Path, options: argparse.Namespace) -> None:
     service = TrainingService(project, split_clips(options.clips, 1), holdout=(0,), catalog=catalog)
     statuses = ClipStatuses(service)
     middle = options.clips // 2
+    claims = Claims(folder, has_thread=False)
+    claims.take("999999")
+    for index in range(options.workers):
+        pretend_holder(folder, index)
+    service.claims.look()
     rows: list[tuple[str, Callable[[], object]]] = [
+        ("claims, who only trains", claims.look_after_held),
+        (f"claims, who looks at {options.workers} others", service.claims.look),
+        ("status of all trainings", lambda: training_status(service)),
         ("states of all clips, nothing has changed", statuses.all),
         ("a clip has ended: judge", lambda: catalog.update(middle)),
         ("a clip has ended: judge, states of all clips", lambda: (catalog.update(middle), statuses.all())),

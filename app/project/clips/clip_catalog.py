@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -101,9 +101,17 @@ class ClipCatalog:
         project: Whose clips.
         n_clips: Number of clips of the capture.
         report: Receives the number of clips read so far, from time to time.
+        only: Clips to look at, for who trains one of thousands; the others count as untrained. All when None.
     """
 
-    def __init__(self, project: Project, n_clips: int, report: Callable[[int], None] = lambda n_read: None) -> None:
+    def __init__(
+        self,
+        project: Project,
+        n_clips: int,
+        report: Callable[[int], None] = lambda n_read: None,
+        *,
+        only: Collection[int] | None = None,
+    ) -> None:
         self._project = project
         self.order = project.training_order(n_clips)
         self._after = dict(itertools.pairwise(self.order))
@@ -117,7 +125,7 @@ class ClipCatalog:
         config = project.settings.config()
         self._inherits, self._goes_on = not config.independent, config.follows_previous
         if project.has_progress:
-            for index in range(n_clips):
+            for index in range(n_clips) if only is None else only:
                 if index % REPORT_EVERY == 0:
                     report(index)
                 self._read(index)

@@ -42,6 +42,9 @@ class HeaderCache:
         self._known: dict[Path, tuple[tuple[int, int, int], FoundHeader]] = {}
         self._last: ClipHeader | None = None
 
+    def __len__(self) -> int:
+        return len(self._known)
+
     def read(self, path: Path) -> FoundHeader | None:
         """The header of a clip, checkpoint or snapshot; None when there is no such file."""
         try:

@@ -136,6 +136,12 @@ def test_a_thousand_clips_that_go_on_from_each_other_are_read_in_one_pass(tmp_pa
     assert "out of date" in catalog[999].reason
 
 
+def test_who_trains_one_clip_reads_no_others(tmp_path: Path) -> None:
+    project = make_chain(tmp_path, 5)
+    assert states(ClipCatalog(project, 5, only=(0, 3))) == ["trained", "untrained", "untrained", "stale", "untrained"]
+    assert len(project.headers) == 2
+
+
 def test_each_header_is_read_once_while_its_file_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     project = make_chain(tmp_path, 20)
     read: list[str] = []

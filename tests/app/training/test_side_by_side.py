@@ -7,6 +7,7 @@ from functools import partial
 import pytest
 
 from app.evaluation.headless import train_clips
+from app.project.claims.claims import Claims
 from app.project.opening.opened_project import OpenedProject
 from app.training.messages import ClipTrained
 from app.training.service import TrainingService
@@ -140,3 +141,15 @@ def test_the_command_line_trains_several_and_begins_none_after_a_failure(six: Op
 )
 def test_they_share_the_cores(cores: int, is_window_open: bool, n_beside: int, expected: int) -> None:
     assert n_training_threads(cores, is_window_open=is_window_open, n_beside=n_beside) == expected
+
+
+def test_a_claim_of_a_clip_that_does_not_exist_is_passed_over(six: OpenedProject) -> None:
+    other = Claims(six.project.folder, has_thread=False)
+    for key in ("0003", "0099"):  # clips were cut otherwise when it was claimed, or somebody made the file
+        other.take(key)
+    service = make_service(six)
+    service.claims.look()
+    assert list(service.elsewhere) == [3]
+    assert len(ClipStatuses(service).all()) == len(training_status(service).trainings) + 5
+    service.close()
+    other.close()
