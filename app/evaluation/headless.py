@@ -39,7 +39,7 @@ TRAIN_SCHEMA = 1
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Worker failures caused by the input, not by the program."""
 POLL_EVERY_S, POLL_AT_LEAST_EVERY_S = 0.05, 1.0
-LOOKING_SHARE = 0.005
+LOOKING_SHARE = 0.003
 """Share of the time for looking at the workers: at hundreds of them less often."""
 STOP_TIMEOUT_S = 60.0
 """A step that changes the phase can take some seconds, and so can writing; neither is cut short."""
