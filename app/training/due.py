@@ -11,9 +11,14 @@ from app.training.train_queue import needed_clips
 from engine.errors import ProjectError
 
 
+def is_due(catalog: ClipCatalog, clip_index: int) -> bool:
+    """Whether a clip is due, see ClipRecord.is_due."""
+    return clip_index in catalog.due
+
+
 def due_clips(catalog: ClipCatalog) -> list[int]:
     """All that are due, in the order of training."""
-    return [index for index in catalog.order if index in catalog.due]
+    return [index for index in catalog.order if is_due(catalog, index)]
 
 
 def stale_clips(catalog: ClipCatalog) -> list[int]:

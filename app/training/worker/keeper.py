@@ -30,7 +30,7 @@ CHECKPOINT_EVERY_S = 25.0
 """From the start of one to the start of the next: a step and the writing included, a kill costs at most 30 s."""
 CHECKPOINT_SHARE = 0.01
 """A disk on which one takes longer than a quarter of a second delays the next: hundreds of workers that share one, each
-with checkpoints of tens of megabytes, would otherwise keep it from anything else, and wait for it half of their time."""
+with checkpoints of tens of megabytes, would keep it from all else and wait for it half of their time."""
 
 
 def _snapshot_cadence(live_view: str) -> Cadence:
