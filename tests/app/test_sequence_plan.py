@@ -77,7 +77,6 @@ def test_the_reference_clip_costs_no_time_once_it_is_trained(run, capture_folder
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (("--plan", "--workers", 0), "--workers is 0"),
         (("--plan", "--price-per-hour", -1), "--price-per-hour is -1.0"),
         (("--plan", "--price-per-hour", "nan"), "--price-per-hour is nan"),
         (("--price-per-hour", 1), "--price-per-hour is of a plan"),
