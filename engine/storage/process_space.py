@@ -1,4 +1,4 @@
-"""Among which processes a process id means one process: those of one run of a kernel, apart in each of its containers."""
+"""Among which processes an id means one process: those of one run of a kernel, apart in each of its containers."""
 
 from __future__ import annotations
 

@@ -174,7 +174,9 @@ class ClipKills:
         """The clips that nobody disturbs."""
         project = self._folders[0] / "undisturbed"
         arguments = ["train", str(self._capture), "--project", str(project), "--clip-length", str(CLIP_FRAMES)]
-        code = run_cli([*arguments, "--quiet"], launch=partial(ProcessWorker, make="tests.faults.kill_clips:make_training"))
+        code = run_cli(
+            [*arguments, "--quiet"], launch=partial(ProcessWorker, make="tests.faults.kill_clips:make_training")
+        )
         if code:
             raise RuntimeError(f"the training without kills failed with exit code {code}")
         return kept_clips(project)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,34 +50,31 @@ def holder_path(folder: Path, token: str) -> Path:
     return folder / CLAIMS / f"holder-{token}.json"
 
 
-def claim_names(folder: Path) -> list[str]:
-    """Names of all files of claims; none without their folder. folder: Of the project. Raises OSError."""
-    try:
-        return os.listdir(folder / CLAIMS)
-    except FileNotFoundError:
-        return []
-
-
-def list_claims(folder: Path, names: Iterable[str] | None = None) -> dict[str, ClaimFile]:
-    """The claim that counts of every claimed clip, by key. folder: Of the project. names: Of all files, as listed just
-    now; listed here when None, which raises OSError."""
+def list_claims(folder: Path) -> dict[str, ClaimFile]:
+    """The claim that counts of every claimed clip, by key. folder: Of the project. Raises OSError but for no folder."""
     found: dict[str, ClaimFile] = {}
-    for key, number in _numbered(claim_names(folder) if names is None else names):
+    for key, number in _numbered(folder):
         if key not in found or found[key].number < number:
             found[key] = ClaimFile(folder, key, number)
     return found
 
 
-def list_holders(folder: Path, names: Iterable[str] | None = None) -> list[str]:
-    """Tokens of all that have a file. folder, names: As of `list_claims`."""
-    listed = claim_names(folder) if names is None else names
-    return [match["token"] for name in listed if (match := _HOLDER.fullmatch(name))]
+def list_holders(folder: Path) -> list[str]:
+    """Tokens of all that have a file. folder: Of the project."""
+    return [match["token"] for name in _names(folder) if (match := _HOLDER.fullmatch(name))]
 
 
-def newest_claim(folder: Path, key: str, names: Iterable[str] | None = None) -> ClaimFile | None:
-    """The claim of a clip that counts; None without one. folder, names: As of `list_claims`."""
-    numbers = [number for other, number in _numbered(claim_names(folder) if names is None else names) if other == key]
+def newest_claim(folder: Path, key: str) -> ClaimFile | None:
+    """The claim of a clip that counts; None without one. folder: Of the project."""
+    numbers = _numbers_of(folder, key)
     return ClaimFile(folder, key, max(numbers)) if numbers else None
+
+
+def is_unsurpassed(claim: ClaimFile, token: str) -> bool:
+    """Whether a claim is as its holder of that token made it, and none that counts more was made after it. Looks at two
+    files only."""
+    after = ClaimFile(claim.folder, claim.key, claim.number + 1)
+    return claim.token() == token and not os.path.lexists(after.path)
 
 
 def make_claim(claim: ClaimFile, token: str) -> bool:
@@ -111,16 +107,28 @@ def make_claim(claim: ClaimFile, token: str) -> bool:
 
 def remove_claim(claim: ClaimFile) -> None:
     """Remove a claim and all that count less, lowest first. Never fails; what the disk refuses counts as dead later."""
-    below: list[ClaimFile] = []
+    below: list[int] = []
     if claim.number > 1:  # else there is nothing to list
         with suppress(OSError):
-            numbers = (number for key, number in _numbered(claim_names(claim.folder)) if key == claim.key)
-            below = [ClaimFile(claim.folder, claim.key, number) for number in sorted(numbers) if number < claim.number]
-    for one in [*below, claim]:
+            below = [number for number in sorted(_numbers_of(claim.folder, claim.key)) if number < claim.number]
+    for number in (*below, claim.number):
         with suppress(OSError):
-            one.path.unlink(missing_ok=True)
+            ClaimFile(claim.folder, claim.key, number).path.unlink(missing_ok=True)
 
 
-def _numbered(names: Iterable[str]) -> list[tuple[str, int]]:
-    found = (_CLAIM.fullmatch(name) for name in names)
+def _numbered(folder: Path) -> list[tuple[str, int]]:
+    found = (_CLAIM.fullmatch(name) for name in _names(folder))
     return [(match["key"], int(match["number"])) for match in found if match and PROGRAM_NAME.fullmatch(match["key"])]
+
+
+def _numbers_of(folder: Path, key: str) -> list[int]:
+    prefix = f"{key}."  # hundreds of others are passed over quickly
+    found = (_CLAIM.fullmatch(name) for name in _names(folder) if name.startswith(prefix))
+    return [int(match["number"]) for match in found if match]
+
+
+def _names(folder: Path) -> list[str]:
+    try:
+        return os.listdir(folder / CLAIMS)
+    except FileNotFoundError:
+        return []

@@ -21,12 +21,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
-from app.project.claims.asks import Ask, drop_ask, take_asks
+from app.project.claims.asks import Ask, drop_ask, take_ask
 from app.project.claims.claim_files import (
     CLAIMS,
     ClaimFile,
-    claim_names,
     holder_path,
+    is_unsurpassed,
     list_claims,
     list_holders,
     make_claim,
@@ -51,10 +51,14 @@ T = TypeVar("T")
 
 BEAT_EVERY_S = 5.0
 LOOK_EVERY_S = 2.0
+LOOK_SHARE = 0.05
+"""Share of the time that looking may take: where there are hundreds of others, it is done less often."""
 DEAD_AFTER_S = 60.0
 """A holder that has said nothing for so long has ended; one that was only slow notices that its claim is lost."""
 LONGEST_GAP_S = 10.0
 """Of silence, between two looks, no more counts."""
+MAX_SAID_AT_ONCE = 16
+"""Clips in training up to which a further one is said at once; the record of hundreds takes a while to write."""
 _MAX_TRIES = 100
 
 
@@ -143,10 +147,6 @@ class Claims:
         describe: Called on the thread of the claims: how far the clips in training are, by key.
         clock: Seconds; tests bring their own.
         has_thread: Whether to look and beat by itself; tests call `look`.
-
-    Attributes:
-        looks_around: Whether to see what others train and have finished. It means reading all that they say every two
-            seconds, which hundreds of processes of one folder cannot all do.
     """
 
     def __init__(
@@ -167,9 +167,8 @@ class Claims:
         self._others: tuple[HolderRecord, ...] = ()
         self._asked: SimpleQueue[tuple[str, Ask]] = SimpleQueue()
         self._changed: SimpleQueue[str] = SimpleQueue()
-        self.looks_around = True
         self._heard: dict[str, _Heard] = {}  # of holders, by the paths of claims and of records
-        self._clip_files: dict[str, tuple[int, int]] | None = None
+        self._clip_files: dict[str, int] | None = None
         self._clips_time: int | None = None
         self._is_clips_time_old = False
         self._load = MachineLoad(os.cpu_count() or 1)
@@ -194,7 +193,8 @@ class Claims:
                 return
             try:
                 (self.folder / CLAIMS).mkdir(exist_ok=True)  # not the project itself, which may be gone
-                self._say()
+                if len(self._held) < MAX_SAID_AT_ONCE:  # else with the next beat
+                    self._say()
                 self._held[key] = self._claimed(key)
             except OSError as error:
                 raise disk_error(error, what="The claim of the clip", path=self.folder / CLAIMS) from error
@@ -236,7 +236,8 @@ class Claims:
                 drop_ask(self.folder, key)
             self._lost.discard(key)
             self._be_silent_without_claims()
-        self._wake.set()
+            if not self._held:
+                self._wake.set()
 
     def _be_silent_without_claims(self) -> None:
         if not self._held:
@@ -287,7 +288,8 @@ class Claims:
         return set(_all_of(self._changed))
 
     def watch(self) -> None:
-        """Look also while nothing is claimed here."""
+        """Look at what others do, from now on, also while nothing is claimed here. Who only trains needs not: hundreds
+        of processes that all look at each other would keep a shared disk from anything else."""
         self._is_watching = True
         self._start()
 
@@ -304,48 +306,58 @@ class Claims:
 
     def look(self) -> None:
         """One round: say that this process lives, and see what others do. For the thread of the claims."""
-        self._load = machine_load()
+        self.look_after_held()
         try:
-            with self._guard:
-                if self._held and self._clock() - self._beaten_s >= BEAT_EVERY_S:
-                    with suppress(OSError):
-                        self._say()
-                names = claim_names(self.folder)
-                for key in list(self._held):
-                    self._check_held(key, names)
-                for asked in take_asks(self.folder, names, set(self._held)):
-                    self._asked.put(asked)
-            if self.looks_around:
-                self._look_around(names)
+            claims = list_claims(self.folder)
+            read = cache(read_holder)
+            known = {
+                key: self._judged(claim, read)
+                for key, claim in claims.items()
+                if key not in self._held and not self._was_released(claim)
+            }
+            self._sweep(claims, known)
         except OSError:
             return  # the disk does not answer; what was seen last holds
-
-    def _look_around(self, names: list[str]) -> None:
-        claims, read = list_claims(self.folder, names), cache(read_holder)
-        known = {key: self._judged(claim, read) for key, claim in claims.items() if key not in self._held}
         elsewhere = {key: other for key, other in known.items() if not other.is_dead}
         said = {other.holder.token: other.holder for other in elsewhere.values() if other.holder is not None}
-        self._sweep(names, claims, known)
         with self._guard:
             self._elsewhere = {key: other for key, other in elsewhere.items() if key not in self._held}
             self._others = tuple(said.values())
             self._look_at_clips()
 
-    def _sweep(self, names: list[str], claims: Mapping[str, ClaimFile], known: Mapping[str, Elsewhere]) -> None:
-        """Remove claims of the dead, and records of those that claim nothing and say nothing any more."""
+    def _sweep(self, claims: Mapping[str, ClaimFile], known: Mapping[str, Elsewhere]) -> None:
+        """Remove claims of the dead, and records of those that claim nothing and say nothing any more. Raises OSError.
+
+        known: Of claims that are not one's own.
+        """
         for key, other in known.items():
             if other.is_dead:
                 remove_claim(claims[key])
                 drop_ask(self.folder, key)
         claiming = {self.token, *(other.holder.token for other in known.values() if other.holder is not None)}
-        idle = [holder_path(self.folder, token) for token in list_holders(self.folder, names) if token not in claiming]
+        idle = [holder_path(self.folder, token) for token in list_holders(self.folder) if token not in claiming]
         for path in idle:
             with suppress(OSError):
                 if self._silent_s(path, path.stat().st_mtime_ns) >= DEAD_AFTER_S:
                     path.unlink()
-        there = {str(claim.path) for claim in claims.values()} | {str(path) for path in idle}
+        there = {str(path) for path in (*idle, *(claim.path for claim in claims.values()))}
         with self._guard:
             self._heard = {path: heard for path, heard in self._heard.items() if path in there}
+
+    def look_after_held(self) -> None:
+        """The part of a round for what is claimed here: say that this process lives, see whether a claim was lost and
+        what is asked. Looks at files of these clips only, however many others train."""
+        self._load = machine_load()
+        if self._held and self._clock() - self._beaten_s >= BEAT_EVERY_S:
+            with self._guard, suppress(OSError):
+                self._say()
+        for key, claim in list(self._held.items()):
+            if not is_unsurpassed(claim, self.token):
+                with self._guard:
+                    self._check_held(key)
+            ask = take_ask(self.folder, key)
+            if ask is not None:
+                self._asked.put((key, ask))
 
     def _start(self) -> None:
         if self._has_thread and (self._thread is None or not self._thread.is_alive()):
@@ -354,11 +366,16 @@ class Claims:
 
     def _run(self) -> None:
         while self._held or self._is_watching:
+            started_s = time.monotonic()
             try:
-                self.look()
+                if self._is_watching:
+                    self.look()
+                else:
+                    self.look_after_held()
             except Exception:  # the thread must go on: others take a silent process for dead
                 logger.exception("claims could not be looked at")
-            self._wake.wait(LOOK_EVERY_S if self.looks_around else BEAT_EVERY_S)
+            took_s = time.monotonic() - started_s
+            self._wake.wait(min(max(LOOK_EVERY_S, took_s / LOOK_SHARE), BEAT_EVERY_S))
             self._wake.clear()
 
     def _say(self) -> None:
@@ -377,14 +394,15 @@ class Claims:
             raise
         self._said_s = now_s
 
-    def _check_held(self, key: str, names: list[str] | None = None) -> None:
-        """names: Of all files of claims, where they were listed already."""
+    def _check_held(self, key: str) -> None:
         claim = self._held.get(key)
         if claim is None:
             return
         try:
-            newest = newest_claim(self.folder, key, names)
-            if newest is None or newest.number < claim.number:  # it was removed: by anybody, or by one that took it over
+            newest = newest_claim(self.folder, key)
+            if (
+                newest is None or newest.number < claim.number
+            ):  # it was removed: by anybody, or by one that took it over
                 if not self._was_silent and make_claim(claim, self.token):
                     return
                 newest = newest_claim(self.folder, key)
@@ -422,6 +440,10 @@ class Claims:
             self._heard[str(path)] = heard
             return heard.silent_s
 
+    def _was_released(self, claim: ClaimFile) -> bool:
+        """Whether it was one's own, or is gone, since claims were listed."""
+        return not claim.path.exists() or claim.token() == self.token
+
     def _has_changed(self, claim: ClaimFile) -> bool:
         """Whether its holder has been heard of while this process watched."""
         return self._heard[str(claim.path)].n_before > 0
@@ -434,12 +456,9 @@ class Claims:
             if is_same and self._is_clips_time_old:
                 return
             self._is_clips_time_old = is_same  # looked at once more: times are coarse
-            found: dict[str, tuple[int, int]] = {}
-            with os.scandir(folder) as entries:
-                for entry in entries:
-                    if entry.name.endswith(".safetensors"):
-                        status = entry.stat(follow_symlinks=False)
-                        found[entry.name.removesuffix(".safetensors")] = (status.st_mtime_ns, status.st_size)
+            with os.scandir(folder) as entries:  # a file that replaces another one has another inode
+                files = [entry for entry in entries if entry.name.endswith(".safetensors")]
+                found = {entry.name.removesuffix(".safetensors"): entry.inode() for entry in files}
         except OSError:
             return
         before, self._clip_files = self._clip_files, found

@@ -163,13 +163,13 @@ def test_an_interruption_keeps_progress_and_frees_the_clip(train: Run, tmp_path:
 
 
 def test_one_that_others_stop_is_interrupted(train: Run, tmp_path: Path, monkeypatch) -> None:
-    look = Claims.look
+    look = Claims.look_after_held
 
     def look_when_asked(claims: Claims) -> None:
         ask_holder(claims.folder, "0000", "stop")
         look(claims)
 
-    monkeypatch.setattr(Claims, "look", look_when_asked)
+    monkeypatch.setattr(Claims, "look_after_held", look_when_asked)
     monkeypatch.setattr(claims_module, "BEAT_EVERY_S", 0.02)
     code, _, err = train(0, make_training=make_slow)
     assert code == 130
@@ -255,7 +255,9 @@ def test_a_folder_of_claims_that_is_none_is_refused(train: Run, tmp_path: Path) 
 
 def test_a_disk_that_refuses_the_claim_is_a_failure_that_leaves_nothing(train: Run, tmp_path: Path, monkeypatch):
     assert train(0)[0] == 0
-    monkeypatch.setattr(claims_module, "make_claim", lambda *_: (_ for _ in ()).throw(OSError(122, "Disk quota exceeded")))
+    monkeypatch.setattr(
+        claims_module, "make_claim", lambda *_: (_ for _ in ()).throw(OSError(122, "Disk quota exceeded"))
+    )
     code, _, err = train(1, make_training=never)
     assert code == 1
     assert "The claim of the clip could not be written (Disk quota exceeded)" in err

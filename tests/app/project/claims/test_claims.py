@@ -98,7 +98,6 @@ def test_one_that_falls_silent_is_dead_after_a_minute_of_the_watchers_own_clock(
     with pytest.raises(ClipClaimed) as refused:
         claims.take(KEY)
     assert refused.value.is_sure
-    claims.looks_around = False  # else it removes the claim itself
     for _ in range(int(DEAD_AFTER_S) - 1):
         clock.now_s += 1
         with pytest.raises(ClipClaimed):
@@ -196,6 +195,21 @@ def test_what_others_train_is_seen_and_they_can_be_asked(tmp_path: Path) -> None
     assert other.take_asked() == []
 
 
+def test_what_is_released_while_others_are_looked_at_is_not_taken_for_anothers(tmp_path: Path, monkeypatch) -> None:
+    claims = make(tmp_path)
+    claims.take(KEY)
+    claims.take("0004")
+
+    def listed_then_released(folder: Path) -> dict[str, ClaimFile]:
+        found = list_claims(folder)
+        claims.release(KEY)
+        return found
+
+    monkeypatch.setattr("app.project.claims.claims.list_claims", listed_then_released)
+    claims.look()
+    assert claims.elsewhere == {}
+
+
 def test_clips_that_others_finish_are_noticed(tmp_path: Path) -> None:
     (tmp_path / CLAIMS).mkdir()
     (tmp_path / "clips").mkdir()
@@ -205,6 +219,43 @@ def test_clips_that_others_finish_are_noticed(tmp_path: Path) -> None:
     (tmp_path / "clips" / "0003.safetensors").write_bytes(b"new")
     claims.look()
     assert claims.take_changed() == {KEY}
+
+
+def test_a_clip_that_replaces_another_of_the_same_size_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / CLAIMS).mkdir()
+    (tmp_path / "clips").mkdir()
+    path = tmp_path / "clips" / f"{KEY}.safetensors"
+    path.write_bytes(b"old")
+    claims = make(tmp_path)
+    claims.look()
+    (tmp_path / "new").write_bytes(b"new")
+    os.replace(tmp_path / "new", path)
+    claims.look()
+    assert claims.take_changed() == {KEY}
+
+
+def test_who_only_trains_looks_at_files_of_its_own_clips_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    claims = make(tmp_path, clock)
+    claims.take(KEY)
+    for index in range(4, 300):
+        make_claim(ClaimFile(tmp_path, f"{index:04d}", 1), "f" * 32)
+    ask_holder(tmp_path, KEY, "pause")
+    with monkeypatch.context() as patched:
+        for name in ("listdir", "scandir"):
+            patched.setattr(f"os.{name}", lambda *_: pytest.fail("hundreds that list each other keep a disk busy"))
+        clock.now_s += 10.0
+        before = read_holder(holder_path(tmp_path, claims.token))
+        claims.look_after_held()
+        after = read_holder(holder_path(tmp_path, claims.token))
+    assert before is not None
+    assert after is not None
+    assert after.beat == before.beat + 1
+    assert claims.take_asked() == [(KEY, "pause")]
+    assert not claims.is_lost(KEY)
+    make_claim(ClaimFile(tmp_path, KEY, 2), "e" * 32)
+    claims.look_after_held()
+    assert claims.is_lost(KEY)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"x" * 5000, b"{}"])
@@ -287,22 +338,6 @@ def test_who_watches_removes_claims_and_records_of_the_dead(tmp_path: Path) -> N
     assert list_claims(tmp_path) != {}
     watch(claims, clock, 2 * DEAD_AFTER_S)
     assert [path.name for path in (tmp_path / CLAIMS).iterdir()] == ["notes.txt"]
-
-
-def test_who_does_not_look_around_reads_no_records(tmp_path: Path, monkeypatch) -> None:
-    claims = make(tmp_path)
-    claims.looks_around = False
-    claims.take("0004")
-    far_away(tmp_path)
-
-    def read(path: Path) -> None:
-        raise AssertionError(path)
-
-    monkeypatch.setattr("app.project.claims.claims.read_holder", read)
-    ask_holder(tmp_path, "0004", "stop")
-    claims.look()
-    assert claims.take_asked() == [("0004", "stop")]
-    assert claims.elsewhere == {}
 
 
 def test_two_computers_of_one_image_are_two(tmp_path: Path) -> None:
