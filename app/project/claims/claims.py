@@ -389,8 +389,9 @@ class Claims:
         try:
             write_holder(path, record)
         except OSError:
-            os.utime(path)  # a full disk keeps nobody from saying that it lives; no file yet is an error
-            self._said_s = now_s
+            with suppress(OSError):
+                os.utime(path)  # a full disk keeps nobody from saying that it lives
+                self._said_s = now_s
             raise
         self._said_s = now_s
 

@@ -394,3 +394,12 @@ def test_a_worker_puts_nothing_into_a_clip_that_another_process_has_taken_over(t
     make_claim(ClaimFile(tmp_path, KEY, 2), "a" * 32)
     with pytest.raises(ClipClaimed, match="Another program trains this clip"):
         check_claim(tmp_path, KEY, record.token)
+
+
+def test_a_disk_that_cannot_be_written_is_named_as_the_cause(tmp_path: Path, monkeypatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr("app.project.claims.claims.write_holder", refuse)
+    with pytest.raises(DiskError, match="Read-only file system"):
+        make(tmp_path).take(KEY)
