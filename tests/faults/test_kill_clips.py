@@ -17,7 +17,7 @@ pytestmark = [
 ]
 
 
-def test_clips_whose_processes_are_killed_are_trained_once_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clips_of_killed_processes_are_trained_once_each(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kill_clips, "N_CLIPS", 3)
     test = ClipKills(tmp_path, [tmp_path / "projects"], random.Random(1), n_at_once=2)
     test.run(4, test.reference())

@@ -128,7 +128,7 @@ def test_a_failure_keeps_progress_and_the_next_run_continues(train: Run, tmp_pat
     begun = list[int]()
 
     def make_continuing(*arguments: Any) -> Any:
-        training = make_fake(*arguments)
+        training: Any = make_fake(*arguments)
         restore = training.restore_checkpoint
         training.restore_checkpoint = lambda path: (restore(path), begun.append(training.steps_done))
         return training
@@ -147,7 +147,7 @@ def test_a_failure_keeps_progress_and_the_next_run_continues(train: Run, tmp_pat
 def test_an_interruption_keeps_progress_and_frees_the_clip(train: Run, tmp_path: Path, monkeypatch) -> None:
     shown = list[object]()
 
-    def interrupt(service: object) -> object:
+    def interrupt(service: Any) -> object:
         shown.append(headless_status(service))
         if len(shown) == 3:
             raise KeyboardInterrupt
