@@ -1,7 +1,7 @@
 """Runs `train --clip K` for all clips of a project as a scheduler does, many at once and some twice, and kills them.
 
 python -m tests.faults.kill_clips --kills 100 --seed 1
-python -m tests.faults.kill_clips --kills 50 --folders /mnt/one/DIR /mnt/two/DIR   # one folder, mounted twice
+python -m tests.faults.kill_clips --kills 50 --folders MOUNT_1/DIR MOUNT_2/DIR   # one folder, mounted twice
 
 Killed are processes, their workers, or both at once; others are halted for longer than a silent holder may live, and
 continue; to others SIGTERM is sent, alone or to their whole group. Every process counts as one of several computers,
@@ -252,7 +252,7 @@ class ClipKills:
             try:
                 state = read_clip_state(path)
             except EngineError as error:
-                if path.is_file():  # else it is no checkpoint any more, or the mount does not show it yet
+                if path.is_file():  # else its clip is finished, or the mount does not show it yet
                     self.tally.faults.append(f"{name}: {error}")
                 continue
             if path.parent.name == "clips":
