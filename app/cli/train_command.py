@@ -26,6 +26,7 @@ from app.project.clips.clip_catalog import ClipCatalog
 from app.residuals.kept_reading import note_kept
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
 from engine.text import duration_text
 from engine.training.config import parse_overrides
@@ -63,6 +64,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     command.add_argument(
+        "--cpu",
+        choices=PROCESSORS,
+        default=NATIVE,
+        help="portable: the same result on every kind of x86-64 processor, slower (default: native, all instructions)",
+    )
+    command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
     command.add_argument(
@@ -75,6 +82,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     if options.plan:
         return _plan(options)
+    environment_of(options.cpu)  # refused before a project is made
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)
@@ -84,7 +92,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         clips = project.clips(capture.n_frames)
         chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
         holdout = capture.camera_indices(project.settings.holdout)
-        service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False)
+        service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False, cpu=options.cpu)
         note_kept(service.catalog, project, capture)
         names = ", ".join(project.settings.holdout) or "none"
         line.say(

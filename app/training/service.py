@@ -30,6 +30,7 @@ from app.training.train_queue import OwnSettings, TrainQueue, drop_hopeless, nee
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import ProjectError
+from engine.portable import NATIVE, Processor
 from engine.training.preparation.stages import remove_stages
 
 Launch = Callable[[TrainJob, Project], Worker]
@@ -50,6 +51,7 @@ class TrainingService:
         catalog: The clips on disk; read here, which takes a while in a long project, when None.
         curves: Reads the curves of clips that are looked at; stays open when the service is closed.
         n_workers: How many clips may train side by side. They share the cores.
+        cpu: Passed on to workers, see TrainJob.
 
     Attributes:
         queue: Clips that wait.
@@ -71,9 +73,11 @@ class TrainingService:
         catalog: ClipCatalog | None = None,
         curves: CurveReader | None = None,
         n_workers: int = 1,
+        cpu: Processor = NATIVE,
     ) -> None:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open, self.n_workers = launch, is_window_open, n_workers
+        self._cpu: Processor = cpu
         self.catalog = ClipCatalog(project, len(self.clips)) if catalog is None else catalog
         self.queue = TrainQueue()
         self.runs: dict[int, ClipRun] = {}
@@ -301,6 +305,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.live_view,
             n_beside=n_beside,
+            cpu=self._cpu,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)
         if header is None:
