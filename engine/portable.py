@@ -38,8 +38,9 @@ _ENVIRONMENT = {
     "ONEDNN_MAX_CPU_ISA": "AVX2",
     "MKL_CBWR": "COMPATIBLE",  # the only one that MKL keeps on processors of other makers than its own
     "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
-    "OPENBLAS_CORETYPE": "Haswell",  # numpy's, scipy's and OpenCV's
+    "OPENBLAS_CORETYPE": "Haswell",  # numpy's, scipy's, OpenCV's and pycolmap's
     "OPENBLAS_NUM_THREADS": "1",  # machines also differ in their number of cores, by which it cuts sums
+    "FAISS_SIMD_LEVEL": "AVX2",  # matches features inside pycolmap
     "OPENCV_CPU_DISABLE": "AVX512-SKX",
     "OPENCV_IPP": "disabled",  # has code for each generation of processors
 }

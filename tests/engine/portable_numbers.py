@@ -73,7 +73,7 @@ def of_training() -> Iterator[tuple[str, str]]:
     from engine.kernels.threads import configure_threads
     from tests.engine.training.tiny_training import CLIP_LENGTH, N_CAMERAS, make_training
 
-    configure_threads(1)
+    configure_threads()
     capture = open_capture(asset_path("sample"), scale=0.25)
     others = [camera for camera in range(len(capture.rig)) if camera % 5 in (1, 3, 4)]
     holdout = others[: len(capture.rig) - N_CAMERAS]
