@@ -14,6 +14,7 @@ from app.training.training_status import ClipStatuses, training_status
 from app.training.worker.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import NonFiniteLoss
+from engine.portable import PROCESSORS
 from tests.app.conftest import inline
 from tests.app.fakes import make_fake, make_slow, write_trained
 from tests.app.training.test_train_queue import run_out, six
@@ -140,3 +141,25 @@ def test_the_command_line_trains_several_and_begins_none_after_a_failure(six: Op
 )
 def test_they_share_the_cores(cores: int, is_window_open: bool, n_beside: int, expected: int) -> None:
     assert n_training_threads(cores, is_window_open=is_window_open, n_beside=n_beside) == expected
+
+
+def test_a_training_with_portable_numbers_begins_with_the_variables_that_libraries_read(
+    six: OpenedProject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[dict[str, str]] = []
+    monkeypatch.setattr("app.training.process.environment_of", lambda cpu: {"OF": cpu})
+
+    class Begun(Exception):
+        pass
+
+    def begin(kind: object, task: object, environment: dict[str, str]) -> None:
+        begun.append(environment)
+        raise Begun
+
+    monkeypatch.setattr("app.training.process.ChildProcess", begin)
+    for clip_index, cpu in enumerate(PROCESSORS):
+        write_trained(six, 0)
+        service = TrainingService(six.project, six.clips, holdout=six.holdout, cpu=cpu)
+        with pytest.raises(Begun):
+            service.enqueue_all([clip_index + 1])
+    assert begun == [{"OF": "native"}, {"OF": "portable"}]
