@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from app.evaluation.headless import train_clips
-from app.project.claims.asks import ask_holder
+from app.project.claims.asks import Ask, ask_holder
 from app.project.claims.claims import Claims
 from app.project.disk.discarding import discard, training_of
 from app.project.opening.opened_project import OpenedProject
@@ -122,7 +122,8 @@ def test_others_can_pause_and_stop_it(pair) -> None:
     other.enqueue(1)
     other.poll()
     key = other.project.clip_name(1)
-    for ask, state in (("pause", "paused"), ("resume", "running")):
+    asks: list[tuple[Ask, str]] = [("pause", "paused"), ("resume", "running")]
+    for ask, state in asks:
         ask_holder(one.project.folder, key, ask)
         look(other)
         other.poll()
