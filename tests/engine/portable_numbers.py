@@ -1,8 +1,9 @@
 """Digests of numbers from every library on the way of a training, and with --training of a tiny one, stage by stage.
 
-    python -m tests.engine.portable_numbers [--training]
+    python -m tests.engine.portable_numbers [--training [FOLDER]]
 
-Where two processors print the same lines, they train the same. Run it with the variables of
+FOLDER keeps what is prepared: whoever runs next with it, perhaps emulated and a hundred times slower, only takes the
+steps. Where two processors print the same lines, they train the same. Run it with the variables of
 engine.portable.portable_environment, on other machines or under `qemu-x86_64 -cpu EPYC`. PYTHON_BELOW names what
 starts children in place of the interpreter, so that these are emulated too.
 """
@@ -14,6 +15,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -65,12 +67,13 @@ def of_libraries() -> Iterator[tuple[str, str]]:
     yield "decoded pictures", digest(*(capture.frame(camera, frame) for camera in (0, 7) for frame in (0, 4)))
 
 
-def of_training() -> Iterator[tuple[str, str]]:
+def of_training(folder: str | None = None) -> Iterator[tuple[str, str]]:
     """Names and digests of the arrays of a tiny reference clip and a source clip: prepared, and after steps."""
     from engine.assets import asset_path
     from engine.capture.capture import open_capture
     from engine.capture.clip import split_clips
     from engine.kernels.threads import configure_threads
+    from engine.training.preparation import stages
     from tests.engine.training.tiny_training import CLIP_LENGTH, N_CAMERAS, make_training
 
     configure_threads()
@@ -78,7 +81,8 @@ def of_training() -> Iterator[tuple[str, str]]:
     others = [camera for camera in range(len(capture.rig)) if camera % 5 in (1, 3, 4)]
     holdout = others[: len(capture.rig) - N_CAMERAS]
     reference = None
-    with tempfile.TemporaryDirectory() as folder:
+    stages.WRITE_AFTER_S = 0.0
+    with nullcontext(folder) if folder else tempfile.TemporaryDirectory() as folder:
         for clip in split_clips(capture.n_frames, CLIP_LENGTH)[:2]:
             training = make_training(capture, holdout, clip=clip, reference=reference, prep_dir=Path(folder) / "prep")
             training.prepare()
@@ -104,9 +108,9 @@ def main() -> None:
 
     use_kernel_cache()
     sys.executable = os.environ.get("PYTHON_BELOW", sys.executable)
-    parts = [of_libraries, of_training] if "--training" in sys.argv else [of_libraries]
-    for part in parts:
-        for name, found in part():
+    is_training, *folder = sys.argv[1:] or [""]
+    for part in [of_libraries(), of_training(*folder)] if is_training == "--training" else [of_libraries()]:
+        for name, found in part:
             sys.stdout.write(f"{name:30} {found}\n")
             sys.stdout.flush()
 
