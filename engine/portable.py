@@ -16,6 +16,7 @@ from hashlib import blake2b
 from typing import Literal
 
 from engine.errors import EngineError
+from engine.kernels import fast_math
 from engine.machine import processor_text
 
 Processor = Literal["native", "portable"]
@@ -23,14 +24,12 @@ Processor = Literal["native", "portable"]
 NATIVE: Processor = "native"
 PORTABLE: Processor = "portable"
 PROCESSORS: tuple[Processor, ...] = (NATIVE, PORTABLE)
-CPU_VARIABLE = "CLIPGSTREAM_CPU"
-"""Says to kernels of a process which it is."""
 
 LEVEL = "x86-64-v3"
 _NEEDED = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "abm"}
 """Of the level, as Linux names them; whoever has these has the rest."""
 _ENVIRONMENT = {
-    CPU_VARIABLE: PORTABLE,
+    fast_math.CPU_VARIABLE: fast_math.PORTABLE,
     "NUMBA_CPU_NAME": LEVEL,
     "NUMBA_CPU_FEATURES": "+avx2,+fma",  # those of the name; without a word numba adds what it finds
     "NUMBA_DISABLE_INTEL_SVML": "1",  # chooses code by itself

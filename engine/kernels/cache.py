@@ -26,8 +26,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+from engine.kernels.fast_math import CPU_VARIABLE
 from engine.machine import processor_text
-from engine.portable import CPU_VARIABLE
 from engine.user_folders import NAME, cache_dir
 
 VARIABLE = "NUMBA_CACHE_DIR"

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import os
 
-from engine.portable import CPU_VARIABLE, PORTABLE
-
+CPU_VARIABLE = "CLIPGSTREAM_CPU"
+"""Says to kernels of a process whether their numbers are to be the same on every processor, see engine.portable."""
+PORTABLE = "portable"
 ALL = ("nnan", "ninf", "nsz", "arcp", "contract", "afn", "reassoc")
 """All liberties, for kernels that never meet NaN or infinity."""
 _ESTIMATES = {"arcp", "afn"}

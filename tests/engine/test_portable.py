@@ -15,8 +15,8 @@ import pytest
 
 from engine import portable
 from engine.errors import EngineError
-from engine.kernels.fast_math import ALL, fast_math
-from engine.portable import CPU_VARIABLE, LEVEL, NATIVE, PORTABLE, cpu_kind, environment_of, portable_environment
+from engine.kernels.fast_math import ALL, CPU_VARIABLE, fast_math
+from engine.portable import LEVEL, NATIVE, PORTABLE, cpu_kind, environment_of, portable_environment
 
 ROOT = Path(__file__).resolve().parents[2]
 V3 = "fpu sse4_2 avx avx2 fma bmi1 bmi2 f16c movbe abm"
