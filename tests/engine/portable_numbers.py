@@ -17,8 +17,12 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import torch
 
 
 def digest(*arrays: np.ndarray) -> str:
@@ -67,6 +71,61 @@ def of_libraries() -> Iterator[tuple[str, str]]:
     yield "decoded pictures", digest(*(capture.frame(camera, frame) for camera in (0, 7) for frame in (0, 4)))
 
 
+def of_kernels() -> Iterator[tuple[str, str]]:
+    """Names and digests of what our kernels compute of random scenes, gradients too."""
+    import torch
+
+    from app.lab.synthetic.gaussian_scenes import layered_scene
+    from engine.backends.table import backend_called
+    from engine.cloud.background.background import estimate_background
+    from engine.cloud.background.exposure import Exposure
+    from engine.cloud.stereo.depth.slanted import refine_slanted
+    from engine.cloud.stereo.depth.smoothing import smooth_inverse_depth
+    from engine.cloud.stereo.depth.sweep import matching_costs
+    from engine.cloud.warm import _two_cameras
+    from engine.kernels.threads import configure_threads
+    from engine.raster import Gaussians, rasterize
+    from tests.decode_scenes import PRESET, Scene, backward
+
+    configure_threads()
+    cpu, generator = backend_called("cpu"), torch.Generator().manual_seed(0)
+    scene = layered_scene(600, 170, 140, 3.0)
+    gaussians = Gaussians(*(tensor.float().requires_grad_() for tensor in scene.gaussians.tensors()))
+    image = rasterize(gaussians, *scene.arguments, backend=cpu).image
+    image.backward(torch.randn(image.shape, generator=generator))
+    yield "rasterizer", _digest_of(image, *(tensor.grad for tensor in gaussians.tensors()))
+    anchors = Scene(**PRESET)
+    decoded = anchors.decode(anchors.rows(), [(1, 0.3), (2, 0.7)], "cpu")
+    backward(decoded)
+    yield "decoder", _digest_of(*decoded.tensors(), *(parameter.grad for parameter in anchors.parameters().values()))
+    truth = torch.randint(0, 255, image.shape[1:], generator=generator, dtype=torch.uint8)
+    seen, gain = image[0].detach().clone().requires_grad_(), torch.full((3,), 1.1, requires_grad=True)
+    found = cpu.photometric_loss(seen, truth, ssim_weight=0.2, gain=gain, is_counted=None, tile_mask=None, rest=None)
+    found.loss.backward()
+    yield "loss", _digest_of(found.loss, seen.grad, gain.grad)
+    assert seen.grad is not None
+    values = {"image": seen.detach().clone()}
+    adam = cpu.adam(values)
+    for n in range(1, 4):
+        adam.step({"image": seen.grad * n}, {"image": 1e-3}, max_norm=0.5, is_sound=torch.tensor(True))
+    yield "optimizer", _digest_of(values["image"])
+    rng, rig = np.random.default_rng(0), _two_cameras()
+    frames = rng.integers(0, 255, (3, 16, 16, 3)).astype(np.uint8)
+    yield "background", digest(estimate_background(Exposure.of_frames(frames).applied_to(frames)).image)
+    greys, planes = frames[:2].mean(-1).astype(np.float32), np.linspace(0.2, 1.0, 64, dtype=np.float32)
+    usable, prior = np.ones(greys.shape, bool), np.full(greys[0].shape, 0.5)
+    costs = matching_costs(greys, usable, rig, camera=0, sources=[1], inverse_depths=planes)
+    yield "depth sweep", digest(costs)
+    yield "smoothing", digest(smooth_inverse_depth(costs, greys[0], planes))
+    slanted = refine_slanted(greys, usable, rig, camera=0, sources=[1], seeds=prior[None], prior=prior, low=0.2, high=1)
+    yield "slanted patches", digest(*slanted)
+
+
+def _digest_of(*tensors: torch.Tensor | None) -> str:
+    """Of those that are there: not every parameter has a gradient."""
+    return digest(*(tensor.detach().numpy() for tensor in tensors if tensor is not None))
+
+
 def of_training(folder: str | None = None) -> Iterator[tuple[str, str]]:
     """Names and digests of the arrays of a tiny reference clip and a source clip: prepared, and after steps."""
     from engine.assets import asset_path
@@ -109,7 +168,7 @@ def main() -> None:
     use_kernel_cache()
     sys.executable = os.environ.get("PYTHON_BELOW", sys.executable)
     is_training, *folder = sys.argv[1:] or [""]
-    for part in [of_libraries(), of_training(*folder)] if is_training == "--training" else [of_libraries()]:
+    for part in [of_libraries(), of_kernels(), *([of_training(*folder)] if is_training == "--training" else [])]:
         for name, found in part:
             sys.stdout.write(f"{name:30} {found}\n")
             sys.stdout.flush()
