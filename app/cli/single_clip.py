@@ -47,7 +47,9 @@ def train_single_clip(options: argparse.Namespace, launch: Launch) -> int:
     needed = needed_clips(project, clip_index)
     is_chained = project.settings.config().follows_previous  # then it stands on all that are before it
     catalog = ClipCatalog(project, len(clips), only=None if is_chained else (*needed, clip_index))
-    service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog)
+    service = TrainingService(
+        project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, cpu=options.cpu
+    )
     service.set_live_view("off")
     try:
         missing = [index for index in needed if not project.is_trained(index)]

@@ -37,6 +37,7 @@ from app.residuals.kept_reading import note_kept
 from app.training.due import is_due
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
 from engine.text import duration_text, shown
 from engine.training.config import parse_overrides
@@ -79,6 +80,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="first discard everything trained in the project, so that its settings can change; --plan shows what",
     )
     command.add_argument(
+        "--cpu",
+        choices=PROCESSORS,
+        default=NATIVE,
+        help="portable: the same result on every kind of x86-64 processor, slower (default: native, all instructions)",
+    )
+    command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
     command.add_argument(
@@ -110,6 +117,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     _check_price(options)
     if options.plan:
         return _plan(options)
+    environment_of(options.cpu)  # refused before a project is made
     if options.clip is not None:
         return train_single_clip(options, launch)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
@@ -128,7 +136,14 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
         n_workers = sequence.together.n_workers
         service = TrainingService(
-            project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, n_workers=n_workers
+            project,
+            clips,
+            holdout=holdout,
+            launch=launch,
+            is_window_open=False,
+            catalog=catalog,
+            n_workers=n_workers,
+            cpu=options.cpu,
         )
         service.set_live_view("off")
         note_kept(catalog, project, capture)

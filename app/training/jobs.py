@@ -8,6 +8,7 @@ from app.project.project import Project
 from app.training.messages import TrainJob
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import SettingValue
+from engine.portable import NATIVE, Processor
 from engine.training.config import config_of
 
 
@@ -20,13 +21,14 @@ def train_job(
     is_window_open: bool = True,
     live_view: str = "live",
     n_beside: int = 1,
+    cpu: Processor = NATIVE,
 ) -> TrainJob:
     """The job of training a clip.
 
     Args:
         holdout: Camera indices never trained on.
         overrides: Settings of this clip; those of the project when None.
-        n_beside: See TrainJob.
+        n_beside, cpu: See TrainJob.
     """
     settings, document = project.settings, project.document
     overrides = dict(settings.overrides if overrides is None else overrides)
@@ -49,4 +51,5 @@ def train_job(
         is_window_open=is_window_open,
         live_view=live_view,
         n_beside=n_beside,
+        cpu=cpu,
     )

@@ -13,6 +13,7 @@ from app.training.messages import ENDINGS, Command, Event, TrainingFailed, Train
 from engine.children.kind import ChildFailed, ChildKind
 from engine.children.process import MAX_EVENTS_PER_POLL, ChildProcess
 from engine.errors import EngineError
+from engine.portable import environment_of
 
 BUILD = "app.training.worker.build:build_training"
 
@@ -83,7 +84,7 @@ class ProcessWorker:
         self._log_path = project.log_path(job.clip_index)
         self._has_ended = False
         task = TrainTask(job, project.folder, Path(project.settings.capture), self._log_path, make)
-        self.child = ChildProcess(TRAINING, task)
+        self.child = ChildProcess(TRAINING, task, environment=environment_of(job.cpu))
 
     def send(self, command: Command) -> None:
         """See `Worker`."""

@@ -36,6 +36,7 @@ from app.training.train_queue import FINISHED, OwnSettings, TrainQueue, drop_hop
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import DiskError, ProjectError
+from engine.portable import NATIVE, Processor
 from engine.training.preparation.stages import remove_stages
 
 Launch = Callable[[TrainJob, Project], Worker]
@@ -57,6 +58,7 @@ class TrainingService:
         curves: Reads the curves of clips that are looked at; stays open when the service is closed.
         n_workers: How many clips may train side by side. They share the cores.
         claims: Of this process; made here when None.
+        cpu: Passed on to workers, see TrainJob.
 
     Attributes:
         queue: Clips that wait.
@@ -79,9 +81,11 @@ class TrainingService:
         curves: CurveReader | None = None,
         n_workers: int = 1,
         claims: Claims | None = None,
+        cpu: Processor = NATIVE,
     ) -> None:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open, self.n_workers = launch, is_window_open, n_workers
+        self._cpu: Processor = cpu
         self.catalog = ClipCatalog(project, len(self.clips)) if catalog is None else catalog
         self.queue = TrainQueue()
         self.runs: dict[int, ClipRun] = {}
@@ -347,6 +351,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.live_view,
             n_beside=n_beside,
+            cpu=self._cpu,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)
         if refused is not None:
