@@ -76,6 +76,7 @@ def train_clips(
     on_begin: Callable[[int], None] = lambda clip_index: None,
     is_again: bool = False,
     own: OwnSettings | None = None,
+    more: Callable[[], Sequence[int] | None] = lambda: None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> list[ClipOutcome]:
     """Train clips, as many in parallel as the service allows; after a failure no other one starts. KeyboardInterrupt
@@ -88,21 +89,29 @@ def train_clips(
         on_begin: Receives the index of each clip before it is trained; not of those left as they are.
         is_again: Train also clips that are trained or damaged; their former state becomes a version.
         own: Settings for these clips alone; their trainings then begin afresh.
+        more: Asked all the time for further clips, which may have come up meanwhile; None once there will be no more.
         sleep: Waits some seconds between looks.
     Raises:
         ProjectError: A clip cannot be trained, for instance because its reference is not.
         KeyboardInterrupt: After the workers have ended and their checkpoints are written.
     """
     outcomes: list[ClipOutcome] = []
-    waiting, begun = list(clip_indices), dict[int, float]()
+    waiting, begun, may_come = list(clip_indices), dict[int, float](), True
 
     def end(outcome: ClipOutcome) -> None:
+        nonlocal may_come
         outcomes.append(outcome)
         on_outcome(outcome)
         if outcome.state == "failed":
             waiting.clear()
+            may_come = False
 
-    while waiting or begun:
+    while True:
+        further = more() if may_come else None
+        may_come = further is not None
+        waiting += further or ()
+        if not (waiting or begun or may_come):
+            return outcomes
         while waiting and _has_room(service, waiting[0], begun):
             clip_index = waiting.pop(0)
             left = _left_as_it_is(service, clip_index, is_again=is_again)
@@ -124,7 +133,6 @@ def train_clips(
         except KeyboardInterrupt:
             service.close(timeout_s=STOP_TIMEOUT_S)
             raise
-    return outcomes
 
 
 def _has_room(service: TrainingService, clip_index: int, begun: Collection[int]) -> bool:

@@ -31,7 +31,7 @@ class TrainJob(Struct, frozen=True):
         fingerprint: Of the capture.
         scale, seed, overrides: As in the project.
         holdout: Camera indices never trained on.
-        frames: Of the capture, as in the project.
+        frames: Of the capture, as in the project, or up to the clip's last one where nothing may look further.
         exclusions, regions: As in the project.
         backend: Name of the back end.
         is_window_open: Leave a core, or at least right of way, to a window.

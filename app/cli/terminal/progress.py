@@ -36,8 +36,9 @@ class ProgressLine:
         self._stage = ""
         self._is_line_open = False
 
-    def update(self, stage: str, done: float, detail: str = "") -> None:
-        """Show a stage, its share 0..1, and other known figures (rate, time left, figures)."""
+    def update(self, stage: str, done: float | None, detail: str = "") -> None:
+        """Show a stage, its share 0..1, and other known figures (rate, time left, figures). done: None where nobody
+        knows, as of something that is waited for."""
         now_s = self._clock()
         is_new = stage != self._stage
         if is_new:
@@ -50,12 +51,14 @@ class ProgressLine:
             self._close_line()
         self._stage, self._written_s = stage, now_s
         stage, detail = printable(stage), printable(detail)
-        done = min(max(done, 0.0), 1.0)
+        done = None if done is None else min(max(done, 0.0), 1.0)
         if not self._is_terminal:
-            self._write(f"{stage} {done * 100:3.0f} %  {detail}".rstrip() + "\n")
+            share = ": " if done is None else f" {done * 100:3.0f} %  "
+            self._write(f"{stage}{share}{detail}".rstrip() + "\n")
             return
-        filled = round(done * BAR_WIDTH)
-        text = f"{stage} [{'#' * filled}{'.' * (BAR_WIDTH - filled)}] {done * 100:3.0f} %  {detail}"
+        filled = round((done or 0.0) * BAR_WIDTH)
+        bar = ":" if done is None else f" [{'#' * filled}{'.' * (BAR_WIDTH - filled)}] {done * 100:3.0f} % "
+        text = f"{stage}{bar} {detail}"
         columns = shutil.get_terminal_size().columns
         self._write("\r" + text[: columns - 1].ljust(columns - 1))
         self._is_line_open = True

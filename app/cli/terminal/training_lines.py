@@ -78,7 +78,7 @@ class PlanLines:
         step_time: StepTime,
         is_quiet: bool,
     ) -> None:
-        self._line, self._project, self._capture, self._is_quiet = line, project, capture, is_quiet
+        self._line, self._project, self.capture, self._is_quiet = line, project, capture, is_quiet
         self._catalog, self._step_time = catalog, step_time
         self._plan: TrainingPlan | None = None
 
@@ -90,7 +90,7 @@ class PlanLines:
         try:
             self._plan = plan_clip(
                 self._project,
-                self._capture,
+                self.capture,
                 clip,
                 step_time=self._step_time,
                 catalog=self._catalog,

@@ -106,12 +106,24 @@ class ClipCatalog:
         self._evaluated: dict[int, tuple[str, float]] = {}
         config = project.settings.config()
         self._inherits, self._goes_on = not config.independent, config.follows_previous
-        if project.has_progress:
-            for index in range(n_clips):
+        self._read_all(range(n_clips), report)
+        self._records = self._judged()
+
+    def extend(self, n_clips: int) -> None:
+        """The capture has grown: there are so many clips now, the present ones first."""
+        later = range(len(self._clips), n_clips)
+        self.order = self._project.training_order(n_clips)
+        self._clips += [None] * len(later)
+        self._checkpoints += [None] * len(later)
+        self._read_all(later)
+        self.judge_anew()
+
+    def _read_all(self, indices: range, report: Callable[[int], None] = lambda n_read: None) -> None:
+        if self._project.has_progress:
+            for index in indices:
                 if index % REPORT_EVERY == 0:
                     report(index)
                 self._read(index)
-        self._records = self._judged()
 
     def __len__(self) -> int:
         return len(self._records)

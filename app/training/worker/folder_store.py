@@ -48,7 +48,13 @@ class FolderStore:
     def capture(self, *, scale: float, frames: tuple[int, int] | None) -> Capture:
         """See `ClipStore`."""
         settings = self._project.settings
-        return open_capture(Path(settings.capture), scale=scale, frames=frames, follow_links=settings.follow_links)
+        return open_capture(
+            Path(settings.capture),
+            scale=scale,
+            frames=frames,
+            follow_links=settings.follow_links,
+            is_growing=settings.is_growing,
+        )
 
     def clip(self, key: str) -> ClipState:
         """See `ClipStore`."""
