@@ -115,7 +115,9 @@ def _follow(
     service = TrainingService(
         project, clips, holdout=capture.camera_indices(settings.holdout), launch=launch, is_window_open=False
     )
-    plans = PlanLines(line, project, capture, catalog=service.catalog, step_time=known_step_time, is_quiet=options.quiet)
+    plans = PlanLines(
+        line, project, capture, catalog=service.catalog, step_time=known_step_time, is_quiet=options.quiet
+    )
     held_out = ", ".join(settings.holdout) or "none"
     line.say(f"{capture.path}: {len(names)} cameras (held out: {held_out}), {first.stop} frames so far")
 
@@ -151,9 +153,7 @@ def _follow(
         service.close()
 
 
-def _open_once_it_can_be(
-    options: argparse.Namespace, stored: ProjectSettings | None, line: ProgressLine
-) -> Capture:
+def _open_once_it_can_be(options: argparse.Namespace, stored: ProjectSettings | None, line: ProgressLine) -> Capture:
     """The capture once its calibration and the first frames of every camera are there."""
     follow_links = options.follow_links or (stored is not None and stored.follow_links)
     until_s = time.monotonic() + options.patience

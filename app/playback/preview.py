@@ -130,9 +130,7 @@ def write_cloud(job: CloudJob, parent: Parent[str]) -> None:
     parent.report("loading")
     from engine.cloud.stereo.static_cloud import build_static_cloud
 
-    capture = open_capture(
-        job.capture, frames=job.frames, follow_links=job.follow_links, is_growing=job.is_growing
-    )
+    capture = open_capture(job.capture, frames=job.frames, follow_links=job.follow_links, is_growing=job.is_growing)
     widest = int(capture.rig.image_sizes[:, 0].max())
     if widest > CLOUD_WIDTH_PX:
         capture = capture.resized(CLOUD_WIDTH_PX / widest, job.frames)

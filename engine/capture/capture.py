@@ -110,7 +110,8 @@ class Capture:
             raise CaptureError("The capture was opened as complete, so that it cannot grow.", path=self.path)
         stop = max(self.first_frame + n_frames, self.layout.n_frames)
         cameras = tuple(replace(camera, source=stretched(camera.source, stop)) for camera in self.layout.cameras)
-        layout, frames = replace(self.layout, cameras=cameras, n_frames=stop), (self.first_frame, self.first_frame + n_frames)
+        layout = replace(self.layout, cameras=cameras, n_frames=stop)
+        frames = (self.first_frame, self.first_frame + n_frames)
         cache_bytes = self.store.cache.max_bytes
         return _make_capture(layout, self.path, self.scale, frames, cache_bytes, follow_links=self.follow_links)
 
@@ -430,11 +431,11 @@ def working_sizes(native_sizes: np.ndarray, scales: np.ndarray, path: Path | Non
 
 
 def fingerprint(layout: Layout) -> str:
-    """16 hex digits that change with format, cameras, calibration, sizes, rate or length; of a capture that may still be
-    recorded length and rate do not count."""
+    """16 hex digits that change with format, cameras, calibration, sizes, rate or length. Of a capture that may still be
+    recorded rate and length do not count: a video grows into its rate."""
     rig = layout.rig()
     digest = hashlib.sha256()
-    length = ("growing",) if layout.is_growing else (layout.n_frames, round(layout.fps, 6))  # a video grows into its rate
+    length = ("growing",) if layout.is_growing else (layout.n_frames, round(layout.fps, 6))
     header = (layout.format, *length, rig.names)
     digest.update(repr(header).encode())
     for array in (rig.world_to_camera, rig.Ks, rig.image_sizes):

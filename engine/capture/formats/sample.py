@@ -215,7 +215,8 @@ def _check_counts(cameras: list[CameraEntry], n_listed: Any, path: Path) -> list
     counts = {camera.name: camera.source.n_frames for camera in cameras}
     problems = check_equal_counts(counts, {camera.name: camera.source.path for camera in cameras})
     n_frames = next(iter(counts.values()), None)
-    if not problems and counts and n_listed is not None and not is_growing() and (not is_whole(n_listed) or n_listed != n_frames):
+    is_stated = n_listed is not None and not is_growing()
+    if not problems and counts and is_stated and (not is_whole(n_listed) or n_listed != n_frames):
         text = f"n_frames is {shown(n_listed)}, every video has {n_frames} frames."
         problems.append(CaptureError(text, hint="Correct the number or export the videos again.", path=path))
     return problems

@@ -15,9 +15,9 @@ import numpy as np
 
 from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.files.frame_files import IMAGE_SUFFIXES, images_in, listed
+from engine.capture.growing.mode import is_growing
 from engine.capture.layout.assembling import assemble
 from engine.capture.layout.findings import Findings
-from engine.capture.growing.mode import is_growing
 from engine.capture.layout.format_checks import check_equal_counts, shortened
 from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.errors import CaptureError

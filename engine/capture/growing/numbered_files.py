@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from pathlib import Path
 from typing import overload
 
@@ -79,7 +79,8 @@ def numbered_files(files: Sequence[Path], folder: Path) -> NumberedFiles:
     """
     if len(files) < 2:
         found = "one frame" if files else "no frame"
-        raise CaptureError(f"It has {found} so far; two show how they are numbered.", hint="Wait for more.", path=folder)
+        text = f"It has {found} so far; two show how they are numbered."
+        raise CaptureError(text, hint="Wait for more.", path=folder)
     names = [str(file.relative_to(folder)) for file in files]
     split = [_NUMBER.split(name) for name in names]
     rows = [row for row, (one, other) in enumerate(zip_longest(split[0], split[1])) if one != other]
@@ -91,7 +92,7 @@ def numbered_files(files: Sequence[Path], folder: Path) -> NumberedFiles:
         if len(found) != 1 or others != [part for row, part in enumerate(template) if row not in rows]:
             raise _not_numbered(names, "".join(parts), folder)
         numbers.append(found.pop())
-    steps = [after - before for before, after in zip(numbers, numbers[1:], strict=False)]
+    steps = [after - before for before, after in pairwise(numbers)]
     if min(steps) < 1 or max(steps) > MAX_GAP or (len(steps) > 1 and min(steps) > 1):
         raise _not_numbered(names, names[steps.index(max(steps)) + 1], folder)
     n_frames = numbers[-1] - numbers[0] + 1

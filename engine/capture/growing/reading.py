@@ -17,6 +17,7 @@ from engine.capture.growing.numbered_files import NumberedFiles, alike, numbered
 from engine.capture.layout.format_result import CameraEntry
 from engine.errors import CaptureError
 
+
 def stretched(source: FrameSource, n_frames: int) -> FrameSource:
     """The same frames with so many of them: those that come later, and those that are there already.
 
