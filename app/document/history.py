@@ -43,7 +43,7 @@ class Redone:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """The capture is found in another place, may follow links now, or has grown. Not a step: undo does not take it back.
+    """The capture lies in another place, may follow links now, or has grown. Not a step: undo does not take it back.
 
     Attributes:
         settings: Of the document, with the new place.

@@ -31,7 +31,7 @@ class ProjectSettings:
         frames: First frame of the capture that is worked on, and the one after the last; None for all.
         clip_bounds: Where clips were split or merged: the first frame of every clip, and at the end the number of
             frames. None where every clip has clip_length frames, the last one the rest.
-        is_growing: Whether the capture may still be recorded; see `open_capture`. `frames` are those that were taken in.
+        is_growing: Whether the capture may still be recorded; see `open_capture`. `frames` are those taken in so far.
     """
 
     capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
@@ -75,10 +75,9 @@ class ProjectSettings:
 
     def is_placed_as(self, other: ProjectSettings) -> bool:
         """Whether nothing differs but what is no choice; a capture that grows does not lose frames."""
-        if self.frames is not None and other.frames is not None and self.is_growing and other.is_growing:
-            if self.frames[0] != other.frames[0] or self.frames[1] > other.frames[1]:
-                return False
-        return self.placed_as(other) == other
+        known, now = self.frames or (0, 0), other.frames or (0, 0)
+        is_longer = known[0] == now[0] and known[1] <= now[1]
+        return (is_longer or not self.is_growing) and self.placed_as(other) == other
 
     def config(self) -> TrainConfig:
         """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""

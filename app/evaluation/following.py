@@ -75,8 +75,8 @@ def check_unfinished(project: Project, service: TrainingService, stop: int) -> N
     if known is None or stop <= known[1] - known[0] or not project.is_trained(last):
         return
     raise ProjectError(
-        f"The recording seemed to have ended at frame {known[1] - known[0]}, and clip {last} was trained with the frames "
-        "up to there.",
+        f"The recording seemed to have ended at frame {known[1] - known[0]}, and clip {last} was trained with the "
+        "frames up to there.",
         hint="Train what was recorded since as a project of its own, or move that clip's file away to train it anew.",
         path=project.clip_path(last),
     )

@@ -431,8 +431,8 @@ def working_sizes(native_sizes: np.ndarray, scales: np.ndarray, path: Path | Non
 
 
 def fingerprint(layout: Layout) -> str:
-    """16 hex digits that change with format, cameras, calibration, sizes, rate or length. Of a capture that may still be
-    recorded rate and length do not count: a video grows into its rate."""
+    """16 hex digits that change with format, cameras, calibration, sizes, rate or length. While a capture may still be
+    recorded, rate and length do not count: a video grows into its rate."""
     rig = layout.rig()
     digest = hashlib.sha256()
     length = ("growing",) if layout.is_growing else (layout.n_frames, round(layout.fps, 6))
