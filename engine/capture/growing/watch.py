@@ -129,11 +129,11 @@ class GrowthWatch:
                 since_s = max(since_s, self._progress_s[row])
             if now_s - since_s < self._patience_s:
                 return now_s - since_s
-            if self._arrivals[row].has(self._first_frame + frame, now_s):
-                return 0.0  # behind a lost one: taken up at the next look
             self._lost.append((row, frame))
             self._n_complete[row] += 1
+            self._last_s = now_s  # something has happened
             self._skip_unwanted(row, self._reached[-1][0])
+            reach = self._advance(row, now_s)
 
     def _without_folder(self, now_s: float) -> Growth:
         self._gone_s = now_s if self._gone_s is None else self._gone_s
