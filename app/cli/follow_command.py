@@ -12,14 +12,14 @@ from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.cli.training_settings import add_training_settings
 from app.document.project_settings import ProjectSettings
-from app.evaluation.following import Following
+from app.evaluation.followed_recording import FollowedRecording
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
 from app.plan.speed import known_step_time
 from app.project.opening.opening import is_project
 from app.project.opening.project_access import DEFAULT_CLIP_LENGTH, read_settings
 from app.project.project import Project
 from app.status import TrainingStatus
-from app.training.intake import UNTIL_IDLE_S, FollowLimits, Intake, Taken, base_of, check_can_follow, n_taken_of
+from app.training.intake import UNTIL_IDLE_S, FollowLimits, Intake, TakenIn, base_of, check_can_follow, n_taken_of
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture, open_capture
 from engine.capture.growing.watch import END_FILE, PATIENCE_S
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         stored = read_settings(options.project) if is_project(options.project) else None
         seen = _open_once_it_can_be(options, stored, line)
         n_complete = 0 if stored is None else n_taken_of(stored)
-        first = Taken(n_complete) if n_complete else _first_frames(options, stored, seen, limits, line)
+        first = TakenIn(n_complete) if n_complete else _first_frames(options, stored, seen, limits, line)
         seen.close()
         project, capture = open_for_training(options, line.say, n_complete=first.stop)
         try:
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 def _follow(
     project: Project,
     capture: Capture,
-    first: Taken,
+    first: TakenIn,
     limits: FollowLimits,
     options: argparse.Namespace,
     launch: Launch,
@@ -121,12 +121,12 @@ def _follow(
     held_out = ", ".join(settings.holdout) or "none"
     line.say(f"{capture.path}: {len(names)} cameras (held out: {held_out}), {first.stop} frames so far")
 
-    def on_taken(taken: Taken) -> None:
+    def on_taken(taken: TakenIn) -> None:
         plans.capture = following.capture
         for sentence in taken.words(limits.patience_s):
             line.say(sentence)
 
-    following = Following(project, capture, service, intake, on_taken=on_taken)
+    following = FollowedRecording(project, capture, service, intake, on_taken=on_taken)
 
     def on_status(status: TrainingStatus) -> None:
         if service.is_busy:
@@ -173,7 +173,7 @@ def _first_frames(
     capture: Capture,
     limits: FollowLimits,
     line: ProgressLine,
-) -> Taken:
+) -> TakenIn:
     """The frames up to the end of the reference clip, once they are there: all other clips need it."""
     length = options.clip_length or (DEFAULT_CLIP_LENGTH if stored is None else stored.clip_length)
     reference = options.reference_clip or (0 if stored is None else stored.reference_clip)

@@ -40,7 +40,7 @@ class FollowLimits:
 
 
 @dataclass(frozen=True, slots=True)
-class Taken:
+class TakenIn:
     """Frames that are taken in.
 
     Attributes:
@@ -135,13 +135,13 @@ class Intake:
         n_whole = n_complete - (n_complete - self._base) % self._length
         return max(n_complete if self.has_ended else n_whole, self.n_taken)
 
-    def take(self) -> Taken | None:
+    def take(self) -> TakenIn | None:
         """Take in what is ready; None where that is nothing new. Raises CaptureError."""
         stop = self.ready()
         if stop <= self.n_taken:
             return None
         self.n_taken = stop
-        return Taken(stop, tuple((self._names[row], frame) for row, frame in self._watch.take_lost(stop)))
+        return TakenIn(stop, tuple((self._names[row], frame) for row, frame in self._watch.take_lost(stop)))
 
     @property
     def words(self) -> str:

@@ -257,7 +257,7 @@ def check_equal_counts(counts: Mapping[str, int], paths: Mapping[str, Path]) -> 
         CaptureError(
             f'Camera "{name}" has {count} frames, {n_others} other {"camera has" if n_others == 1 else "cameras have"} '
             f"{expected}.",
-            hint="Export all cameras over the same frames.",
+            hint="Export all cameras over the same frames. While it is still being recorded, use clipgstream follow.",
             path=paths[name],
         )
         for name, count in filled.items()

@@ -51,11 +51,11 @@ class Recording:
         self.n += 1
 
     def tick(self, n: int = 1, seconds: float = 1.0):
-        for _ in range(n):
+        for _ in range(n - 1):
             self.write()
-            self.clock.now_s += seconds
-            growth = self.watch.look()
-        return growth
+            self.wait(seconds)
+        self.write()
+        return self.wait(seconds)
 
     def wait(self, seconds: float):
         self.clock.now_s += seconds
@@ -93,7 +93,7 @@ def test_a_camera_that_is_only_slow_is_waited_for(source: Capture, tmp_path: Pat
 
 @pytest.mark.parametrize(("kind", "word"), [("lost", "no frame 3"), ("torn", "truncated")])
 def test_a_frame_that_stays_away_is_given_up(source: Capture, tmp_path: Path, kind: str, word: str) -> None:
-    recording = Recording(source, tmp_path / "c", **{kind: [("1", 3)]})
+    recording = Recording(source, tmp_path / "c", **{kind: [("1", 3)]})  # type: ignore[arg-type]
     growth = recording.tick(4)
     assert growth.n_complete == 3
     assert word in growth.words(0, 5)

@@ -1,17 +1,17 @@
-"""Following: clips are trained while their capture is still being recorded. Prints nothing."""
+"""FollowedRecording: clips are trained while their capture is still being recorded. Prints nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from app.project.project import Project
-from app.training.intake import Intake, Taken
+from app.training.intake import Intake, TakenIn
 from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
 
 
-class Following:
+class FollowedRecording:
     """Gives a service the clips of a capture as they come. For one thread.
 
     Args:
@@ -32,7 +32,7 @@ class Following:
         service: TrainingService,
         intake: Intake,
         *,
-        on_taken: Callable[[Taken], object],
+        on_taken: Callable[[TakenIn], object],
     ) -> None:
         self.capture, self._project, self._service, self._intake = capture, project, service, intake
         self._on_taken = on_taken
@@ -58,7 +58,7 @@ class Following:
         return list(range(n_before, len(self._service.clips)))
 
 
-def take_in(project: Project, taken: Taken, capture: Capture) -> None:
+def take_in(project: Project, taken: TakenIn, capture: Capture) -> None:
     """Write into a project that frames were taken in. Raises ProjectError, DiskError."""
     document = taken.without_lost(project.document, capture)
     if document != project.document:

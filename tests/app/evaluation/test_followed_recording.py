@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.document.history import Undone
-from app.evaluation.following import Following
+from app.evaluation.followed_recording import FollowedRecording
 from app.evaluation.headless import train_clips
 from app.project.opening.opening import open_capture_of
 from app.project.opening.project_access import create_project, default_settings, open_project
@@ -60,7 +60,7 @@ class Show:
         self.service = TrainingService(
             project, project.clips(n_taken), holdout=(0,), launch=launch, is_window_open=False
         )
-        self.following = Following(
+        self.following = FollowedRecording(
             project,
             capture,
             self.service,
@@ -222,8 +222,15 @@ def test_memory_and_disk_stay_flat_over_hundreds_of_clips(source: Capture, tmp_p
         begun.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
         return show.following.more()
 
-    ignore = {name: lambda _: None for name in ("on_status", "on_event", "on_outcome")}
-    train_clips(show.service, [0], more=more, sleep=lambda seconds: None, **ignore)
+    train_clips(
+        show.service,
+        [0],
+        more=more,
+        on_status=lambda status: None,
+        on_event=lambda event: None,
+        on_outcome=lambda outcome: None,
+        sleep=lambda seconds: None,
+    )
     assert show.service.catalog.n_trained == 200
     assert begun[-1] - begun[40] < 40.0, "MB"
     left = {folder.name: len(list(folder.iterdir())) for folder in (tmp_path / "p").iterdir() if folder.is_dir()}
