@@ -12,14 +12,22 @@ from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.cli.training_settings import add_training_settings
 from app.document.project_settings import ProjectSettings
-from app.evaluation.followed_recording import FollowedRecording
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
 from app.plan.speed import known_step_time
 from app.project.opening.opening import is_project
 from app.project.opening.project_access import DEFAULT_CLIP_LENGTH, read_settings
 from app.project.project import Project
 from app.status import TrainingStatus
-from app.training.intake import UNTIL_IDLE_S, FollowLimits, Intake, TakenIn, base_of, check_can_follow, n_taken_of
+from app.training.recording.followed_recording import FollowedRecording
+from app.training.recording.intake import (
+    UNTIL_IDLE_S,
+    FollowLimits,
+    Intake,
+    TakenIn,
+    base_of,
+    check_can_follow,
+    n_taken_of,
+)
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture, open_capture
 from engine.capture.growing.watch import END_FILE, PATIENCE_S

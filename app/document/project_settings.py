@@ -69,12 +69,12 @@ class ProjectSettings:
         return cut_clips(self.clip_bounds, self.clip_length)
 
     def placed_as(self, now: ProjectSettings) -> ProjectSettings:
-        """These settings with what is no choice as it is now: where the capture lies, and how far it has grown."""
+        """These settings with what nobody chooses as it is now: where the capture lies, and how far it has grown."""
         frames = now.frames if self.is_growing and now.is_growing else self.frames
         return replace(self, capture=now.capture, follow_links=now.follow_links, frames=frames)
 
     def is_placed_as(self, other: ProjectSettings) -> bool:
-        """Whether nothing differs but what is no choice; a capture that grows does not lose frames."""
+        """Whether nothing differs except what nobody chooses; a capture that grows does not lose frames."""
         known, now = self.frames or (0, 0), other.frames or (0, 0)
         is_longer = known[0] == now[0] and known[1] <= now[1]
         return (is_longer or not self.is_growing) and self.placed_as(other) == other

@@ -318,7 +318,7 @@ def open_capture(
         is_shape_asked: Whether frames of quite another shape than their calibration are taken as scaled instead of
             refused: for those who ask the user what became of them.
         is_growing: Whether it may still be recorded: it then has the frames of its farthest camera, of which others may
-            lack some, images count by the numbers in their names, and its length is no part of its fingerprint.
+            lack some, images count by the numbers in their names, and its length does not count in its fingerprint.
     Raises:
         CaptureError: The folder does not hold a capture, or one that cannot be used; lists every problem found.
     """

@@ -1,6 +1,6 @@
 """Records a capture anew: copies its images into another folder, frame by frame, as cameras would write them.
 
-    python -m tests.faults.record shared/data/panoptic_basketball /tmp/growing --fps 5 --late 3:4 --lost 7:12
+    python -m tests.faults.record CAPTURE FOLDER --fps 5 --late 3:4 --lost 7:12
 
 Every image is written in two pieces. `--late CAMERA:N` is N frames behind, `--lost CAMERA:FRAME` never comes, and
 `--torn CAMERA:FRAME` stays half-written. The first frames and the calibration are there at once.

@@ -17,7 +17,7 @@ from app.session.notices import Notices
 from app.session.part import SessionPart
 from app.session.training.live_training import LiveTraining
 from app.status import RecordingStatus
-from app.training.intake import LOOK_EVERY_S, Intake, TakenIn, base_of, check_can_follow, n_taken_of
+from app.training.recording.intake import LOOK_EVERY_S, Intake, TakenIn, base_of, check_can_follow, n_taken_of
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, ProjectError
 

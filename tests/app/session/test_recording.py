@@ -33,7 +33,7 @@ def test_a_followed_recording_grows_in_the_window(make_session, tmp_path: Path) 
     poll_until(session, lambda: session.recording_status.is_followed)
     assert session.project.settings.is_growing
     assert session.project.settings.config().backgrounds == "clip"
-    assert [clip.n_frames for clip in session.clips] == [3], "frame 3 is no clip yet"
+    assert [clip.n_frames for clip in session.clips] == [3], "a clip needs more than frame 3"
     poll_until(session, lambda: session.clip_states[0].state == "trained", what="the reference clip")
     for tick in range(4, 11):
         recorder.write(tick)
@@ -71,7 +71,7 @@ def test_growing_interrupts_no_training_and_undo_takes_no_frames(make_session, t
     session.dispatch(FollowRecording(is_wanted=False))
     assert not session.recording_status.is_followed
     session.dispatch(StopTraining())
-    poll_until(session, lambda: not session.training.is_busy)
+    poll_until(session, lambda: not session.live_training.is_busy)
     session.dispatch(Undo())
     assert "cannot count as complete" in list(session.notices)[-1].detail
     assert session.project.settings.frames == (0, 6)

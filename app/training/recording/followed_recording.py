@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.project.project import Project
-from app.training.intake import Intake, TakenIn
+from app.training.recording.intake import Intake, TakenIn
 from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.errors import ProjectError

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from app.document.history import Undone
-from app.evaluation.followed_recording import FollowedRecording
 from app.evaluation.headless import train_clips
 from app.project.opening.opening import open_capture_of
 from app.project.opening.project_access import create_project, default_settings, open_project
-from app.training.intake import FollowLimits, Intake, check_can_follow, n_taken_of
 from app.training.jobs import train_job
+from app.training.recording.followed_recording import FollowedRecording
+from app.training.recording.intake import FollowLimits, Intake, check_can_follow, n_taken_of
 from app.training.service import TrainingService
 from engine.capture.capture import Capture, open_capture
 from engine.capture.growing.watch import END_FILE
@@ -115,7 +115,7 @@ def test_each_clip_is_trained_once_it_is_there_and_the_rest_at_the_end(source: C
     show = Show(source, tmp_path)
     with pytest.raises(KeyboardInterrupt):
         show.run(8, ends=False)
-    assert [clip for clip, _ in show.trained] == [0, 1, 2], "frames 9 and 10 are no whole clip yet"
+    assert [clip for clip, _ in show.trained] == [0, 1, 2], "a whole clip needs more than frames 9 and 10"
     assert show.project.settings.frames == (0, 9)
     show.close()
 
@@ -127,7 +127,7 @@ def test_each_clip_is_trained_once_it_is_there_and_the_rest_at_the_end(source: C
     assert [job.frames for job in show.jobs] == [(0, 3), (0, 6), (0, 9), (0, 11)], "nothing may look further"
     assert all(show.service.catalog[index].state == "trained" for index in range(4))
     show.close()
-    assert show.project.history.past == (), "growth is no step to undo"
+    assert show.project.history.past == (), "growth cannot be undone"
 
 
 def test_frames_that_do_not_come_are_excluded_with_a_note(source: Capture, tmp_path: Path) -> None:
@@ -233,6 +233,7 @@ def test_memory_and_disk_stay_flat_over_hundreds_of_clips(source: Capture, tmp_p
     )
     assert show.service.catalog.n_trained == 200
     assert begun[-1] - begun[40] < 40.0, "MB"
+    print("MB", begun[-1] - begun[40])
     left = {folder.name: len(list(folder.iterdir())) for folder in (tmp_path / "p").iterdir() if folder.is_dir()}
     assert left["clips"] == 200
     assert [left.get(name, 0) for name in ("live", "prep", "checkpoints", "versions")] == [0, 0, 0, 0]

@@ -31,7 +31,7 @@ class FollowLimits:
     Attributes:
         patience_s: For a frame that other cameras have; see GrowthWatch.
         until_idle_s: For any new frame, before the recording counts as ended; infinity for ever.
-        n_frames: The recording ends after so many; None where nobody knows.
+        n_frames: The recording ends after so many; None where that is not known.
     """
 
     patience_s: float = PATIENCE_S
