@@ -233,7 +233,6 @@ def test_memory_and_disk_stay_flat_over_hundreds_of_clips(source: Capture, tmp_p
     )
     assert show.service.catalog.n_trained == 200
     assert begun[-1] - begun[40] < 40.0, "MB"
-    print("MB", begun[-1] - begun[40])
     left = {folder.name: len(list(folder.iterdir())) for folder in (tmp_path / "p").iterdir() if folder.is_dir()}
     assert left["clips"] == 200
     assert [left.get(name, 0) for name in ("live", "prep", "checkpoints", "versions")] == [0, 0, 0, 0]

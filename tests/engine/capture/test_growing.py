@@ -15,6 +15,7 @@ from engine.capture.growing.numbered_files import numbered_files
 from engine.capture.growing.watch import END_FILE, GrowthWatch
 from engine.errors import CaptureError
 from tests.app.fakes import write_capture
+from tests.engine.capture.layouts.all_layouts import ALL
 from tests.engine.capture.made_videos import number_of, write_video_of_kind
 from tests.faults.record import Recorder
 
@@ -246,3 +247,21 @@ def test_a_plain_mp4_says_that_it_cannot_be_read_before_its_end(tmp_path: Path) 
     arrivals = VideoArrivals(path, 0, Clock())
     assert not arrivals.has(0, 0.0)
     assert "before it is finished" in arrivals.fault
+
+
+@pytest.mark.parametrize(
+    "layout",
+    ["capture_json-fisheye", "colmap_frames", "easyvolcap-videos", "multipleview", "n3dv-images", "technicolor"],
+)
+def test_a_complete_capture_of_any_layout_is_the_same_when_read_as_growing(layout: str, tmp_path: Path) -> None:
+    ALL[layout](tmp_path)
+    whole, growing = open_capture(tmp_path), open_capture(tmp_path, is_growing=True)
+    assert (growing.rig.names, growing.n_frames) == (whole.rig.names, whole.n_frames)
+    for camera in range(len(whole.rig)):
+        assert np.array_equal(growing.frame(camera, 2), whole.frame(camera, 2))
+
+
+def test_a_capture_with_times_of_frames_is_refused(tmp_path: Path) -> None:
+    ALL["caliscope"](tmp_path)
+    with pytest.raises(CaptureError, match="has times of its frames, which a capture that is still being recorded"):
+        open_capture(tmp_path, is_growing=True)
