@@ -106,24 +106,24 @@ def train_clips(
             waiting.clear()
             may_come = False
 
-    while True:
-        further = more() if may_come else None
-        may_come = further is not None
-        waiting += further or ()
-        if not (waiting or begun or may_come):
-            return outcomes
-        while waiting and _has_room(service, waiting[0], begun):
-            clip_index = waiting.pop(0)
-            left = _left_as_it_is(service, clip_index, is_again=is_again)
-            if left is not None:
-                end(left)
-                continue
-            on_begin(clip_index)
-            service.add(clip_index, own)
-            begun[clip_index] = time.monotonic()
-        service.go_on()
-        runs = dict(service.runs)
-        try:
+    try:
+        while True:
+            further = more() if may_come else None
+            may_come = further is not None
+            waiting += further or ()
+            if not (waiting or begun or may_come):
+                return outcomes
+            while waiting and _has_room(service, waiting[0], begun):
+                clip_index = waiting.pop(0)
+                left = _left_as_it_is(service, clip_index, is_again=is_again)
+                if left is not None:
+                    end(left)
+                    continue
+                on_begin(clip_index)
+                service.add(clip_index, own)
+                begun[clip_index] = time.monotonic()
+            service.go_on()
+            runs = dict(service.runs)
             for clip_index, event in service.poll():
                 on_event(event)
                 if isinstance(event, ENDINGS) and clip_index in begun:
@@ -131,9 +131,9 @@ def train_clips(
                     end(_outcome(service, clip_index, runs.get(clip_index), event, seconds))
             on_status(training_status(service))
             sleep(POLL_EVERY_S)
-        except KeyboardInterrupt:
-            service.close(timeout_s=STOP_TIMEOUT_S)
-            raise
+    except KeyboardInterrupt:
+        service.close(timeout_s=STOP_TIMEOUT_S)
+        raise
 
 
 def _has_room(service: TrainingService, clip_index: int, begun: Collection[int]) -> bool:
