@@ -58,6 +58,12 @@ COMMANDS = {
         _GOES_ON,
         has_backend=True,
     ),
+    "schedule": Command(
+        "write a job for SLURM, OpenJD or a shell that trains the clips on many computers",
+        "app.cli.schedule_command",
+        "No job was written.",
+        has_backend=True,
+    ),
     "eval": Command(
         "measure trained clips against every camera, and the seams between them",
         "app.cli.eval_command",

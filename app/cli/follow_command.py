@@ -151,7 +151,7 @@ def _follow(
             on_begin=lambda clip_index: plans.begin(service.clips[clip_index]),
             on_status=on_status,
             on_event=lambda event: show_event(line, event),
-            on_outcome=lambda outcome: (show_outcome(line, outcome), plans.end(outcome)),
+            on_outcome=lambda outcome: (show_outcome(line, outcome, has_others=True), plans.end(outcome)),
         )
         line.finish()
         if not any(outcome.state == "failed" for outcome in outcomes):
