@@ -54,7 +54,7 @@ COMMANDS = {
     ),
     "follow": Command(
         "train the clips of a capture while it is still being recorded",
-        "app.cli.follow_command",
+        "app.cli.captures.follow_command",
         _GOES_ON,
         has_backend=True,
     ),
