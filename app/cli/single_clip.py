@@ -41,6 +41,8 @@ def train_single_clip(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_clip(options)
     clips, clip_index = project.clips(capture.n_frames), options.clip
+    if project.settings.is_growing and clip_index >= len(clips):
+        return fail(EXIT_NOT_READY, f"Clip {clip_index} is still being recorded: {len(clips)} clips are complete.")
     if not 0 <= clip_index < len(clips):
         raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(clips) - 1}.")
     holdout = capture.camera_indices(project.settings.holdout)

@@ -33,7 +33,11 @@ def train_job(
     settings, document = project.settings, project.document
     overrides = dict(settings.overrides if overrides is None else overrides)
     reference, previous = project.inherited_index(clip.clip_index), None
-    if clip.clip_index != settings.reference_clip and config_of(overrides).follows_previous:
+    config, frames = config_of(overrides), settings.frames
+    if config.backgrounds == "clip" and (reference is None or reference <= clip.clip_index):
+        first = 0 if frames is None else frames[0]
+        frames = (first, first + clip.stop)  # so that nothing can depend on later ones, which may not exist yet
+    if clip.clip_index != settings.reference_clip and config.follows_previous:
         previous = project.previous_index(clip.clip_index)
     return TrainJob(
         key=project.clip_name(clip.clip_index),
@@ -45,7 +49,7 @@ def train_job(
         holdout=tuple(holdout),
         seed=settings.seed,
         overrides=overrides,
-        frames=settings.frames,
+        frames=frames,
         exclusions=document.exclusions,
         regions=tuple(document.regions),
         is_window_open=is_window_open,

@@ -32,7 +32,7 @@ class TrainJob(Struct, frozen=True):
         fingerprint: Of the capture.
         scale, seed, overrides: As in the project.
         holdout: Camera indices never trained on.
-        frames: Of the capture, as in the project.
+        frames: Of the capture, as in the project, or up to the clip's last one where nothing may look further.
         exclusions, regions: As in the project.
         backend: Name of the back end.
         cpu: Whether its numbers are to be the same on every kind of processor, see engine.portable.

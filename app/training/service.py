@@ -163,6 +163,12 @@ class TrainingService:
         record = self.catalog[clip_index]
         return None if record.file is None else ShownState(record.file, record.revision)
 
+    def extend(self, clips: Sequence[Clip]) -> None:
+        """The capture has grown: these are all clips now, the present ones first. Whatever trains or waits does not
+        notice."""
+        self.clips = list(clips)
+        self.catalog.extend(len(self.clips))
+
     # ---------------------------------------------------------------- choosing clips
 
     @property
