@@ -69,6 +69,7 @@ class TrainingStatus:
             one at the playhead, else the one that began first: everything else here is about that one.
         n_running: How many clips this process trains.
         n_workers: How many it may train side by side.
+        why_fewer: Why that is less than was asked for, one sentence; empty where it is not.
         trainings: All clips in training, here and elsewhere, in the order of their indices.
         machines: Computers that train them, this one first.
         step, n_steps: Optimiser steps of that clip.
@@ -92,6 +93,7 @@ class TrainingStatus:
     clip_index: int | None = None
     n_running: int = 0
     n_workers: int = 1
+    why_fewer: str = ""
     trainings: tuple[RunningClip, ...] = ()
     machines: tuple[MachineStatus, ...] = ()
     step: int = 0

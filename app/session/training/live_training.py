@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 from app.background.jobs import JobContext, Jobs
 from app.background.latest import nothing
@@ -270,7 +271,12 @@ class LiveTraining(SessionPart):
         self._follow_places()
 
     def _follow_places(self) -> None:
-        if self.service is not None and self.service.n_workers != self._places.n_workers:
+        if self.service is None:
+            return
+        newest = self._forecasts.newest
+        is_known = newest is not None and newest[0].project is self.service.project
+        self._places.decide(self.service, newest[1].kinds if newest is not None and is_known else {})
+        if self.service.n_workers != self._places.n_workers:
             self.service.set_workers(self._places.n_workers)
 
     def look_at(self, clip_index: int | None, *, is_following: bool) -> None:
@@ -298,6 +304,7 @@ class LiveTraining(SessionPart):
                     self._ended_clip = clip_index
         if self.service is not None:
             self._others.hear(self.service)
+            self._follow_places()
         if events and self.service is not None:
             tell_dropped(self.service.take_dropped(), self._notices)
         return bool(events)
@@ -359,7 +366,9 @@ class LiveTraining(SessionPart):
         Args:
             viewed_clip: The clip at the playhead.
         """
-        return TrainingStatus() if self.service is None else training_status(self.service, viewed_clip)
+        if self.service is None:
+            return TrainingStatus()
+        return replace(training_status(self.service, viewed_clip), why_fewer=self._places.why_fewer)
 
     def clip_states(self) -> list[ClipStatus]:
         """One status per clip."""

@@ -105,6 +105,16 @@ def test_one_more_begins_at_once_and_none_is_ended_for_fewer(session: Session) -
     assert session.training.n_workers == 4, "a core each"
 
 
+def test_as_many_train_as_memory_suffices_for(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    poll_until(session, lambda: session.queue.everything is not None and session.queue.everything.n_steps > 0)
+    monkeypatch.setattr(places, "free_memory_bytes", lambda: 0)
+    session.dispatch(SetWorkers(4))
+    assert session.training.n_workers == 2, "those that train have theirs"
+    assert "4 clips side by side need" in session.training.why_fewer
+    session.dispatch(SetWorkers(1))
+    assert (session.training.n_workers, session.training.why_fewer) == (1, "")
+
+
 def test_only_the_clip_at_the_playhead_is_shown_live(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     live, service = session.live_training, session.live_training.service
     assert service is not None

@@ -45,6 +45,9 @@ def draw_workers(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         _draw_joining(dispatch, ui)
     else:
         imgui.new_line()
+    if session.training.why_fewer:
+        text_wrapped_dim(session.training.why_fewer)
+        ui.mark("training.why_fewer")
 
 
 def _draw_number(n_cores: int, ui: UiState) -> None:
