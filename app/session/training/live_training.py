@@ -22,7 +22,7 @@ from app.session.notices import Notices
 from app.session.part import SessionPart
 from app.session.questions import RetrainQuestion, retrain_question
 from app.session.training.others import Others
-from app.session.training.places import Places
+from app.session.training.places import TrainingPlaces
 from app.session.training.training_notices import tell, tell_dropped
 from app.status import ClipStatus, PlanStatus, QueueStatus, TrainingStatus
 from app.training.clip_run import ShownState
@@ -65,7 +65,7 @@ class LiveTraining(SessionPart):
         self._jobs, self._notices, self._can_measure = jobs, notices, can_measure
         self._forecasts, self._curves = Forecasts(), CurveReader()
         self._live_view, self._settle = live_view, settle
-        self._places, self._others = Places(launch), Others(jobs, notices)
+        self._places, self._others = TrainingPlaces(launch), Others(jobs, notices)
         self._statuses: ClipStatuses | None = None
         self._unread: dict[int, SnapshotWritten] = {}
         self._live_counts: tuple[int, int, int] | None = None

@@ -1,4 +1,4 @@
-"""Places: where clips of the open project train, and how many at once."""
+"""TrainingPlaces: where clips of the open project train, and how many at once."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from engine.parallel import n_cores
 from engine.training.plan.plan import TrainingPlan
 
 
-class Places:
+class TrainingPlaces:
     """This computer, or others instead.
 
     Args:
