@@ -145,7 +145,7 @@ def _draw_machines(machines: tuple[MachineStatus, ...], ui: UiState) -> None:
         words = machine_words(machine)
         room = imgui.get_content_region_avail().x - imgui.calc_text_size(words).x - 16
         name = f"{machine.name}, here" if machine.is_here else machine.name
-        imgui.text(elided(name, room))
+        imgui.text(name if imgui.calc_text_size(name).x <= room else elided(machine.name, room))
         imgui.set_item_tooltip(
             f"{name}, {clips_text(machine.n_clips)} in training.\nThe load is how many processes want to run."
         )
