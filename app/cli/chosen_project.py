@@ -1,4 +1,4 @@
-"""The project that the arguments of `clipgstream train` ask for, made or opened."""
+"""The project that the arguments of a command that trains clips ask for, made or opened."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.cli.arguments import parse_cameras, parse_range
-from app.cli.training_settings import overrides_of
+from app.cli.arguments import add_follow_links, parse_cameras, parse_range, path_argument
+from app.cli.training_settings import add_training_settings, overrides_of
 from app.document.history import DocumentHistory
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
@@ -34,6 +34,20 @@ from engine.training.presets import closest_preset
 _OF_TRAINING = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
 """Settings that arguments of `train` ask for, and that all clips share."""
 _N_LOOKS, _LOOK_EVERY_S = 50, 0.1
+
+
+def add_project_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments that choose a capture, a project, its settings and clips of it."""
+    command.add_argument("capture", type=path_argument, help="capture folder")
+    command.add_argument("--project", type=path_argument, required=True, help="project folder; created if missing")
+    command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    command.add_argument(
+        "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
+    )
+    add_follow_links(command)
+    add_training_settings(command)
+    command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
+    command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
 
 
 def open_for_training(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[Project, Capture]:

@@ -11,12 +11,10 @@ from app.cli.arguments import (
     EXIT_FAILED,
     EXIT_NOT_READY,
     EXIT_OK,
-    add_follow_links,
     fail,
     parse_range,
-    path_argument,
 )
-from app.cli.chosen_project import open_for_training, project_to_plan, what_goes
+from app.cli.chosen_project import add_project_arguments, open_for_training, project_to_plan, what_goes
 from app.cli.single_clip import train_single_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import (
@@ -27,7 +25,6 @@ from app.cli.terminal.training_lines import (
     show_outcome,
     show_status,
 )
-from app.cli.training_settings import add_training_settings
 from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
@@ -45,9 +42,7 @@ from engine.training.config import parse_overrides
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream train`."""
-    command.add_argument("capture", type=path_argument, help="capture folder")
-    command.add_argument("--project", type=path_argument, required=True, help="project folder; created if missing")
-    command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    add_project_arguments(command)
     command.add_argument(
         "--clip",
         type=int,
@@ -56,16 +51,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it",
     )
     command.add_argument(
-        "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
-    )
-    command.add_argument(
         "--workers",
         type=workers_argument,
         metavar="N",
         help="train N clips side by side, on as many cores and in as much memory as there is (default: 1)",
     )
-    add_follow_links(command)
-    add_training_settings(command)
     command.add_argument(
         "--again",
         action="store_true",
@@ -85,8 +75,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="first discard everything trained in the project, so that its settings can change; --plan shows what",
     )
-    command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
-    command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
