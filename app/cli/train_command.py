@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 from collections.abc import Sequence
 
 from app.cli.arguments import (
@@ -28,6 +29,7 @@ from app.cli.terminal.training_lines import (
 from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
+from app.plan.sequence import plan_sequence, sequence_text
 from app.plan.side_by_side import plan_here
 from app.plan.speed import step_time
 from app.project.clips.clip_catalog import ClipCatalog
@@ -54,7 +56,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--workers",
         type=workers_argument,
         metavar="N",
-        help="train N clips side by side, on as many cores and in as much memory as there is (default: 1)",
+        help="train N clips side by side, on as many cores and in as much memory as there is (default: 1); with "
+        "--plan, what N machines would cost",
     )
     command.add_argument(
         "--again",
@@ -79,6 +82,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
     command.add_argument(
+        "--price-per-hour", type=float, metavar="X", help="with --plan: price of a worker, in any unit, for the total"
+    )
+    command.add_argument(
         "--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output"
     )
     command.add_argument("--quiet", action="store_true", help="show no progress")
@@ -101,6 +107,7 @@ def exit_code(outcomes: Sequence[ClipOutcome]) -> int:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
+    _check_price(options)
     if options.plan:
         return _plan(options)
     if options.clip is not None:
@@ -172,6 +179,13 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     return code if code == EXIT_OK else fail(code, failure_text(outcomes))
 
 
+def _check_price(options: argparse.Namespace) -> None:
+    price = options.price_per_hour
+    if price is not None and not (options.plan and 0 <= price < math.inf):
+        problem = f"is {price}" if options.plan else "is of a plan"
+        raise ProjectError(f"--price-per-hour {problem}.", hint="Give a price of 0 or more together with --plan.")
+
+
 def _plan(options: argparse.Namespace) -> int:
     project, capture = project_to_plan(options)
     clips = project.clips(capture.n_frames)
@@ -183,7 +197,7 @@ def _plan(options: argparse.Namespace) -> int:
     kept = [] if is_afresh else order
     trained = [i for i in kept if catalog[i].state == "trained"]
     damaged = [i for i in kept if catalog[i].state == "damaged" or catalog[i].blocked_by is not None]
-    history = clip_history(project, len(clips))
+    history = clip_history(project, len(clips), catalog)
     plans = [
         plan_clip(
             project, capture, clips[i], step_time=step_time, history=history, catalog=catalog, is_afresh=is_afresh
@@ -191,8 +205,12 @@ def _plan(options: argparse.Namespace) -> int:
         for i in order
         if i not in trained and i not in damaged
     ]
+    sequence = None
+    if plans and (options.workers is not None or options.price_per_hour is not None):
+        n_workers, price = options.workers or 1, options.price_per_hour
+        sequence = plan_sequence(project, capture, plans, n_workers=n_workers, price_per_hour=price)
     if options.json:
-        document = plan_document(project, capture, plans, trained, damaged) | {"discards": discarded}
+        document = plan_document(project, capture, plans, trained, damaged, sequence) | {"discards": discarded}
         print(json_text(document, indent=2))
         return EXIT_OK
     if discarded:
@@ -212,4 +230,6 @@ def _plan(options: argparse.Namespace) -> int:
         print(
             f"All {len(plans)} clips: about {duration_text(seconds)}, at most {memory_text(sums['memory_mb'])}{stored}"
         )
+    if sequence is not None:
+        print("\n".join(sequence_text(sequence)))
     return EXIT_OK

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Hashable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Annotated
 
 from msgspec import Meta
@@ -65,7 +67,13 @@ class ProjectSettings:
 
     def config(self) -> TrainConfig:
         """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""
-        return config_of(self.overrides)
+        return _config_of(tuple((name, type(value), value) for name, value in self.overrides.items()))
+
+
+@lru_cache(maxsize=64)
+def _config_of(overrides: tuple[tuple[str, type, Hashable], ...]) -> TrainConfig:
+    """Checked once, as it is asked for all the time. With types, since 1 and True are not the same setting."""
+    return config_of({name: value for name, _, value in overrides})
 
 
 def check_bounds(clip_bounds: tuple[int, ...] | None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
 TRAIN_SCHEMA = 1
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Worker failures caused by the input, not by the program."""
-POLL_EVERY_S = 0.05
+POLL_EVERY_S, POLL_AT_LEAST_EVERY_S = 0.05, 1.0
+LOOKING_SHARE = 0.003
+"""Share of the time for looking at the workers: at hundreds of them less often."""
 STOP_TIMEOUT_S = 60.0
 """A step that changes the phase can take some seconds, and so can writing; neither is cut short."""
 
@@ -97,7 +100,7 @@ def train_clips(
         KeyboardInterrupt: After the workers have ended and their checkpoints are written.
     """
     outcomes: list[ClipOutcome] = []
-    waiting, begun = list(clip_indices), dict[int, float]()
+    waiting, begun = deque(clip_indices), dict[int, float]()
     lost: dict[int, int] = {}  # clips that cannot come now, and the one whose failure is behind it
 
     def end(outcome: ClipOutcome) -> None:
@@ -111,7 +114,7 @@ def train_clips(
 
     while waiting or begun:
         while waiting and _has_room(service, waiting[0], begun):
-            clip_index = waiting.pop(0)
+            clip_index = waiting.popleft()
             left = _left_as_it_is(service, clip_index, is_again=is_again) or _left_out(service, clip_index, lost)
             if left is not None:
                 end(left)
@@ -121,6 +124,7 @@ def train_clips(
             begun[clip_index] = time.monotonic()
         service.go_on()
         runs = dict(service.runs)
+        looked_s = time.monotonic()
         try:
             for clip_index, event in service.poll():
                 on_event((clip_index, event))
@@ -128,7 +132,8 @@ def train_clips(
                     seconds = time.monotonic() - begun.pop(clip_index)
                     end(_outcome(service, clip_index, runs.get(clip_index), event, seconds))
             on_status(training_status(service))
-            sleep(POLL_EVERY_S)
+            took_s = time.monotonic() - looked_s
+            sleep(min(max(POLL_EVERY_S, took_s / LOOKING_SHARE), POLL_AT_LEAST_EVERY_S))
         except KeyboardInterrupt:
             service.close(timeout_s=STOP_TIMEOUT_S)
             raise

@@ -225,12 +225,12 @@ class Forecasts:
             return self._kept
         self._waiting_of = waiting_of
         parts = self._parts = _clip_parts(service, project, kinds, own)
-        due = {*due_clips(service.catalog), *clips}.difference(running)
+        due, coming = {*due_clips(service.catalog), *clips}.difference(running), running.union(clips)
         self._kept = Waiting(
             tuple(QueuedClip(index, parts[index].n_steps, parts[index].seconds, index in own) for index in clips),
             together([parts[index] for index in clips if index not in running]),
             together([parts[index] for index in sorted(due)]),
-            together([parts[index] for index in stale_clips(service.catalog) if index not in {*queue, *running}]),
+            together([parts[index] for index in stale_clips(service.catalog) if index not in coming]),
         )
         return self._kept
 
@@ -282,7 +282,7 @@ def _planned_left_s(run: ClipProgress, whole: SequenceForecast) -> float | None:
 
 
 def _plans(request: ForecastRequest, timed: StepTime) -> Plans:
-    free_mb, history = None, clip_history(request.project, len(request.clips))
+    free_mb, history = None, clip_history(request.project, len(request.clips), request.catalog)
     with suppress(OSError):
         free_mb = shutil.disk_usage(request.project.folder).free / 1e6
     kinds, next_plan = {}, None

@@ -301,6 +301,10 @@ class ClipPreparation:
         if kept is None or not kept.equals(backgrounds):
             write_backgrounds(self._prep_dir, backgrounds, key)
 
+    def shared_backgrounds(self) -> Backgrounds | None:
+        """The backgrounds that the reference clip has left for source clips; None where there are none."""
+        return read_backgrounds(self._prep_dir, self._key_of_corrected())
+
     # ---------------------------------------------------------------- the kept parts of an attempt
 
     def _key(self) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from functools import partial
 import pytest
 
 from app.evaluation.headless import ClipOutcome, train_clips
+from app.project.claims.claims import Claims
 from app.project.opening.opened_project import OpenedProject
 from app.training.jobs import train_job
 from app.training.messages import ClipTrained
@@ -166,6 +167,18 @@ def test_a_disk_that_fails_lets_no_other_clip_begin(six: OpenedProject) -> None:
 )
 def test_they_share_the_cores(cores: int, is_window_open: bool, n_beside: int, expected: int) -> None:
     assert n_training_threads(cores, is_window_open=is_window_open, n_beside=n_beside) == expected
+
+
+def test_a_claim_of_a_clip_that_does_not_exist_is_passed_over(six: OpenedProject) -> None:
+    other = Claims(six.project.folder, has_thread=False)
+    for key in ("0003", "0099"):  # clips were cut otherwise when it was claimed, or somebody made the file
+        other.take(key)
+    service = make_service(six)
+    service.claims.look()
+    assert list(service.elsewhere) == [3]
+    assert len(ClipStatuses(service).all()) == len(training_status(service).trainings) + 5
+    service.close()
+    other.close()
 
 
 def test_a_worker_computes_everything_with_its_share(six: OpenedProject, monkeypatch) -> None:
