@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from app.project.claims import claims
-from app.project.claims.asks import take_asks
+from app.project.claims.asks import take_ask
 from app.project.claims.claim_files import CLAIMS, ClaimFile, holder_path, make_claim
 from app.project.claims.holder_record import ClipProgress, HolderRecord, MachineLoad, write_holder
 from app.project.lock import this_process
@@ -209,7 +209,7 @@ def test_its_process_is_asked_and_answers_are_not_waited_for(shared: Session) ->
         shared.dispatch(command)
         poll_until(shared, lambda: not shared.jobs)
         assert shared.notices[-1].title == f"Asked to {ask} clip 1"
-        assert take_asks(project.folder, ["ask-0001.json"], {"0001"}) == [("0001", ask)]
+        assert take_ask(project.folder, "0001") == ask
     shared.dispatch(StopTraining())
     poll_until(shared, lambda: not shared.jobs)
     assert not (project.folder / CLAIMS / "ask-0001.json").exists(), "all that trains here, not what others train"
