@@ -3,6 +3,7 @@ for the clip that is looked at alone."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -198,6 +199,9 @@ def test_a_clip_that_trains_elsewhere_is_shown_like_an_own_one(shared: Session) 
     everything = shared.queue.everything
     assert everything is not None
     assert everything.n_clips == 5
+    until_s = time.monotonic() + 0.5
+    while time.monotonic() < until_s:  # nothing else is new by then
+        until_s = time.monotonic() + 0.5 if shared.poll() else until_s
     tell_of(shared, ClipProgress(1, "paused", "render-7", step=31, n_steps=60), beat=2)
     poll_until(shared, lambda: shared.clip_states[1].state == "paused")
 
