@@ -20,6 +20,8 @@ from app.session.projects.project_commands import AskStartOver, StartOver
 from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SetTrainSetting
 from app.session.training.train_commands import (
     AskTrainSettings,
+    JoinCluster,
+    LeaveCluster,
     RemoveVersion,
     RestoreVersion,
     TrainAll,
@@ -42,6 +44,8 @@ TITLES: dict[type, str] = {
     TrainClips: "The clips cannot be trained",
     TrainStale: "The clips cannot be trained",
     TrainAll: "The clips cannot be trained",
+    JoinCluster: "The cluster cannot be joined",
+    LeaveCluster: "The cluster cannot be left now",
     AskTrainSettings: "The clip cannot be trained",
     **dict.fromkeys(get_args(ExclusionCommand), "The exclusion cannot be changed"),
     **dict.fromkeys(get_args(MendCommand), "Mending cannot start"),

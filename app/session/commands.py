@@ -29,7 +29,7 @@ from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import ProjectCommand
 from app.session.projects.setting_commands import SettingCommand
 from app.session.showing.look_commands import LookCommand
-from app.session.training.train_commands import HoldCommand, TrainCommand
+from app.session.training.train_commands import ClusterCommand, HoldCommand, TrainCommand
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +57,7 @@ Command = (
     | SettingCommand
     | TrainCommand
     | HoldCommand
+    | ClusterCommand
     | ClipCommand
     | ExclusionCommand
     | MendCommand

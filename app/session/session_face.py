@@ -206,11 +206,18 @@ class SessionFace:
         """An earlier version of a clip as a file to show; None until it was read, and where it cannot be shown."""
         return self.versions.state(clip_index, version)
 
-    def log_lines(self) -> Sequence[LogLine]:
-        """Lines of the program, and of the training of the clip that trains or is looked at; in the order of time."""
+    def log_lines(self, clip_index: int | None = None) -> Sequence[LogLine]:
+        """Lines of the program and of the training of a clip, in the order of time.
+
+        Args:
+            clip_index: When None, the clip at the playhead if it trains, else the one that leads the training, else the
+                one at the playhead.
+        """
         clip, project = self.timeline.clip, self.project
-        trains = self.training.state not in ("idle", "failed")
-        clip_index = self.training.clip_index if trains or clip is None else clip.clip_index
+        if clip_index is None and clip is not None:
+            clip_index = clip.clip_index
+            if self.training.state not in ("idle", "failed") and self.training.of_clip(clip_index) is None:
+                clip_index = self.training.clip_index
         if project is None or clip_index is None:
             return self.log.lines(None, None)
         return self.log.lines(clip_index, project.log_path(clip_index))

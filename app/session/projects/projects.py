@@ -151,7 +151,7 @@ class Projects(SessionPart):
         self._asked.put(None)
         if isinstance(command, SaveProjectAs):  # the copy would hold half-written files
             self._parts.check_idle()
-        self._files.apply(command, self.project, is_training=self._live.is_busy)
+        self._files.apply(command, self.project, is_training=self._live.is_busy_anywhere)
 
     def change_settings(self, command: SettingCommand) -> None:
         """Replace settings that every clip shares.
@@ -247,7 +247,11 @@ class Projects(SessionPart):
             status = self._live.status(None)
             name = project_name(found.project.folder.absolute(), found.project.settings.capture)
             n_waiting = len(status.queue)
-            self._asked.put(LeaveQuestion(name, status.clip_index or 0, status.step, status.n_steps, n_waiting))
+            self._asked.put(
+                LeaveQuestion(
+                    name, status.clip_index or 0, status.step, status.n_steps, n_waiting, status.n_running - 1
+                )
+            )
         else:
             self._enter(found)
 
