@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_NOT_READY, EXIT_OK, fail
+from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_NOT_READY, EXIT_OK, EXIT_STOPPED, fail
 from app.cli.chosen_project import open_for_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import show_event, show_outcome, show_status
@@ -31,7 +31,7 @@ def train_single_clip(options: argparse.Namespace, launch: Launch) -> int:
     """Train the clip of the arguments, if nobody has and nobody does. Returns the exit code.
 
     0: it is trained, now or before. 75: not yet possible, try again later. 1: it failed; trying again continues from
-    its checkpoint. 2: bad input; trying again does not help.
+    its checkpoint. 2: bad input; trying again does not help. 3: somebody stopped it.
     """
     for name, default, written in _CONTRADICTED:
         if getattr(options, name) != default:
@@ -99,6 +99,7 @@ def _exit_code(outcome: ClipOutcome) -> int:
     said = " ".join(part for part in (outcome.message, outcome.hint) if part)
     if outcome.kind == ClipClaimed.__name__:
         return fail(EXIT_NOT_READY, said)
+    if outcome.state == "stopped":
+        return fail(EXIT_STOPPED, f"The training of clip {outcome.clip_index} was stopped; progress is kept.")
     is_input = outcome.state == "damaged" or outcome.kind in BAD_INPUT_KINDS
-    said = said or f"The training of clip {outcome.clip_index} was stopped; progress is kept."
     return fail(EXIT_BAD_INPUT if is_input else EXIT_FAILED, said)

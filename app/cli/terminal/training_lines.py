@@ -180,7 +180,7 @@ class SequenceTable:
             for row in running.values()
         ]
         n_done, eta_s = self._n_clips - len(self._left), self._eta_s(running)
-        share = (n_done + sum(row.done for row in rows)) / max(self._n_clips, 1)
+        share = (n_done + sum(row.done or 0.0 for row in rows)) / max(self._n_clips, 1)
         left = "" if eta_s is None else f", {duration_text(eta_s)} left"
         self._line.show([*rows, ProgressRow("All", share, f"{n_done}/{self._n_clips} clips{left}")])
 
