@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -11,7 +12,7 @@ from app.background.logs import tail
 from app.project.project import Project
 from app.training.messages import ENDINGS, Command, Event, TrainingFailed, TrainJob, WorkerDied
 from engine.children.kind import ChildFailed, ChildKind
-from engine.children.process import MAX_EVENTS_PER_POLL, ChildProcess
+from engine.children.process import MAX_EVENTS_PER_POLL, Child, ChildProcess
 from engine.errors import EngineError
 
 BUILD = "app.training.worker.build:build_training"
@@ -43,6 +44,9 @@ TRAINING: ChildKind[TrainTask, Event, None] = ChildKind(
 )
 
 
+StartChild = Callable[[ChildKind[TrainTask, Event, None], TrainTask], Child[TrainTask, Event, None]]
+
+
 class Worker(Protocol):
     """One clip being trained, wherever that happens."""
 
@@ -71,16 +75,17 @@ class ProcessWorker:
         job: The training.
         project: Where it is read from and kept.
         make: See `TrainTask`.
+        start: Starts the process, on this computer or on another one.
 
     Attributes:
         child: The process.
     """
 
-    def __init__(self, job: TrainJob, project: Project, make: str = BUILD) -> None:
+    def __init__(self, job: TrainJob, project: Project, make: str = BUILD, *, start: StartChild = ChildProcess) -> None:
         self.job = job
         self._log_path = project.log_path(job.clip_index)
         self._has_ended = False
-        self.child = ChildProcess(TRAINING, TrainTask(job, project.folder, self._log_path, make))
+        self.child = start(TRAINING, TrainTask(job, project.folder, self._log_path, make))
 
     def send(self, command: Command) -> None:
         """See `Worker`."""

@@ -105,4 +105,5 @@ def _flush_output() -> None:
 def _set_threads(job: TrainJob) -> int:
     if job.is_window_open:  # before any thread is started, since threads take over the priority
         lower_process()
-    return use_threads(n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside))
+    share = n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside)
+    return use_threads(job.n_threads or share)
