@@ -19,6 +19,8 @@ from engine.text import printable, shown
 logger = logging.getLogger(__name__)
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT = 0, 1, 2
+EXIT_NOT_READY = 75
+"""Of `train --clip`: nothing is wrong, but it cannot be done yet. The number of "try again later" in sysexits.h."""
 
 _LONGEST_INSIDE = 200
 """Bytes of the longest name that the program adds to a folder it was given."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -21,13 +22,18 @@ from app.project.opening.project_access import (
     check_settings,
     create_project,
     default_settings,
+    open_for_clips,
     open_project,
     read_settings,
 )
 from app.project.project import Project
 from engine.capture.capture import Capture, open_capture
-from engine.errors import ProjectError
+from engine.errors import DiskError, ProjectError
 from engine.training.presets import closest_preset
+
+_OF_TRAINING = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
+"""Settings that arguments of `train` ask for, and that all clips share."""
+_N_LOOKS, _LOOK_EVERY_S = 50, 0.1
 
 
 def open_for_training(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[Project, Capture]:
@@ -55,6 +61,44 @@ def open_for_training(options: argparse.Namespace, say: Callable[[str], None]) -
         project.close()
         raise
     return project, capture
+
+
+def open_for_clip(options: argparse.Namespace) -> tuple[Project, Capture]:
+    """Likewise without the project's lock, for training single clips. Where there is no project it is made, by one of
+    all that try to at the same time.
+
+    Raises:
+        ProjectError: The arguments ask for other settings than the project has.
+    """
+    settings, stored, capture = _chosen_settings(options)
+    if stored is None:
+        try:
+            create_project(options.project, settings).close()
+        except DiskError:
+            raise
+        except ProjectError:
+            _wait_for_project(options.project)
+        settings, stored, capture = _chosen_settings(options)
+    assert stored is not None
+    changed = [name for name in _OF_TRAINING if getattr(settings, name) != getattr(stored, name)]
+    if changed:
+        listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)
+        raise ProjectError(
+            f"The project has {listed}; single clips are trained with its settings.",
+            hint="Leave the option out, or change the settings by training without --clip.",
+            path=options.project,
+        )
+    project = open_for_clips(options.project)
+    return project.placed(settings.capture, follow_links=settings.follow_links), capture
+
+
+def _wait_for_project(folder: Path) -> None:
+    """Wait until another process has made the project; raises ProjectError if none does."""
+    for _ in range(_N_LOOKS):
+        if (folder / PROJECT_FILE).is_file():
+            return
+        time.sleep(_LOOK_EVERY_S)
+    read_settings(folder)
 
 
 def project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
@@ -136,8 +180,7 @@ def _unlocked(folder: Path, settings: ProjectSettings, document: ProjectDocument
 def _check_changes(project: Project, capture: Capture, settings: ProjectSettings) -> None:
     """Check that no clip is finished with other settings."""
     stored = project.settings
-    names = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
-    changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]
+    changed = [name for name in _OF_TRAINING if getattr(settings, name) != getattr(stored, name)]
     before, after = project.document, replace(project.document, settings=settings)
     try:
         check_change(project, capture, before, after)

@@ -8,6 +8,7 @@ import contextlib
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
+    EXIT_NOT_READY,
     EXIT_OK,
     add_follow_links,
     fail,
@@ -15,6 +16,7 @@ from app.cli.arguments import (
     path_argument,
 )
 from app.cli.chosen_project import open_for_training, project_to_plan, what_goes
+from app.cli.single_clip import train_single_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.cli.training_settings import add_training_settings
@@ -36,6 +38,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("capture", type=path_argument, help="capture folder")
     command.add_argument("--project", type=path_argument, required=True, help="project folder; created if missing")
     command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    command.add_argument(
+        "--clip",
+        type=int,
+        metavar="K",
+        help="train this clip only, beside other processes and computers that train others; does nothing if it is "
+        f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it",
+    )
     command.add_argument(
         "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
     )
@@ -75,6 +84,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     if options.plan:
         return _plan(options)
+    if options.clip is not None:
+        return train_single_clip(options, launch)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)

@@ -117,8 +117,9 @@ def train_clips(
         try:
             for clip_index, event in service.poll():
                 on_event(event)
-                if isinstance(event, ENDINGS):
-                    end(_outcome(service, runs[clip_index], event, time.monotonic() - begun.pop(clip_index)))
+                if isinstance(event, ENDINGS) and clip_index in begun:
+                    seconds = time.monotonic() - begun.pop(clip_index)
+                    end(_outcome(service, clip_index, runs.get(clip_index), event, seconds))
             on_status(training_status(service))
             sleep(POLL_EVERY_S)
         except KeyboardInterrupt:
@@ -132,8 +133,11 @@ def _has_room(service: TrainingService, clip_index: int, begun: Collection[int])
     return len(begun) < service.n_workers and not any(index in begun for index in needed)
 
 
-def _outcome(service: TrainingService, run: ClipRun, ending: Event, seconds: float) -> ClipOutcome:
-    clip_index, step = run.clip_index, run.step
+def _outcome(
+    service: TrainingService, clip_index: int, run: ClipRun | None, ending: Event, seconds: float
+) -> ClipOutcome:
+    """run: None of a clip that another process has trained."""
+    step = 0 if run is None else run.step
     match ending:
         case ClipTrained():
             return ClipOutcome(clip_index, "trained", ending.step, ending.held_out_psnr, seconds)

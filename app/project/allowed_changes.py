@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from app.project.claims.left_over import check_unclaimed
 from app.project.disk.discarding import Discarded, discard, progress_of, training_of
 from app.project.opening.project_access import check_settings
 from app.project.project import Project
@@ -37,6 +38,7 @@ def check_change(
         return
     if is_training:
         raise SettingsFixed("A clip is being trained with the present settings.", hint="Stop the training first.")
+    check_unclaimed(project.folder)
     if project.has_finished_clips:
         raise SettingsFixed(
             "These settings are shared by all clips and fixed once one is finished; there "

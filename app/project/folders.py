@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from app.document.storing.replay import JOURNAL_FOLDER
+from app.project.claims.claim_files import CLAIMS
 from app.project.clips.clip_names import PROGRAM_NAME
 from engine.errors import ProjectError
 from engine.storage.files import check_folder
@@ -24,6 +25,7 @@ FOLDERS = (
     "logs",
     "evaluations",
     "exchange",
+    CLAIMS,
     JOURNAL_FOLDER,
 )
 

@@ -126,6 +126,18 @@ class LockOwner:
         return "This program" if self.pid == os.getpid() else f"Another process ({self.pid})"
 
 
+def this_process() -> LockOwner:
+    """This process as the owner of something, from now on."""
+    return LockOwner(
+        os.getpid(),
+        process_start(os.getpid()),
+        platform.node(),
+        machine_id(),
+        boot_id(),
+        datetime.now().astimezone().isoformat(timespec="seconds"),
+    )
+
+
 class ProcessLock:
     """Owns one lock from `acquire` to `release`, which may be called by different threads.
 
@@ -202,14 +214,7 @@ class ProcessLock:
             self._system_lock = None
 
     def _write_owner(self) -> None:
-        self._owner = LockOwner(
-            os.getpid(),
-            process_start(os.getpid()),
-            platform.node(),
-            machine_id(),
-            boot_id(),
-            datetime.now().astimezone().isoformat(timespec="seconds"),
-        )
+        self._owner = this_process()
         try:
             with atomic_path(self.path) as partial:  # whoever looks finds all of it, or nothing
                 partial.write_text(json.dumps(asdict(self._owner)), encoding="utf-8")

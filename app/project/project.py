@@ -10,6 +10,7 @@ mends/0001.json              what was mended, with figures before and after
 versions/0000/               what was trained before it was trained again
 damaged/0000-1.safetensors   damaged files that were put aside
 checkpoints/0000.safetensors unfinished clips: everything needed to continue
+claims/                      which process trains which clip, see app.project.claims
 live/                        snapshots of the running training; swept when the project is opened for writing
 prep/                        what clips share, such as backgrounds
 metrics/0000.jsonl           curves of the finished clip, one JSON object per line
@@ -53,6 +54,7 @@ class Project:
 
     Args:
         why_read_only: Without a lock, the cause and the remedy.
+        is_for_clips: Whether it was opened to train clips without the lock, each of which is claimed.
     """
 
     def __init__(
@@ -63,12 +65,13 @@ class Project:
         *,
         store: DocumentStore | None = None,
         why_read_only: str = READ_ONLY,
+        is_for_clips: bool = False,
     ) -> None:
         self.folder = folder
         self.history, self.store = history, store or DocumentStore(folder)
         self.headers = HeaderCache()
         self._lock = lock
-        self._why_read_only = why_read_only
+        self._why_read_only, self._is_for_clips = why_read_only, is_for_clips
 
     @property
     def document(self) -> ProjectDocument:
@@ -82,8 +85,13 @@ class Project:
 
     @property
     def is_writable(self) -> bool:
-        """Whether this process may train into the project."""
+        """Whether this process may change the document."""
         return self._lock is not None and self._lock.is_held
+
+    @property
+    def is_trainable(self) -> bool:
+        """Whether this process may train clips into the project."""
+        return self._is_for_clips or self.is_writable
 
     @property
     def live_dir(self) -> Path:
@@ -204,6 +212,15 @@ class Project:
         if not self.is_writable:
             raise ProjectError("The project is open read-only.", hint=self._why_read_only, path=self.folder)
 
+    def check_trainable(self) -> None:
+        """Check that this process may train clips.
+
+        Raises:
+            ProjectError: It may not.
+        """
+        if not self.is_trainable:
+            self.check_writable()
+
     def change(self, document: ProjectDocument, name: str) -> None:
         """Replace the document, on disk first, as a step of its history. name: See Changed.
 
@@ -230,6 +247,19 @@ class Project:
             self.happen(Placed(settings))
         else:
             self.change(replace(self.document, settings=settings), "change settings")
+
+    def placed(self, capture: str, *, follow_links: bool) -> Project:
+        """The same project with its capture in another place, as seen from this computer; not kept."""
+        settings = replace(self.settings, capture=capture, follow_links=follow_links)
+        history = replace(self.history, present=replace(self.document, settings=settings))
+        return Project(
+            self.folder,
+            history,
+            self._lock,
+            store=self.store,
+            why_read_only=self._why_read_only,
+            is_for_clips=self._is_for_clips,
+        )
 
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip and its curves stay."""

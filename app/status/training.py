@@ -7,6 +7,57 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
+class RunningClip:
+    """One clip in training, here or elsewhere.
+
+    Attributes:
+        clip_index: The clip.
+        state: starting, preparing, running, paused or stopping; unknown where another process has not said it yet.
+        machine: Name of the computer that trains it; empty while not known.
+        is_elsewhere: Whether another process trains it, which can only be asked to do something.
+        who: That process as the subject of a sentence; empty for this one.
+        stage: In words.
+        step, n_steps: Optimiser steps; zeros while it is prepared.
+        steps_per_s: 0 when unknown.
+        eta_s: Seconds until it is finished; None when unknown.
+        held_out_psnr: dB; None when not measured.
+        since_s: For how long it trains already.
+    """
+
+    clip_index: int
+    state: str
+    machine: str = ""
+    is_elsewhere: bool = False
+    who: str = ""
+    stage: str = ""
+    step: int = 0
+    n_steps: int = 0
+    steps_per_s: float = 0.0
+    eta_s: float | None = None
+    held_out_psnr: float | None = None
+    since_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class MachineStatus:
+    """A computer that trains clips of the project.
+
+    Attributes:
+        name: Of it.
+        is_here: Whether it is this one.
+        n_clips: Clips in training there.
+        n_cores, load, free_mb: See MachineLoad; 0 and None where not known.
+    """
+
+    name: str
+    is_here: bool = False
+    n_clips: int = 0
+    n_cores: int = 0
+    load: float | None = None
+    free_mb: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class TrainingStatus:
     """The training as a whole, derived from queue, worker and last event.
 
@@ -14,7 +65,9 @@ class TrainingStatus:
         state: idle, starting, preparing, running, paused, stopping or failed.
         clip_index: Clip of the worker, or of the last one that failed; None when idle. Of several that train, the one
             that began first: everything else here is about that one.
-        n_running: How many clips train.
+        n_running: How many clips this process trains.
+        trainings: All clips in training, here and elsewhere, in the order of their indices.
+        machines: Computers that train them, this one first.
         step, n_steps: Optimiser steps of that clip.
         progress: Share of the current stage while preparing, of all steps later. 0..1
         stage: The present stage, as shown to the user.
@@ -35,6 +88,8 @@ class TrainingStatus:
     state: str = "idle"
     clip_index: int | None = None
     n_running: int = 0
+    trainings: tuple[RunningClip, ...] = ()
+    machines: tuple[MachineStatus, ...] = ()
     step: int = 0
     n_steps: int = 0
     progress: float = 0.0

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from app.background.latest import nothing
 from app.project.clips.finished_clip import take_in
 from app.project.project import Project
 from app.training.worker.disk_retries import Retries
@@ -18,8 +19,9 @@ class Arrival:
     the disk refuses. Methods are for one other thread and do not wait.
 
     Args:
-        project: With its lock.
+        project: With its lock, or with a claim of the clip.
         is_endless: A window is open: its user makes room, or stops the training.
+        check: Called on the thread before; raises ProjectError where this process may not put the clip there any more.
         clock: Seconds; tests bring their own.
 
     Attributes:
@@ -28,9 +30,15 @@ class Arrival:
     """
 
     def __init__(
-        self, project: Project, clip_index: int, *, is_endless: bool, clock: Callable[[], float] = time.monotonic
+        self,
+        project: Project,
+        clip_index: int,
+        *,
+        is_endless: bool,
+        check: Callable[[], None] = nothing,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._project, self._clip_index = project, clip_index
+        self._project, self._clip_index, self._check = project, clip_index, check
         self._retries = Retries(is_endless=is_endless, clock=clock)
         self._thread: threading.Thread | None = None
         self.error: ProjectError | None = None
@@ -63,6 +71,7 @@ class Arrival:
 
     def _take_in(self) -> None:
         try:
+            self._check()
             try:
                 is_there = take_in(self._project, self._clip_index)
             except DiskError:

@@ -5,10 +5,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from app.background.latest import nothing
+from app.project.claims.claims import lost_claim
+from app.project.claims.holder_record import ClipProgress
 from app.project.clips.clip_catalog import ClipRecord
 from app.project.clips.finished_clip import take_in
 from app.project.project import Project
@@ -64,17 +68,18 @@ class ShownState:
 
 @dataclass(frozen=True, slots=True)
 class HandedOver:
-    """In place of a worker: the clip was trained before, and has only to be taken in."""
+    """In place of a worker, which is not needed: the clip was trained before and has only to be taken in, or cannot be
+    trained."""
 
     job: TrainJob
-    trained: ClipTrained
+    ending: ClipTrained | TrainingFailed
 
     def send(self, command: Command) -> None:
         """See `Worker`."""
 
     def poll(self) -> list[Event]:
         """See `Worker`."""
-        return [self.trained]
+        return [self.ending]
 
     def close(self, *, timeout_s: float) -> None:
         """See `Worker`."""
@@ -88,13 +93,16 @@ class ClipRun:
         number: In the names of live states: each worker counts its own from one.
         step, n_steps, held_out_psnr, curves: Its progress.
         stage, last_step: The worker's last reports.
-        pid: Process of the worker; None before it has reported it.
+        check: Raises ProjectError where a clip may no longer be put in its place by this process.
+        pid, machine: Process of the worker, and its computer; None and empty before it has reported them.
+        began_s: When it was started, by time.monotonic.
         ending: How it ended; None while it continues.
     """
 
     worker: Worker
     project: Project
     number: int
+    check: Callable[[], None] = nothing
     step: int = 0
     n_steps: int = 0
     held_out_psnr: float | None = None
@@ -102,6 +110,8 @@ class ClipRun:
     stage: StageReported = field(default_factory=lambda: StageReported("", 0.0))
     last_step: StepReported | None = None
     pid: int | None = None
+    machine: str = ""
+    began_s: float = field(default_factory=time.monotonic)
     is_paused: bool = False
     is_stopping: bool = False
     ending: Event | None = None
@@ -139,6 +149,23 @@ class ClipRun:
         if step is None or step.steps_per_s <= 0 or self.state != "running":
             return None
         return (step.n_steps - step.step) / step.steps_per_s
+
+    @property
+    def progress(self) -> ClipProgress:
+        """How far it is, for others."""
+        is_running = self.last_step is not None and self.state == "running"
+        return ClipProgress(
+            self.clip_index,
+            self.state,
+            self.machine,
+            self.stage.stage,
+            self.step,
+            self.n_steps,
+            self.last_step.steps_per_s if is_running and self.last_step is not None else 0.0,
+            self.eta_s,
+            self.held_out_psnr,
+            time.monotonic() - self.began_s,
+        )
 
     @property
     def message(self) -> str:
@@ -180,7 +207,15 @@ class ClipRun:
         if self._arrival is not None:
             self._arrival.wait()
         with suppress(ProjectError):
+            self.check()
             take_in(self.project, self.clip_index)
+
+    def lose(self) -> TrainingFailed:
+        """Another process trains the clip since. The worker ends at once. Returns the ending."""
+        self.worker.close(timeout_s=0.0)
+        lost = lost_claim()
+        self.ending = TrainingFailed(type(lost).__name__, *lost.parts())
+        return self.ending
 
     # ---------------------------------------------------------------- events
 
@@ -220,8 +255,8 @@ class ClipRun:
 
     def _take(self, event: Event) -> None:
         match event:
-            case WorkerReady(pid=pid):
-                self.pid = pid
+            case WorkerReady(pid=pid, machine=machine):
+                self.pid, self.machine = pid, machine
             case StageReported():
                 self.stage = event
             case StepReported():
@@ -244,7 +279,7 @@ class ClipRun:
             case ClipTrained():
                 self._trained = event
                 is_endless = self.worker.job.is_window_open
-                self._arrival = Arrival(self.project, self.clip_index, is_endless=is_endless)
+                self._arrival = Arrival(self.project, self.clip_index, is_endless=is_endless, check=self.check)
             case _ if isinstance(event, ENDINGS):
                 self.ending = event
             case _:

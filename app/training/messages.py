@@ -105,10 +105,11 @@ class SetSnapshots(Struct, frozen=True, tag=True):
 
 
 class WorkerReady(Struct, frozen=True, tag=True):
-    """The worker runs and has read the job."""
+    """The worker runs and has read the job. machine: Name of the computer."""
 
     pid: int
     n_threads: int
+    machine: str = ""
 
 
 class StageReported(Struct, frozen=True, tag=True):

@@ -23,12 +23,14 @@ class TrainTask(Struct, frozen=True):
 
     Attributes:
         project: Folder of it, in which the worker's store lies.
+        capture: Where its capture is.
         log: File for everything that the process prints.
         make: "module:name" of the function that builds the training, a MakeTraining.
     """
 
     job: TrainJob
     project: Path
+    capture: Path
     log: Path
     make: str
 
@@ -85,7 +87,8 @@ class ProcessWorker:
         self.job = job
         self._log_path = project.log_path(job.clip_index)
         self._has_ended = False
-        self.child = start(TRAINING, TrainTask(job, project.folder, self._log_path, make))
+        task = TrainTask(job, project.folder, Path(project.settings.capture), self._log_path, make)
+        self.child = start(TRAINING, task)
 
     def send(self, command: Command) -> None:
         """See `Worker`."""

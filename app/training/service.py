@@ -1,14 +1,19 @@
 """TrainingService: clips that train, clips that wait, and the workers' last reports. Status is derived, never stored.
 
 Owned by one thread. It knows no window and raises no notices: `poll` returns the events for the caller to report.
-Files on disk are left to app.project.clips.clip_catalog; running trainings never hide them.
+Files on disk are left to app.project.clips.clip_catalog; running trainings never hide them. Every clip is claimed while
+it trains, so that other processes, also of other computers, can train others of the same project.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
+from app.project.claims.asks import Ask
+from app.project.claims.claims import Claims, ClipClaimed, Elsewhere
+from app.project.claims.holder_record import ClipProgress
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.training.clip_run import ClipRun, HandedOver, ShownState
@@ -22,6 +27,7 @@ from app.training.messages import (
     SetSnapshots,
     SnapshotConsumed,
     SnapshotNow,
+    TrainingFailed,
     TrainJob,
 )
 from app.training.own_settings import with_own
@@ -29,7 +35,7 @@ from app.training.process import ProcessWorker, Worker
 from app.training.train_queue import OwnSettings, TrainQueue, drop_hopeless, needed_clips
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import read_clip_header
-from engine.errors import ProjectError
+from engine.errors import DiskError, ProjectError
 from engine.training.preparation.stages import remove_stages
 
 Launch = Callable[[TrainJob, Project], Worker]
@@ -50,6 +56,7 @@ class TrainingService:
         catalog: The clips on disk; read here, which takes a while in a long project, when None.
         curves: Reads the curves of clips that are looked at; stays open when the service is closed.
         n_workers: How many clips may train side by side. They share the cores.
+        claims: Of this process; made here when None.
 
     Attributes:
         queue: Clips that wait.
@@ -71,6 +78,7 @@ class TrainingService:
         catalog: ClipCatalog | None = None,
         curves: CurveReader | None = None,
         n_workers: int = 1,
+        claims: Claims | None = None,
     ) -> None:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open, self.n_workers = launch, is_window_open, n_workers
@@ -85,6 +93,23 @@ class TrainingService:
         self._begun: dict[int, OwnSettings] = {}  # own settings with which unfinished clips were begun
         self._dropped: list[int] = []
         self._n_runs = 0
+        self.claims = Claims(project.folder, describe=self._described) if claims is None else claims
+        self._ended_elsewhere: list[ClipEvent] = []
+        self._known_elsewhere: Mapping[str, Elsewhere] = self.claims.elsewhere
+        self._elsewhere: tuple[Mapping[str, Elsewhere], dict[int, Elsewhere]] = ({}, {})
+
+    @property
+    def elsewhere(self) -> Mapping[int, Elsewhere]:
+        """Clips that other processes train, by index, as far as clips are cut so here. Not to be changed."""
+        known = self.claims.elsewhere
+        if self._elsewhere[0] is not known:
+            indices = {key: self.project.index_of(key) for key in known}
+            found = {index: known[key] for key, index in indices.items() if index is not None}
+            self._elsewhere = (known, found)
+        return self._elsewhere[1]
+
+    def _described(self) -> dict[str, ClipProgress]:
+        return {run.worker.job.key: run.progress for run in list(self.runs.values())}
 
     @property
     def is_busy(self) -> bool:
@@ -142,14 +167,14 @@ class TrainingService:
         """
         if not self.runs and self.queue:
             return next(iter(self.queue))
-        taken = {*self.queue, *self.runs}
+        taken = {*self.queue, *self.runs, *self.elsewhere}
         clips = (index for index in self.catalog.order if index not in taken)
         return next((index for index in clips if is_due(self.catalog, index)), None)
 
     @property
     def can_train_next(self) -> bool:
         """Whether training the next clip would start something."""
-        return self.project.is_writable and self.next_clip_index is not None and not self.is_stopping
+        return self.project.is_trainable and self.next_clip_index is not None and not self.is_stopping
 
     def enqueue(self, clip_index: int, own: OwnSettings | None = None) -> None:
         """Train a clip when its turn comes; at once when nothing else does. See `add`."""
@@ -165,7 +190,7 @@ class TrainingService:
             ProjectError: The project is read-only, there is no such clip, a clip that it needs is missing or damaged,
                 or a setting cannot differ between clips.
         """
-        self.project.check_writable()
+        self.project.check_trainable()
         if not 0 <= clip_index < len(self.clips):
             raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(self.clips) - 1}.")
         if own:
@@ -173,7 +198,7 @@ class TrainingService:
         coming = {*self.queue, *self.runs}
         if clip_index in self.runs or (clip_index in coming and own is None):
             return
-        check_needed(self.project, self.catalog, clip_index, coming)
+        check_needed(self.project, self.catalog, clip_index, coming.union(self.elsewhere))
         self._add(clip_index, own)
 
     def _add(self, clip_index: int, own: OwnSettings | None = None) -> None:
@@ -189,8 +214,9 @@ class TrainingService:
         Raises:
             ProjectError: The project is read-only.
         """
-        self.project.check_writable()
-        order, left_out = with_needed(self.project, self.catalog, clip_indices, {*self.queue, *self.runs})
+        self.project.check_trainable()
+        coming = {*self.queue, *self.runs, *self.elsewhere}
+        order, left_out = with_needed(self.project, self.catalog, clip_indices, coming)
         for clip_index in order:
             self._add(clip_index)
         self.go_on()
@@ -217,7 +243,7 @@ class TrainingService:
 
     def drop_hopeless(self) -> list[int]:
         """Take clips that can no longer be trained out of the queue. Returns them."""
-        return drop_hopeless(self.queue, self.runs, self.project, self.catalog)
+        return drop_hopeless(self.queue, {*self.runs, *self.elsewhere}, self.project, self.catalog)
 
     def take_dropped(self) -> list[int]:
         """Clips that left the queue because clips they need cannot come; each is given once."""
@@ -264,6 +290,7 @@ class TrainingService:
             run.close(timeout_s=timeout_s)
             self.catalog.update(clip_index)
         self.runs = {}
+        self.claims.close()
         if self._owns_curves:
             self.curves.close()
 
@@ -274,14 +301,16 @@ class TrainingService:
             ready = self._ready()
             if not ready:
                 return
-            self._start(ready[0], n_beside=min(len(self.runs) + len(ready), self.n_workers))
+            self._start(ready[0], n_beside=min(len(self.runs) + len(ready), self.n_workers))  # or leave it to another
 
     def _ready(self) -> list[int]:
-        """Waiting clips that need none that trains or waits before them, as many as there is room for."""
+        """Waiting clips that need none that trains or waits before them, as many as there is room for; but for those
+        that another process trains."""
         room, ready = self.n_workers - len(self.runs), list[int]()
-        coming, config = set(self.runs), self.project.settings.config()
+        coming, config = {*self.runs, *self.elsewhere}, self.project.settings.config()
         for clip_index in self.queue:
-            if coming.isdisjoint(needed_clips(self.project, clip_index, config)):
+            is_free = clip_index not in self.elsewhere
+            if is_free and coming.isdisjoint(needed_clips(self.project, clip_index, config)):
                 ready.append(clip_index)
             coming.add(clip_index)
             if len(ready) == room:
@@ -290,6 +319,17 @@ class TrainingService:
 
     def _start(self, clip_index: int, *, n_beside: int) -> None:
         """n_beside: How many trainings share the cores."""
+        refused: ProjectError | None = None
+        try:
+            self.claims.take(self.project.clip_name(clip_index))
+        except ClipClaimed:
+            self.claims.watch()
+            return  # it is among those elsewhere now, and waits until they have finished it or given it up
+        except DiskError as error:
+            refused = error
+        if self._is_finished_since(clip_index):
+            self.claims.release(self.project.clip_name(clip_index))
+            return
         own = self.queue.take(clip_index)
         if own is not None:
             self._begin_afresh(clip_index, own)
@@ -303,12 +343,15 @@ class TrainingService:
             n_beside=n_beside,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)
-        if header is None:
-            worker = self._launch(job, self.project)
-        else:
+        if refused is not None:
+            worker = HandedOver(job, TrainingFailed(type(refused).__name__, *refused.parts()))
+        elif header is not None:
             worker = HandedOver(job, ClipTrained(header.step, header.figures.held_out_psnr))
+        else:
+            worker = self._launch(job, self.project)
         self._n_runs += 1
-        run = self.runs[clip_index] = ClipRun(worker, self.project, self._n_runs)
+        check = partial(self.claims.check, job.key)
+        run = self.runs[clip_index] = ClipRun(worker, self.project, self._n_runs, check)
         run.take_up(self.catalog[clip_index])
 
     def _begin_afresh(self, clip_index: int, own: OwnSettings) -> None:
@@ -321,17 +364,63 @@ class TrainingService:
     def poll(self, *, budget_s: float = 0.002) -> list[ClipEvent]:
         """Take in the workers' events; start the next clip when one ended. Returns the events, oldest first of each."""
         until_s = time.monotonic() + budget_s
-        taken: list[ClipEvent] = []
+        taken: list[ClipEvent] = self._look_elsewhere()
         for clip_index, run in list(self.runs.items()):
             taken += [(clip_index, event) for event in run.poll(until_s)]
             if run.ending is not None:
                 self._end(run)
         return taken
 
+    def _look_elsewhere(self) -> list[ClipEvent]:
+        """Take in what other processes did and ask for. Returns endings of clips: finished by them, or lost to them."""
+        for key, ask in self.claims.take_asked():
+            clip_index = self.project.index_of(key)
+            if clip_index is not None:
+                self._obey(clip_index, ask)
+        for run in self.runs.values():
+            if run.ending is None and self.claims.is_lost(run.worker.job.key):
+                self._ended_elsewhere.append((run.clip_index, run.lose()))
+        changed = {self.project.index_of(key) for key in self.claims.take_changed()}
+        for clip_index in sorted(index for index in changed if index is not None and index < len(self.clips)):
+            if clip_index not in self.runs:
+                self._is_finished_since(clip_index)
+        is_news = self.claims.elsewhere is not self._known_elsewhere
+        self._known_elsewhere = self.claims.elsewhere
+        if is_news and self.queue:
+            self._dropped += self.drop_hopeless()
+            self._start_waiting()
+        ended, self._ended_elsewhere = self._ended_elsewhere, []
+        return ended
+
+    def _obey(self, clip_index: int, ask: Ask) -> None:
+        match ask:
+            case "pause":
+                self.pause(clip_index)
+            case "resume":
+                self.resume(clip_index)
+            case "stop":
+                for run in self._chosen(clip_index):
+                    run.stop()
+            case "look":
+                self.snapshot_now(clip_index)
+
+    def _is_finished_since(self, clip_index: int) -> bool:
+        """Read a clip's files again. Whether another process has finished it since they were read; it waits no more."""
+        before = self.catalog[clip_index].revision
+        self.catalog.update(clip_index)
+        record = self.catalog[clip_index]
+        if record.state != "trained" or record.revision == before:
+            return False
+        if clip_index in self.queue:
+            self.queue.remove(clip_index)
+            self._ended_elsewhere.append((clip_index, ClipTrained(record.step, record.held_out_psnr)))
+        return True
+
     def _end(self, run: ClipRun) -> None:
         clip_index = run.clip_index
         run.worker.close(timeout_s=0.5)
         del self.runs[clip_index]
+        self.claims.release(run.worker.job.key)
         self.last = run
         self.catalog.update(clip_index)  # also finds clips that are out of date by it
         self.queue.note_end(run.n_steps)

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from dataclasses import replace
 
-from app.status import ClipStatus, TrainingStatus
+from app.project.claims.claims import Elsewhere
+from app.project.claims.holder_record import ClipProgress, MachineLoad, machine_name
+from app.status import ClipStatus, MachineStatus, RunningClip, TrainingStatus
 from app.training.curves import Curves
 from app.training.messages import ClipTrained
 from app.training.service import TrainingService
@@ -34,6 +38,8 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
         state=state,
         clip_index=clip_index,
         n_running=len(service.runs),
+        trainings=tuple(running_clips(service)),
+        machines=tuple(machines(service)),
         step=0 if run is None else run.step,
         n_steps=0 if run is None else run.n_steps,
         progress=done if step is None else step.step / max(step.n_steps, 1),
@@ -52,6 +58,51 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
         resume_step=None if upcoming is None else service.catalog[upcoming].resume_step,
         queue=tuple(service.queue),
     )
+
+
+def running_clips(service: TrainingService) -> list[RunningClip]:
+    """All clips in training, here and elsewhere, in the order of their indices."""
+    found = [_running(run.progress) for run in service.runs.values() if run.ending is None]
+    found += [_elsewhere(clip_index, other) for clip_index, other in service.elsewhere.items()]
+    return sorted(found, key=lambda clip: clip.clip_index)
+
+
+def _running(progress: ClipProgress) -> RunningClip:
+    return RunningClip(
+        progress.clip_index,
+        progress.state,
+        progress.machine,
+        stage=progress.stage,
+        step=progress.step,
+        n_steps=progress.n_steps,
+        steps_per_s=progress.steps_per_s,
+        eta_s=progress.eta_s,
+        held_out_psnr=progress.held_out_psnr,
+        since_s=progress.since_s,
+    )
+
+
+def _elsewhere(clip_index: int, other: Elsewhere) -> RunningClip:
+    said = other.progress
+    machine = "" if other.holder is None else other.holder.owner.host
+    if said is None:
+        return RunningClip(clip_index, "unknown", machine, is_elsewhere=True, who=other.who)
+    known = _running(said)
+    return replace(known, clip_index=clip_index, machine=known.machine or machine, is_elsewhere=True, who=other.who)
+
+
+def machines(service: TrainingService) -> list[MachineStatus]:
+    """The computers that train clips, this one first, the others by name."""
+    here, known = machine_name(), dict[str, MachineLoad]()
+    for holder in service.claims.others:
+        known[holder.owner.host] = holder.load
+    known[here] = service.claims.load
+    counts = Counter(clip.machine or here for clip in running_clips(service))
+    found = list[MachineStatus]()
+    for name in sorted({*counts, here}, key=lambda name: (name != here, name)):
+        load = known.get(name, MachineLoad(0))
+        found.append(MachineStatus(name, name == here, counts[name], load.n_cores, load.load, load.free_mb))
+    return found
 
 
 def curves_of(service: TrainingService, clip_index: int) -> Curves | None:
@@ -81,12 +132,12 @@ class ClipStatuses:
             live_counts: A clip that trains, with its inherited and own anchors, if a state of it was loaded.
         """
         service = self._service
-        queue, runs = service.queue, service.runs
-        made_of = (service.catalog.revision, tuple(queue), tuple(runs), tuple(queue.failed))
+        queue, runs, elsewhere = service.queue, service.runs, service.elsewhere
+        made_of = (service.catalog.revision, tuple(queue), tuple(runs), tuple(queue.failed), tuple(elsewhere))
         if self._made_of != made_of:
             self._statuses = [self._status(index, None) for index in range(len(service.clips))]
             self._made_of = made_of
-        for clip_index in runs:
+        for clip_index in (*runs, *elsewhere):
             counts = live_counts[1:] if live_counts is not None and live_counts[0] == clip_index else None
             self._statuses[clip_index] = self._status(clip_index, counts)
         return list(self._statuses)
@@ -100,6 +151,11 @@ class ClipStatuses:
             shown, step, n_steps = _WORDS.get(run.state, "training"), run.step, run.n_steps
             if run.held_out_psnr is not None:
                 psnr, is_whole = run.held_out_psnr, False
+        elif (other := self._service.elsewhere.get(clip_index)) is not None:
+            said = other.progress
+            shown = "training" if said is None else _WORDS.get(said.state, "training")
+            step, n_steps = (0, 0) if said is None else (said.step, said.n_steps)
+            psnr, is_whole = (None if said is None else said.held_out_psnr), False
         elif clip_index in queue:
             shown = "queued"
         elif clip_index in queue.failed and shown in ("untrained", "stopped"):

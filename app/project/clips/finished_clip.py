@@ -1,4 +1,4 @@
-"""A finished clip on its way into the project: its worker has left it there, and the owner of the lock puts it in its
+"""A finished clip on its way into the project: its worker has left it there, and the holder of its claim puts it in its
 place. What the clip was before becomes a version. Nobody else replaces a finished clip by a trained one."""
 
 from __future__ import annotations
@@ -7,6 +7,7 @@ import logging
 import os
 from contextlib import suppress
 
+from app.project.claims.left_over import live_claims
 from app.project.clips.clip_versions import forget_oldest, set_aside
 from app.project.project import Project
 from engine.clip_files.clip_state import read_clip_header
@@ -24,10 +25,10 @@ def take_in(project: Project, clip_index: int) -> bool:
     Returns:
         Whether there was one.
     Raises:
-        ProjectError: The project is read-only.
+        ProjectError: This process may not train clips.
         DiskError: The disk refused; everything is as it was, and it can be tried again.
     """
-    project.check_writable()
+    project.check_trainable()
     files = project.files(clip_index)
     header = read_clip_header(files.handed_over)
     if header is None:
@@ -50,10 +51,12 @@ def take_in(project: Project, clip_index: int) -> bool:
 
 
 def take_in_left_over(project: Project) -> None:
-    """Put every clip in its place that was finished when the program was killed. A disk that refuses keeps it for the
-    next time."""
+    """Put every clip in its place that was finished when the program was killed, but for those that a living process
+    has claimed. A disk that refuses keeps it for the next time."""
+    claimed = live_claims(project.folder)
     for path in sorted(project.live_dir.glob("*-trained.safetensors")):
-        clip_index = project.index_of(path.name.removesuffix("-trained.safetensors"))
-        if clip_index is not None:
+        key = path.name.removesuffix("-trained.safetensors")
+        clip_index = project.index_of(key)
+        if clip_index is not None and key not in claimed:
             with suppress(ProjectError):
                 take_in(project, clip_index)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.project.claims.left_over import check_unclaimed
 from app.project.clips.clip_names import PROGRAM_NAME
 from app.project.disk.room import Room, make_room
 from app.project.disk.use import files_of
@@ -104,9 +105,10 @@ def discard(project: Project, discarded: Discarded) -> None:
     """Delete it for good.
 
     Raises:
-        ProjectError: The project is read-only.
+        ProjectError: The project is read-only, or somebody trains a clip of it.
         DiskError: The disk refused; what was not deleted by then is still there, and fits together.
     """
+    check_unclaimed(project.folder)
     make_room(project, discarded.room)
 
 

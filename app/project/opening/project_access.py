@@ -170,6 +170,20 @@ def open_project(
     return project
 
 
+def open_for_clips(folder: Path | str) -> Project:
+    """Open an existing project folder to train clips into it, without its lock: any number of processes may do so, and
+    a window may have it open meanwhile. Every clip is claimed before it is trained.
+
+    Raises:
+        ProjectError: The folder is not a project, is damaged, of a newer schema, or a folder in it is a link.
+    """
+    folder = Path(folder)
+    if is_project(folder):  # any other folder raises its error below
+        check_folders(folder)
+    store = DocumentStore(folder)
+    return Project(folder, store.read(), None, store=store, is_for_clips=True)
+
+
 def repair_project(folder: Path | str) -> Path:
     """Continue with the steps before the damage; see app.document.storing.recovery.
 

@@ -13,6 +13,7 @@ from app.document.project_document import ProjectDocument
 from app.plan.forecasts import Forecasts
 from app.playback.modes.arrays import AnchorArrays
 from app.project.allowed_changes import check_change, is_other_cut
+from app.project.claims.left_over import check_unclaimed
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
@@ -93,6 +94,7 @@ class LiveTraining(SessionPart):
             catalog=self._catalog,
             curves=self._curves,
         )
+        self.service.claims.watch()
         self.service.live_view = self._live_view
         self._statuses = ClipStatuses(self.service)
         self._catalog = None
@@ -152,6 +154,8 @@ class LiveTraining(SessionPart):
                 "Clips are training or queued.",
                 hint="Stop training first; progress is kept.",
             )
+        if self._opened is not None:
+            check_unclaimed(self._opened.project.folder)
 
     def check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """Check that no clip is finished with settings that change. Raises ProjectError."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -26,13 +27,14 @@ class FolderStore:
 
     Args:
         folder: Of the project, as it is now.
+        capture: Where its capture is on this machine; where the project says so when None.
     Raises:
         ProjectError: It is not a project, or is damaged.
         ProjectGone: It is missing.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, capture: Path | None = None) -> None:
+        self.folder, self._capture = folder, capture
         self._watch = FolderWatch(folder)
         self._project = open_project(folder, is_writable=False)
 
@@ -48,7 +50,8 @@ class FolderStore:
     def capture(self, *, scale: float, frames: tuple[int, int] | None) -> Capture:
         """See `ClipStore`."""
         settings = self._project.settings
-        return open_capture(Path(settings.capture), scale=scale, frames=frames, follow_links=settings.follow_links)
+        place = Path(settings.capture) if self._capture is None else self._capture
+        return open_capture(place, scale=scale, frames=frames, follow_links=settings.follow_links)
 
     def clip(self, key: str) -> ClipState:
         """See `ClipStore`."""
@@ -67,7 +70,7 @@ class FolderStore:
     def put_clip(self, key: str, clip: CompactClip) -> None:
         """See `ClipStore`."""
         path = self._files(key).handed_over
-        draft = path.with_name(f"{key}-final.safetensors")
+        draft = path.with_name(f"{key}-p{os.getpid()}-final.safetensors")  # one taken for dead may still write its own
         try:
             write_compact_clip(draft, clip)
             if not _reads_back(draft, clip):

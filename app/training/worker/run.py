@@ -11,6 +11,7 @@ import time
 import traceback
 from collections.abc import Callable
 
+from app.project.claims.holder_record import machine_name
 from app.training.messages import (
     ClipTrained,
     Command,
@@ -153,7 +154,7 @@ class TrainingRun:
         self._watch.enter(STARTING)
         self._store = store = self._open_store()
         self._keeper = keeper = Keeper(job, store, send=self._send, watch=self._watch, clock=self._clock)
-        self._send(WorkerReady(pid=os.getpid(), n_threads=self._n_threads))
+        self._send(WorkerReady(os.getpid(), self._n_threads, machine_name()))
         training = self._restored(store) or self._prepared(store)
         self._watch.enter(KEEPING)
         self._send(nothing_yet(training.steps_done, training.n_steps))

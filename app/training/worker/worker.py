@@ -54,7 +54,7 @@ def main(task: TrainTask, parent: Parent[Event]) -> None:
         send(WarningRaised("The log of the training could not be written", str(refused)))
     run = TrainingRun(
         job,
-        lambda: FolderStore(task.project),
+        lambda: FolderStore(task.project, task.capture),
         receive=parent.receive,
         send=send,
         make_training=find(task.make),

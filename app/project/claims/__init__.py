@@ -1,0 +1,1 @@
+"""Which process trains which clip of a project, on whatever computer. Claims need no locks of the file system."""

@@ -1,0 +1,369 @@
+"""Claims: what one process of a project trains, said to all others; and what those train.
+
+Training a clip needs no lock of the project, only the claim of that clip. A thread says every few seconds that this
+process lives, and looks at what others say. Whether another one lives is judged by whether its record changes, on this
+process's own clock: clocks of computers may differ by any amount.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import TypeVar
+
+from app.project.claims.asks import Ask, drop_ask, take_asks
+from app.project.claims.claim_files import (
+    CLAIMS,
+    ClaimFile,
+    holder_path,
+    list_claims,
+    list_holders,
+    make_claim,
+    newest_claim,
+    remove_claim,
+)
+from app.project.claims.holder_record import (
+    ClipProgress,
+    HolderRecord,
+    MachineLoad,
+    machine_load,
+    pid_space,
+    read_holder,
+    write_holder,
+)
+from app.project.lock import this_process
+from engine.errors import ProjectError
+from engine.storage.files import disk_error
+
+logger = logging.getLogger(__name__)
+T = TypeVar("T")
+
+BEAT_EVERY_S = 5.0
+LOOK_EVERY_S = 2.0
+DEAD_AFTER_S = 60.0
+"""A holder that has said nothing for so long has ended; one that was only slow notices that its claim is lost."""
+_MAX_TRIES = 100
+
+
+class ClipClaimed(ProjectError):
+    """Another process trains the clip.
+
+    Attributes:
+        is_sure: Whether that one lives for certain; else it may have died, and a minute will tell.
+    """
+
+    def __init__(self, message: str, *, hint: str = "", path: Path | None = None, is_sure: bool = True) -> None:
+        super().__init__(message, hint=hint, path=path)
+        self.is_sure = is_sure
+
+
+def lost_claim() -> ClipClaimed:
+    """The error of a process that was taken for dead, and whose clip another one trains since."""
+    return ClipClaimed(
+        f"Another program trains this clip, because this one had said nothing for {DEAD_AFTER_S:.0f} s.",
+        hint="Nothing is lost: the other one continues.",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Elsewhere:
+    """A clip that another process trains.
+
+    Attributes:
+        key: Of the clip.
+        holder: Who trains it; None while that is not known.
+        is_dead: Whether the claim may be taken over.
+    """
+
+    key: str
+    holder: HolderRecord | None = None
+    is_dead: bool = False
+
+    @property
+    def progress(self) -> ClipProgress | None:
+        """How far it is; None while that is not known."""
+        return None if self.holder is None else self.holder.clips.get(self.key)
+
+    @property
+    def who(self) -> str:
+        """The holder as the subject of a sentence."""
+        return "Another program" if self.holder is None else self.holder.owner.words()
+
+
+class Claims:
+    """Claims of one process in one project. Methods are for one thread, but for those said to be for another.
+
+    Args:
+        folder: Of the project.
+        describe: Called on the thread of the claims: how far the clips in training are, by key.
+        clock: Seconds; tests bring their own.
+        has_thread: Whether to look and beat by itself; tests call `look`.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        describe: Callable[[], Mapping[str, ClipProgress]] = dict,
+        clock: Callable[[], float] = time.monotonic,
+        has_thread: bool = True,
+    ) -> None:
+        self.folder = folder
+        self.token = uuid.uuid4().hex
+        self._describe, self._clock, self._has_thread = describe, clock, has_thread
+        self._held: dict[str, ClaimFile] = {}
+        self._lost: set[str] = set()
+        self._elsewhere: dict[str, Elsewhere] = {}
+        self._others: tuple[HolderRecord, ...] = ()
+        self._asked: SimpleQueue[tuple[str, Ask]] = SimpleQueue()
+        self._changed: SimpleQueue[str] = SimpleQueue()
+        self._seen: dict[str, tuple[object, float, int]] = {}  # state of a holder, since when, and how many before it
+        self._clip_files: dict[str, tuple[int, int]] | None = None
+        self._clips_time: int | None = None
+        self._is_clips_time_old = False
+        self._load = MachineLoad(os.cpu_count() or 1)
+        self._beat, self._beaten_s = 0, -BEAT_EVERY_S
+        self._is_watching = False
+        self._guard = threading.RLock()
+        self._wake = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    # ---------------------------------------------------------------- one's own
+
+    def take(self, key: str) -> None:
+        """Claim a clip.
+
+        Raises:
+            ClipClaimed: Another process trains it, or may do so.
+            DiskError: The disk refused.
+        """
+        with self._guard:
+            if key in self._held:
+                return
+            try:
+                (self.folder / CLAIMS).mkdir(exist_ok=True)  # not the project itself, which may be gone
+                self._say()
+                self._held[key] = self._claimed(key)
+            except OSError as error:
+                raise disk_error(error, what="The claim of the clip", path=self.folder / CLAIMS) from error
+            if key in self._elsewhere:
+                self._elsewhere = {other: known for other, known in self._elsewhere.items() if other != key}
+            self._lost.discard(key)
+            drop_ask(self.folder, key)
+        self._start()
+
+    def _claimed(self, key: str) -> ClaimFile:
+        for _ in range(_MAX_TRIES):
+            newest = newest_claim(self.folder, key)
+            if newest is not None:
+                other = self._judged(newest)
+                if not other.is_dead:
+                    self._elsewhere = {**self._elsewhere, key: other}
+                    is_sure = other.holder is not None and (other.holder.is_here or self._has_changed(newest))
+                    raise ClipClaimed(
+                        f"{other.who} trains this clip.", hint="Wait for it, or stop it there.", is_sure=is_sure
+                    )
+                logger.info("clip %s: the claim of %s is taken over, which has ended", key, other.who)
+            claim = ClaimFile(self.folder, key, 1 if newest is None else newest.number + 1)
+            if make_claim(claim, self.token):
+                return claim
+        raise ClipClaimed("Other programs claim this clip again and again.", hint="Try again later.")
+
+    def release(self, key: str) -> None:
+        """Free a clip, if it is claimed. Never fails."""
+        with self._guard:
+            claim = self._held.pop(key, None)
+            if claim is not None and key not in self._lost:
+                remove_claim(claim)
+                drop_ask(self.folder, key)
+            self._lost.discard(key)
+            if not self._held:
+                with suppress(OSError):
+                    holder_path(self.folder, self.token).unlink(missing_ok=True)
+        self._wake.set()
+
+    def is_lost(self, key: str) -> bool:
+        """Whether another process has taken over a clip claimed here, for it took this one for dead."""
+        return key in self._lost
+
+    def check(self, key: str) -> None:
+        """Check, on disk, that a clip is still claimed here. For any thread.
+
+        Raises:
+            ClipClaimed: It is not.
+        """
+        with self._guard:
+            self._check_held(key)
+            if key not in self._held or key in self._lost:
+                raise lost_claim()
+
+    # ---------------------------------------------------------------- what others do
+
+    @property
+    def elsewhere(self) -> Mapping[str, Elsewhere]:
+        """Clips that other processes train, by key, as of the last look. Not to be changed."""
+        return self._elsewhere
+
+    @property
+    def others(self) -> tuple[HolderRecord, ...]:
+        """The other processes that train clips, as of the last look."""
+        return self._others
+
+    @property
+    def load(self) -> MachineLoad:
+        """How busy this computer is, as of the last look."""
+        return self._load
+
+    def take_asked(self) -> list[tuple[str, Ask]]:
+        """What others ask of clips claimed here; each request is given once."""
+        return _all_of(self._asked)
+
+    def take_changed(self) -> set[str]:
+        """Keys of clips whose finished files came, went or changed since the last call, whoever did it."""
+        return set(_all_of(self._changed))
+
+    def watch(self) -> None:
+        """Look also while nothing is claimed here."""
+        self._is_watching = True
+        self._start()
+
+    def close(self) -> None:
+        """Release everything, and end the thread."""
+        self._is_watching = False
+        for key in list(self._held):
+            self.release(key)
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join(LOOK_EVERY_S)
+
+    # ---------------------------------------------------------------- the thread
+
+    def look(self) -> None:
+        """One round: say that this process lives, and see what others do. For the thread of the claims."""
+        self._load = machine_load()
+        with self._guard:
+            if self._held and self._clock() - self._beaten_s >= BEAT_EVERY_S:
+                with suppress(OSError):
+                    self._say()
+            for key in list(self._held):
+                self._check_held(key)
+        try:
+            claims = list_claims(self.folder)
+            names = os.listdir(self.folder / CLAIMS) if claims else []
+        except OSError:
+            return  # the disk does not answer; what was seen last holds
+        records = {token: read_holder(holder_path(self.folder, token)) for token in list_holders(self.folder)}
+        with self._guard:
+            elsewhere = {key: self._judged(claim, records) for key, claim in claims.items() if key not in self._held}
+            self._elsewhere = {key: other for key, other in elsewhere.items() if not other.is_dead}
+            said = {other.holder.token for other in self._elsewhere.values() if other.holder is not None}
+            self._others = tuple(record for token, record in records.items() if record is not None and token in said)
+            counting = {str(claim.path) for claim in claims.values()}
+            for asked in take_asks(self.folder, names, set(self._held)):
+                self._asked.put(asked)
+            self._seen = {path: seen for path, seen in self._seen.items() if path in counting}
+            self._look_at_clips()
+
+    def _start(self) -> None:
+        if self._has_thread and (self._thread is None or not self._thread.is_alive()):
+            self._thread = threading.Thread(target=self._run, name="claims", daemon=True)
+            self._thread.start()
+
+    def _run(self) -> None:
+        while self._held or self._is_watching:
+            try:
+                self.look()
+            except Exception:  # the thread must go on: others take a silent process for dead
+                logger.exception("claims could not be looked at")
+            self._wake.wait(LOOK_EVERY_S)
+            self._wake.clear()
+
+    def _say(self) -> None:
+        """Write this process's record. Raises OSError."""
+        self._beat += 1
+        self._beaten_s = self._clock()
+        path = holder_path(self.folder, self.token)
+        record = HolderRecord(self.token, this_process(), pid_space(), self._beat, self._load, dict(self._describe()))
+        try:
+            write_holder(path, record)
+        except OSError:
+            os.utime(path)  # a full disk keeps nobody from saying that it lives; no file yet is an error
+            raise
+
+    def _check_held(self, key: str) -> None:
+        claim = self._held.get(key)
+        if claim is None:
+            return
+        try:
+            newest = newest_claim(self.folder, key)
+        except OSError:
+            return
+        if newest is None or newest.number < claim.number:  # somebody has removed its file
+            with suppress(OSError):
+                if make_claim(claim, self.token):
+                    return
+                newest = newest_claim(self.folder, key)
+        if newest is not None and newest.number > claim.number:
+            self._lost.add(key)
+
+    def _judged(self, claim: ClaimFile, records: Mapping[str, HolderRecord | None] | None = None) -> Elsewhere:
+        """A claim, and whether its holder has ended."""
+        token = claim.token()
+        path = holder_path(self.folder, token) if token else claim.path
+        record = None
+        if token:
+            record = read_holder(path) if records is None or token not in records else records[token]
+        if record is not None and record.is_gone:
+            return Elsewhere(claim.key, record, is_dead=True)
+        try:
+            state: object = (None if record is None else record.beat, path.stat().st_mtime_ns)
+        except OSError:
+            state = None
+        name = str(claim.path)
+        before = self._seen.get(name)
+        if before is None or before[0] != state:
+            self._seen[name] = (state, self._clock(), 0 if before is None else before[2] + 1)
+        return Elsewhere(claim.key, record, is_dead=self._clock() - self._seen[name][1] >= DEAD_AFTER_S)
+
+    def _has_changed(self, claim: ClaimFile) -> bool:
+        """Whether its holder has been heard of while this process watched."""
+        return self._seen[str(claim.path)][2] > 0
+
+    def _look_at_clips(self) -> None:
+        folder = self.folder / "clips"
+        try:
+            changed_ns = folder.stat().st_mtime_ns
+            is_same, self._clips_time = changed_ns == self._clips_time, changed_ns
+            if is_same and self._is_clips_time_old:
+                return
+            self._is_clips_time_old = is_same  # looked at once more: times are coarse
+            found: dict[str, tuple[int, int]] = {}
+            with os.scandir(folder) as entries:
+                for entry in entries:
+                    if entry.name.endswith(".safetensors"):
+                        status = entry.stat(follow_symlinks=False)
+                        found[entry.name.removesuffix(".safetensors")] = (status.st_mtime_ns, status.st_size)
+        except OSError:
+            return
+        before, self._clip_files = self._clip_files, found
+        if before is not None:
+            for key in {*before, *found}:
+                if before.get(key) != found.get(key):
+                    self._changed.put(key)
+
+
+def _all_of(waiting: SimpleQueue[T]) -> list[T]:
+    """Everything that waits, oldest first."""
+    found: list[T] = []
+    with suppress(Empty):
+        while True:
+            found.append(waiting.get_nowait())
+    return found

@@ -1,0 +1,223 @@
+"""Claims of clips: one holder at a time, whoever dies, stalls, or has another clock; without locks."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from app.project.claims.asks import ask_holder
+from app.project.claims.claim_files import CLAIMS, ClaimFile, holder_path, list_claims, make_claim
+from app.project.claims.claims import DEAD_AFTER_S, Claims, ClipClaimed
+from app.project.claims.holder_record import ClipProgress, HolderRecord, pid_space, read_holder, write_holder
+from app.project.claims.left_over import check_unclaimed, live_claims, sweep_claims
+from app.project.lock import this_process
+from engine.errors import DiskError, ProjectError
+
+KEY = "0003"
+
+
+class Clock:
+    """Seconds that pass when told to."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def make(folder: Path, clock: Clock | None = None) -> Claims:
+    return Claims(folder, clock=clock or Clock(), has_thread=False)
+
+
+def far_away(folder: Path, *, beat: int = 1, key: str = KEY, number: int = 1) -> HolderRecord:
+    """A claim of a process of another computer, whose process nobody here can look at."""
+    (folder / CLAIMS).mkdir(exist_ok=True)
+    owner = replace(this_process(), host="render-7", machine="another", boot="another", pid=1)
+    record = HolderRecord("f" * 32, owner, clips={key: ClipProgress(3, "running", "render-7", step=5, n_steps=9)})
+    record = msgspec.structs.replace(record, beat=beat)
+    write_holder(holder_path(folder, record.token), record)
+    make_claim(ClaimFile(folder, key, number), record.token)
+    return record
+
+
+def test_one_holder_at_a_time(tmp_path: Path) -> None:
+    one, other = make(tmp_path), make(tmp_path)
+    one.take(KEY)
+    with pytest.raises(ClipClaimed, match="This program trains this clip") as refused:
+        other.take(KEY)
+    assert refused.value.is_sure, "a living process of this computer"
+    other.take("0004")
+    one.release(KEY)
+    other.take(KEY)
+    other.close()
+    assert list((tmp_path / CLAIMS).iterdir()) == []
+
+
+def test_one_that_falls_silent_is_dead_after_a_minute_of_the_watchers_own_clock(tmp_path: Path) -> None:
+    clock = Clock()
+    claims, record = make(tmp_path, clock), far_away(tmp_path)
+    os.utime(holder_path(tmp_path, record.token), (4e9, 4e9))  # its clock is decades ahead
+    with pytest.raises(ClipClaimed, match="computer render-7") as refused:
+        claims.take(KEY)
+    assert not refused.value.is_sure
+    clock.now_s = DEAD_AFTER_S - 1
+    far_away(tmp_path, beat=2)  # it lives
+    with pytest.raises(ClipClaimed) as refused:
+        claims.take(KEY)
+    assert refused.value.is_sure
+    clock.now_s = 2 * DEAD_AFTER_S - 2
+    with pytest.raises(ClipClaimed):
+        claims.take(KEY)
+    clock.now_s = 2 * DEAD_AFTER_S - 1
+    claims.take(KEY)
+    assert list_claims(tmp_path)[KEY].number == 2
+    claims.release(KEY)
+    assert list_claims(tmp_path) == {}, "with the claims that count less"
+
+
+def test_one_that_was_taken_for_dead_finds_its_claim_lost(tmp_path: Path) -> None:
+    clock = Clock()
+    slow, other = make(tmp_path), make(tmp_path, clock)
+    slow.take(KEY)
+    path = holder_path(tmp_path, slow.token)
+    record = read_holder(path)
+    assert record is not None
+    write_holder(path, msgspec.structs.replace(record, owner=replace(record.owner, host="far", boot="x", machine="x")))
+    with pytest.raises(ClipClaimed):
+        other.take(KEY)
+    clock.now_s = DEAD_AFTER_S
+    other.take(KEY)
+    assert not slow.is_lost(KEY)
+    with pytest.raises(ClipClaimed, match="had said nothing"):
+        slow.check(KEY)
+    slow.look()
+    assert slow.is_lost(KEY)
+    slow.release(KEY)
+    other.check(KEY)  # raises nothing: it was not the slow one's to remove
+
+
+def test_a_process_of_this_computer_that_has_ended_is_dead_at_once(tmp_path: Path) -> None:
+    context = multiprocessing.get_context("spawn")
+    child = context.Process(target=_claim_and_die, args=(str(tmp_path),))
+    child.start()
+    child.join(60)
+    assert child.exitcode == 9
+    assert list(list_claims(tmp_path)) == [KEY]
+    assert live_claims(tmp_path) == {}
+    claims = make(tmp_path)
+    claims.take(KEY)
+    assert list_claims(tmp_path)[KEY].number == 2
+    claims.close()
+    sweep_claims(tmp_path)
+    assert list((tmp_path / CLAIMS).iterdir()) == []
+
+
+def _claim_and_die(folder: str) -> None:
+    Claims(Path(folder), has_thread=False).take(KEY)
+    os._exit(9)
+
+
+def test_of_many_at_once_one_gets_it(tmp_path: Path) -> None:
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(4) as pool:
+        won = pool.starmap(_try_often, [(str(tmp_path), number) for number in range(4)])
+    taken = sorted(key for keys in won for key in keys)
+    assert taken == [f"{number:04d}" for number in range(200)], "each once"
+
+
+def _try_often(folder: str, number: int) -> list[str]:
+    claims, won = Claims(Path(folder), has_thread=False), []
+    for key in (f"{index:04d}" for index in range(200)):
+        try:
+            claims.take(key)
+            won.append(key)
+        except ClipClaimed:
+            continue
+    return won
+
+
+def test_containers_of_one_computer_do_not_count_each_others_processes(tmp_path: Path) -> None:
+    (tmp_path / CLAIMS).mkdir()
+    record = HolderRecord("e" * 32, replace(this_process(), pid=2**22 - 3, start=""), space="pid:[1]")
+    write_holder(holder_path(tmp_path, record.token), record)
+    make_claim(ClaimFile(tmp_path, KEY, 1), record.token)
+    assert KEY in live_claims(tmp_path), "no process of this number here says nothing"
+    with pytest.raises(ClipClaimed):
+        make(tmp_path).take(KEY)
+    assert pid_space() != "pid:[1]"
+
+
+def test_what_others_train_is_seen_and_they_can_be_asked(tmp_path: Path) -> None:
+    far_away(tmp_path)
+    claims, other = make(tmp_path), make(tmp_path)
+    claims.look()
+    assert claims.elsewhere[KEY].progress == ClipProgress(3, "running", "render-7", step=5, n_steps=9)
+    assert [holder.owner.host for holder in claims.others] == ["render-7"]
+    with pytest.raises(ProjectError, match=r"computer render-7 .* trains clip 3"):
+        check_unclaimed(tmp_path)
+    other.take("0004")
+    ask_holder(tmp_path, "0004", "pause")
+    ask_holder(tmp_path, KEY, "stop")
+    (tmp_path / CLAIMS / "ask-0004x.json").write_text("{}")
+    other.look()
+    assert other.take_asked() == [("0004", "pause")]
+    assert other.take_asked() == []
+    (tmp_path / CLAIMS / "ask-0004.json").write_text(json.dumps({"do": "format the disk"}))
+    other.look()
+    assert other.take_asked() == []
+
+
+def test_clips_that_others_finish_are_noticed(tmp_path: Path) -> None:
+    (tmp_path / CLAIMS).mkdir()
+    (tmp_path / "clips").mkdir()
+    claims = make(tmp_path)
+    claims.look()
+    assert claims.take_changed() == set()
+    (tmp_path / "clips" / "0003.safetensors").write_bytes(b"new")
+    claims.look()
+    assert claims.take_changed() == {KEY}
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"x" * 5000, b"{}"])
+def test_damaged_claims_are_claims_until_a_minute_has_passed(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / CLAIMS).mkdir()
+    (tmp_path / CLAIMS / f"{KEY}.0001").write_bytes(content)
+    (tmp_path / CLAIMS / "holder-xyz.json").write_bytes(content)
+    (tmp_path / CLAIMS / f"{KEY}.x").write_bytes(content)
+    clock = Clock()
+    claims = make(tmp_path, clock)
+    with pytest.raises(ClipClaimed, match="Another program"):
+        claims.take(KEY)
+    clock.now_s = DEAD_AFTER_S
+    claims.take(KEY)
+
+
+def test_a_claim_whose_file_somebody_removed_is_made_again(tmp_path: Path) -> None:
+    claims = make(tmp_path)
+    claims.take(KEY)
+    list_claims(tmp_path)[KEY].path.unlink()
+    claims.look()
+    assert not claims.is_lost(KEY)
+    assert KEY in list_claims(tmp_path)
+
+
+def test_a_disk_that_refuses_is_an_error_that_leaves_nothing_claimed(tmp_path: Path, monkeypatch) -> None:
+    claims = make(tmp_path)
+    claims.take("0001")
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("app.project.claims.claims.write_holder", refuse)
+    before = holder_path(tmp_path, claims.token).stat().st_mtime_ns
+    with pytest.raises(DiskError, match="No space left"):
+        claims.take(KEY)
+    assert holder_path(tmp_path, claims.token).stat().st_mtime_ns >= before, "a full disk makes nobody look dead"
+    assert list(list_claims(tmp_path)) == ["0001"]
