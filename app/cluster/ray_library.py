@@ -1,0 +1,24 @@
+"""Ray, which is an extra: imported once it is used, and never before its settings are made."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from engine.errors import ProjectError
+
+
+def ray_library() -> Any:
+    """The module.
+
+    Raises:
+        ProjectError: It is not installed.
+    """
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # it would report to its makers
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # or it warns about graphics cards
+    try:
+        import ray
+        import ray.exceptions
+    except ImportError as error:
+        raise ProjectError("Ray is not installed.", hint="Install it with: pip install clipgstream[cluster]") from error
+    return ray
