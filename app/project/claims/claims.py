@@ -118,6 +118,7 @@ class Claims:
     ) -> None:
         self.folder = folder
         self.token = uuid.uuid4().hex
+        self._owner = this_process()
         self._describe, self._clock, self._has_thread = describe, clock, has_thread
         self._held: dict[str, ClaimFile] = {}
         self._lost: set[str] = set()
@@ -154,6 +155,8 @@ class Claims:
                 self._held[key] = self._claimed(key)
             except OSError as error:
                 raise disk_error(error, what="The claim of the clip", path=self.folder / CLAIMS) from error
+            finally:
+                self._be_silent_without_claims()
             if key in self._elsewhere:
                 self._elsewhere = {other: known for other, known in self._elsewhere.items() if other != key}
             self._lost.discard(key)
@@ -185,10 +188,13 @@ class Claims:
                 remove_claim(claim)
                 drop_ask(self.folder, key)
             self._lost.discard(key)
-            if not self._held:
-                with suppress(OSError):
-                    holder_path(self.folder, self.token).unlink(missing_ok=True)
+            self._be_silent_without_claims()
         self._wake.set()
+
+    def _be_silent_without_claims(self) -> None:
+        if not self._held:
+            with suppress(OSError):
+                holder_path(self.folder, self.token).unlink(missing_ok=True)
 
     def is_lost(self, key: str) -> bool:
         """Whether another process has taken over a clip claimed here, for it took this one for dead."""
@@ -291,7 +297,7 @@ class Claims:
         self._beat += 1
         self._beaten_s = self._clock()
         path = holder_path(self.folder, self.token)
-        record = HolderRecord(self.token, this_process(), pid_space(), self._beat, self._load, dict(self._describe()))
+        record = HolderRecord(self.token, self._owner, pid_space(), self._beat, self._load, dict(self._describe()))
         try:
             write_holder(path, record)
         except OSError:

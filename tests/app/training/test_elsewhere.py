@@ -1,0 +1,172 @@
+"""Two services of one project, as of two processes: who trains what, and what each sees of the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from functools import partial
+
+import pytest
+
+from app.evaluation.headless import train_clips
+from app.project.claims.asks import ask_holder
+from app.project.claims.claims import Claims
+from app.project.disk.discarding import discard, training_of
+from app.project.opening.opened_project import OpenedProject
+from app.project.opening.project_access import open_for_clips
+from app.training.messages import ClipTrained, TrainingFailed
+from app.training.service import TrainingService
+from app.training.training_status import ClipStatuses, training_status
+from engine.errors import ProjectError
+from tests.app.conftest import inline
+from tests.app.fakes import make_fake, make_slow
+from tests.app.training.test_train_queue import run_out, six
+
+__all__ = ["six"]
+
+
+def make_service(opened: OpenedProject, make_training=make_fake, *, is_other: bool = False) -> TrainingService:
+    """is_other: As of another process, which has no lock."""
+    project = open_for_clips(opened.project.folder) if is_other else opened.project
+    service = TrainingService(
+        project,
+        opened.clips,
+        holdout=opened.holdout,
+        launch=partial(inline, make_training=make_training),
+        is_window_open=False,
+        claims=Claims(project.folder, has_thread=False),
+    )
+    service.claims._describe = service._described
+    return service
+
+
+def make_service_like(one: TrainingService) -> TrainingService:
+    service = TrainingService(
+        open_for_clips(one.project.folder),
+        one.clips,
+        holdout=one.holdout,
+        launch=partial(inline, make_training=make_fake),
+        is_window_open=False,
+        claims=Claims(one.project.folder, has_thread=False),
+    )
+    service.claims._describe = service._described
+    return service
+
+
+@pytest.fixture
+def pair(six: OpenedProject) -> Iterator[tuple[TrainingService, TrainingService]]:
+    one, other = make_service(six), make_service(six, make_slow, is_other=True)
+    one.enqueue(0)
+    run_out(one)
+    other.catalog.update(0)
+    yield one, other
+    one.close()
+    other.close()
+
+
+def look(*services: TrainingService) -> None:
+    for service in services:
+        service.claims._beaten_s = -1e9  # a beat is due
+        service.claims.look()
+
+
+def test_a_clip_that_another_process_trains_is_left_to_it(pair) -> None:
+    one, other = pair
+    other.enqueue(1)
+    other.poll()
+    look(other, one)
+    assert one.next_clip_index == 2
+    shown = training_status(one).trainings
+    assert [(clip.clip_index, clip.is_elsewhere) for clip in shown] == [(1, True)]
+    assert ClipStatuses(one).all()[1].state in ("training", "preparing")
+    one.add(1)
+    one.enqueue(2)
+    assert ended_of(one) == [2]
+    assert list(one.queue) == [1], "it waits"
+    other.stop(1)
+    run_out(other)
+    look(one)
+    assert ended_of(one) == [1], "given up there, trained here"
+
+
+def test_what_another_process_finishes_is_finished_here(pair) -> None:
+    one, _ = pair
+    other = make_service_like(one)
+    look(one)
+    other.enqueue(3)
+    look(one)
+    one.add(3)
+    one.go_on()
+    assert not one.runs
+    run_out(other)
+    look(one)
+    assert [(index, type(event)) for index, event in one.poll()] == [(3, ClipTrained)]
+    assert one.catalog[3].state == "trained"
+    assert not one.queue
+    other.close()
+
+
+def ended_of(service: TrainingService) -> list[int]:
+    """Clips that end before nothing trains any more, though others may wait."""
+    ended = list[int]()
+    for _ in range(1000):
+        ended += [index for index, event in service.poll() if isinstance(event, ClipTrained)]
+        if not service.runs:
+            break
+        time.sleep(0.002)  # clips arrive on a thread
+    return ended
+
+
+def test_others_can_pause_and_stop_it(pair) -> None:
+    one, other = pair
+    other.enqueue(1)
+    other.poll()
+    key = other.project.clip_name(1)
+    for ask, state in (("pause", "paused"), ("resume", "running")):
+        ask_holder(one.project.folder, key, ask)
+        look(other)
+        other.poll()
+        other.poll()
+        assert other.runs[1].is_paused == (state == "paused")
+    ask_holder(one.project.folder, key, "stop")
+    look(other)
+    run_out(other)
+    assert not other.runs
+    assert one.project.checkpoint_path(1).is_file(), "progress is kept"
+
+
+def test_a_run_whose_claim_is_lost_ends_and_puts_nothing_in_place(pair) -> None:
+    _, other = pair
+    other.enqueue(1)
+    other.poll()
+    other.claims._lost.add(other.project.clip_name(1))
+    events = [event for index, event in other.poll() if index == 1]
+    assert isinstance(events[-1], TrainingFailed)
+    assert events[-1].kind == "ClipClaimed"
+    assert not other.project.is_trained(1)
+
+
+def test_train_clips_waits_for_what_another_process_trains(pair) -> None:
+    one, _ = pair
+    other = make_service_like(one)
+    other.enqueue(1)
+    look(one)
+
+    def meanwhile(_: float) -> None:
+        run_out(other)
+        look(one)
+
+    said: list[object] = []
+    outcomes = train_clips(
+        one, [1, 2], on_status=said.append, on_event=said.append, on_outcome=said.append, sleep=meanwhile
+    )
+    assert sorted((outcome.clip_index, outcome.state) for outcome in outcomes) == [(1, "trained"), (2, "trained")]
+    other.close()
+
+
+def test_settings_cannot_change_while_another_process_trains(pair) -> None:
+    one, other = pair
+    other.enqueue(1)
+    other.poll()
+    with pytest.raises(ProjectError, match="trains clip 1"):
+        discard(one.project, training_of(one.project))
