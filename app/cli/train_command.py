@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+from functools import partial
 
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
@@ -20,12 +21,16 @@ from app.cli.single_clip import train_single_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.cli.training_settings import add_training_settings
+from app.cluster.cluster import Cluster
+from app.cluster.cluster_worker import ClusterWorker
+from app.cluster.forecast import training_bytes
 from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.speed import step_time
 from app.project.clips.clip_catalog import ClipCatalog
 from app.residuals.kept_reading import note_kept
+from app.status import TrainingStatus
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.storage.json_files import json_text
@@ -72,6 +77,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     command.add_argument(
+        "--cluster",
+        metavar="WHERE",
+        help="train on the computers of a Ray cluster: auto, HOST:PORT, or local:N for N clips side by side here",
+    )
+    command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
     command.add_argument(
@@ -91,18 +101,25 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     project, capture = open_for_training(options, line.say)
     is_refused, outcomes = False, []
     service: TrainingService | None = None
+    cluster: Cluster | None = None
     try:
         clips = project.clips(capture.n_frames)
         chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
         holdout = capture.camera_indices(project.settings.holdout)
-        service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False)
+        if options.cluster is not None:
+            cluster = Cluster(options.cluster, project, capture, n_bytes=training_bytes(project, capture, clips))
+            launch = partial(ClusterWorker, cluster=cluster)
+        n_workers = 1 if cluster is None else cluster.n_slots
+        service = TrainingService(
+            project, clips, holdout=holdout, launch=launch, is_window_open=False, n_workers=n_workers
+        )
         note_kept(service.catalog, project, capture)
         names = ", ".join(project.settings.holdout) or "none"
         line.say(
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
-        for sentence in capture.warnings:
+        for sentence in (*capture.warnings, *(() if cluster is None else cluster.words)):
             line.say(f"Note: {sentence}")
         first = project.settings.reference_clip  # the others cannot begin before it
         plans = PlanLines(
@@ -113,20 +130,27 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             step_time=step_time,
             is_quiet=options.quiet,
         )
+
+        def follow(status: TrainingStatus) -> None:
+            show_status(line, status)
+            if cluster is not None and service is not None:
+                service.n_workers = cluster.n_slots  # computers come and go
+
         outcomes = train_clips(
             service,
             sorted(chosen, key=lambda clip_index: clip_index != first),
             on_begin=lambda clip_index: plans.begin(clips[clip_index]),
             is_again=options.again,
             own=parse_overrides(options.own_assignments) or None,
-            on_status=lambda status: show_status(line, status),
+            on_status=follow,
             on_event=lambda event: show_event(line, event),
             on_outcome=lambda outcome: (show_outcome(line, outcome), plans.end(outcome)),
         )
         is_refused = outcomes[-1].state == "failed" and outcomes[-1].kind in BAD_INPUT_KINDS
         line.finish()
         if options.json:
-            print(json_text(train_document(project, capture, outcomes), indent=2))
+            document = train_document(project, capture, outcomes)
+            print(json_text(document if cluster is None else document | {"cluster": cluster.document()}, indent=2))
     except (CaptureError, ProjectError) as error:
         is_refused = not isinstance(error, DiskError)
         raise
@@ -134,6 +158,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         line.finish()
         if service is not None:
             service.close()
+        if cluster is not None:
+            cluster.close()
         has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
         if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
             project.remove_files()

@@ -16,7 +16,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from app.cluster.nodes import Node, Seat, take_seat
-from app.cluster.ray_library import ray_library
+from app.cluster.ray_library import check_ray, ray_library
 from app.cluster.runner import look_around
 from app.cluster.versions import difference
 from app.project.project import Project
@@ -33,8 +33,6 @@ _LOCAL = re.compile(r"local:(\d{1,5})")
 _ADDRESS = re.compile(r"(?P<host>[^:/\s]+|\[[0-9a-fA-F:]+\]):(?P<port>\d{1,5})")
 REACH_TIMEOUT_S = 5.0
 CONNECT_TIMEOUT_S = 15.0
-LOCAL_TIMEOUT_S = 120.0
-"""A busy computer takes so long to start Ray."""
 LOOK_TIMEOUT_S = 90.0
 WATCH_EVERY_S = 2.0
 STORE_BYTES = 80 << 20
@@ -68,9 +66,11 @@ class Cluster:
         self._notes: SimpleQueue[str] = SimpleQueue()
         self._guard, self._is_closing = threading.RLock(), threading.Event()
         self._kept = ExitStack()
-        self._ray = ray_library()
+        check_ray()
         try:
             connect(address, self._kept)
+            self._ray = ray_library()
+            self._kept.callback(self._ray.shutdown)
             self._nonce = secrets.token_hex(16)
             self._probe = project.live_dir / f"probe-{self._nonce}"
             with atomic_path(self._probe, makes_parents=False) as partial:
@@ -86,8 +86,6 @@ class Cluster:
     def close(self) -> None:
         """Let go of the cluster; one that was started here ends."""
         self._is_closing.set()
-        if self._ray.is_initialized():
-            self._ray.shutdown()
         self._kept.close()
 
     # ---------------------------------------------------------------- places
@@ -97,6 +95,16 @@ class Cluster:
         """All computers that were ever part of it."""
         with self._guard:
             return list(self._nodes.values())
+
+    @property
+    def words(self) -> list[str]:
+        """Sentences about its computers without a full stop, for the user."""
+        usable = [node for node in self.nodes if node.is_usable]
+        copied = [node.name for node in usable if not node.sees_project]
+        found = [f"the cluster trains {self.n_slots} clips side by side, on {len(usable)} computers"]
+        if copied:
+            found.append(f"{', '.join(copied)} cannot see the project, and gets copies of what it needs")
+        return found
 
     @property
     def n_slots(self) -> int:
@@ -239,9 +247,9 @@ def connect(address: str, kept: ExitStack) -> None:
     options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     local = _LOCAL.fullmatch(address)
     if local is not None:
-        timeout_s, options = LOCAL_TIMEOUT_S, options | _local_options(int(local[1]), kept)
+        options |= _local_options(int(local[1]), kept)
     elif address == AUTO or _ADDRESS.fullmatch(address):
-        timeout_s, options = CONNECT_TIMEOUT_S, options | {"address": address}
+        options["address"] = address
         if address != AUTO:
             _check_reachable(address)
     else:
@@ -249,8 +257,24 @@ def connect(address: str, kept: ExitStack) -> None:
             f"--cluster is '{address}', which is not the address of a cluster.",
             hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
         )
-    failed: list[Exception] = []
     before = signal.getsignal(signal.SIGTERM)
+    try:
+        if local is not None:
+            ray_library().init(**options)  # here: what a thread starts ends with that thread
+        else:
+            _init_in_time(address, options)
+    except EngineError:
+        raise
+    except Exception as error:
+        raise _refused(address, error) from error
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, before)
+
+
+def _init_in_time(address: str, options: dict[str, Any]) -> None:
+    """On a thread: where something else than Ray answers, it waits for minutes and hears no signal."""
+    failed: list[Exception] = []
 
     def work() -> None:
         try:
@@ -258,19 +282,16 @@ def connect(address: str, kept: ExitStack) -> None:
         except Exception as error:  # noqa: BLE001 - handed to the thread that waits
             failed.append(error)
 
-    # on a thread: where something else than Ray answers, it waits for minutes and hears no signal
     thread = threading.Thread(target=work, name="connecting", daemon=True)
     thread.start()
-    thread.join(timeout_s)
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, before)
+    thread.join(CONNECT_TIMEOUT_S)
     if thread.is_alive():
         raise TrainingError(
-            f"No Ray cluster answers at {address} within {timeout_s:.0f} s.",
+            f"No Ray cluster answers at {address} within {CONNECT_TIMEOUT_S:.0f} s.",
             hint="Check the address and, where the cluster asks for one, the token (RAY_AUTH_TOKEN_PATH).",
         )
     if failed:
-        raise _refused(address, failed[0]) from failed[0]
+        raise failed[0]
 
 
 def _local_options(n: int, kept: ExitStack) -> dict[str, Any]:

@@ -142,7 +142,7 @@ class FarChild(Child[Job, Event, Result]):
             self.fault, ending = "here", error
         except ChildFailed as error:
             self.fault, ending = "" if error.is_final else "lost", error
-        except Exception as error:  # noqa: BLE001 - the edge of the thread: whoever waits has to hear of it
+        except Exception as error:
             logger.exception("a child on %s", self._name)
             ending = ChildFailed(f"{self.kind.what} failed ({error})", is_final=True)
         self._remote.kill()

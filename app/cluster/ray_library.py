@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+import logging
 import os
 from typing import Any
 
@@ -16,9 +18,15 @@ def ray_library() -> Any:
     """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # it would report to its makers
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # or it warns about graphics cards
-    try:
-        import ray
-        import ray.exceptions
-    except ImportError as error:
-        raise ProjectError("Ray is not installed.", hint="Install it with: pip install clipgstream[cluster]") from error
+    check_ray()
+    import ray
+    import ray.exceptions
+
+    logging.getLogger("ray").setLevel(logging.ERROR)  # what it has to say comes as an error
     return ray
+
+
+def check_ray() -> None:
+    """Check that Ray is installed, without importing it: it reads its settings then. Raises ProjectError."""
+    if importlib.util.find_spec("ray") is None:
+        raise ProjectError("Ray is not installed.", hint="Install it with: pip install clipgstream[cluster]")
