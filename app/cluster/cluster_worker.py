@@ -35,7 +35,7 @@ _OF_THE_CAPTURE = ("CaptureError", "OutsideError", "ProjectGone")
 
 
 @dataclass(frozen=True, slots=True)
-class Attempt:
+class NodeAttempt:
     """A clip on one computer: its place, and its process there."""
 
     seat: Seat
@@ -56,7 +56,7 @@ class ClusterWorker:
     def __init__(self, job: TrainJob, project: Project, cluster: Cluster, make: str = BUILD) -> None:
         self.job = job if job.is_window_open else replace(job, live_view="off")  # nobody looks, and it would be sent
         self._project, self._cluster, self._make = project, cluster, make
-        self._attempt: Attempt | None = None
+        self._attempt: NodeAttempt | None = None
         self._commands: list[Command] = []
         self._avoided: list[Node] = []
         self._said: list[Event] = []
@@ -107,7 +107,7 @@ class ClusterWorker:
             return started[0]
 
         worker = ProcessWorker(replace(self.job, n_threads=seat.n_threads), self._project, self._make, start=start)
-        self._attempt = Attempt(seat, worker, started[0])
+        self._attempt = NodeAttempt(seat, worker, started[0])
         for command in self._commands:
             worker.send(command)
         return [StageReported(f"Starting on {seat.node.name}", 0.0)]
@@ -121,7 +121,7 @@ class ClusterWorker:
 
         return CopiedProject(self._cluster, seat.node, task, is_whole=self._is_whole, report=report)
 
-    def _events(self, attempt: Attempt) -> list[Event]:
+    def _events(self, attempt: NodeAttempt) -> list[Event]:
         if self._stop is not None and attempt.child.pid is None:
             attempt.worker.close(timeout_s=0.0)
             return [self._stopped(self._stop)]
@@ -136,7 +136,7 @@ class ClusterWorker:
         title = f"Clip {self.job.clip_index} resumes, on another computer if there is one"
         return [*events[:-1], WarningRaised(title, f"{why.rstrip('.')}.")]
 
-    def _why_again(self, ending: TrainingFailed | WorkerDied, attempt: Attempt) -> str | None:
+    def _why_again(self, ending: TrainingFailed | WorkerDied, attempt: NodeAttempt) -> str | None:
         """Why another attempt may succeed, elsewhere if possible; None where it would be the same."""
         node, fault = attempt.seat.node, attempt.child.fault
         is_copied = not node.sees_project

@@ -33,7 +33,7 @@ _lock = threading.Lock()
 
 
 @dataclass(frozen=True, slots=True)
-class Content:
+class SentFile:
     """A file, or its beginning.
 
     Attributes:
@@ -49,7 +49,7 @@ class Content:
     digest: str
 
 
-def contents_of(project: Project, capture: Capture, job: TrainJob, folder: Path, *, is_whole: bool) -> list[Content]:
+def contents_of(project: Project, capture: Capture, job: TrainJob, folder: Path, *, is_whole: bool) -> list[SentFile]:
     """All files that a training reads. Reads every file once, to hash it. Raises OSError.
 
     Args:
@@ -68,7 +68,7 @@ def contents_of(project: Project, capture: Capture, job: TrainJob, folder: Path,
     return found + [_content(name, path) for name, path in files.items() if path.is_file()]
 
 
-def progress_contents(project: Project, job: TrainJob) -> tuple[int, list[Content]]:
+def progress_contents(project: Project, job: TrainJob) -> tuple[int, list[SentFile]]:
     """Steps of the unfinished training in the project, and its files; -1 and nothing where there is none."""
     files = project.files(job.clip_index)
     header = read_clip_header(files.checkpoint)
@@ -97,7 +97,7 @@ def _plain_document(project: Project, folder: Path) -> Path:
 
 
 def _of_capture(capture: Capture, job: TrainJob, *, is_whole: bool) -> Iterator[tuple[str, Path, int | None]]:
-    """Names, places and bytes of a capture's files: media that its cameras use, and whatever is no medium."""
+    """Names, places and bytes of a capture's files: media that its cameras use, and all other files."""
     heads, whole, media = set[Path](), set[Path](), set[Path]()
     first = capture.first_frame + job.clip.start
     clip = range(first, first + job.clip.n_frames)
@@ -135,11 +135,11 @@ def _files_of(source: FrameSource) -> Sequence[Path]:
     return source.files if isinstance(source, ImageFrames) else [source.path]
 
 
-def _content(name: str, path: Path, n_bytes: int | None = None) -> Content:
+def _content(name: str, path: Path, n_bytes: int | None = None) -> SentFile:
     state = path.stat()
     size = state.st_size if n_bytes is None else min(n_bytes, state.st_size)
     with _lock:  # several clips ask for the same files at once
-        return Content(name, path, size, _digest(path, size, state.st_mtime_ns))
+        return SentFile(name, path, size, _digest(path, size, state.st_mtime_ns))
 
 
 @lru_cache(maxsize=1 << 17)

@@ -12,7 +12,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from app.cluster.cluster import Cluster
-from app.cluster.contents import Content, contents_of, job_key, progress_contents
+from app.cluster.contents import SentFile, contents_of, job_key, progress_contents
 from app.cluster.far_child import NodeRefused, Remote
 from app.cluster.mirror import file_digest
 from app.cluster.nodes import Node
@@ -75,7 +75,7 @@ class CopiedProject:
                 there = Path(remote.call("mirror", job_key(project, job)))
                 self._send(remote, contents)
                 step, progress = progress_contents(project, job)
-                if progress and step > remote.call("build", _names(contents), job.key):
+                if remote.call("build", _names(contents), job.key) < step:
                     self._send(remote, progress)
                     remote.call("build", _names([*contents, *progress]), job.key)
             except OSError as error:
@@ -114,7 +114,7 @@ class CopiedProject:
 
     # ---------------------------------------------------------------- there
 
-    def _send(self, remote: Remote, contents: Sequence[Content]) -> None:
+    def _send(self, remote: Remote, contents: Sequence[SentFile]) -> None:
         """Send what is not there yet."""
         by_digest = {content.digest: content for content in contents}
         wanted = [by_digest[digest] for digest in remote.call("missing", list(by_digest))]
@@ -173,11 +173,11 @@ class CopiedProject:
         return path.relative_to(self._cluster.project.folder).as_posix()
 
 
-def _names(contents: Sequence[Content]) -> list[tuple[str, str]]:
+def _names(contents: Sequence[SentFile]) -> list[tuple[str, str]]:
     return [(content.name, content.digest) for content in contents]
 
 
-def _parts(contents: Sequence[Content]) -> Iterator[tuple[str, int, bytes, bool]]:
+def _parts(contents: Sequence[SentFile]) -> Iterator[tuple[str, int, bytes, bool]]:
     for content in contents:
         offset = 0
         with open(content.path, "rb") as file:

@@ -63,6 +63,7 @@ class Driver:
         until_s = time.monotonic() + DEADLINE_S
         while not is_done():
             assert time.monotonic() < until_s, self.events[-20:]
+            assert not self.service.queue.failed, self.events[-5:]
             self.events += self.service.poll()
             time.sleep(0.02)
 
