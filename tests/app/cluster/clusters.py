@@ -107,21 +107,22 @@ def driving(
 
 
 @contextmanager
-def ray_nodes(n: int, caches: Path) -> Iterator[Any]:
+def ray_nodes(n: int, caches: Path, **environment: str) -> Iterator[Any]:
     """A Ray cluster: a head that trains nothing, and nodes of one core. Each has a folder for caches of its own."""
     from ray.cluster_utils import Cluster as RayCluster
 
     made = RayCluster(initialize_head=True, head_node_args={"num_cpus": 0, "object_store_memory": 80 << 20})
     try:
         for k in range(n):
-            add_node(made, caches / str(k))
+            add_node(made, caches / str(k), **environment)
         yield made
     finally:
         made.shutdown()
 
 
-def add_node(made: Any, cache: Path) -> Any:
+def add_node(made: Any, cache: Path, **environment: str) -> Any:
     """Add a node of one core. cache: Its folder for caches."""
-    node = made.add_node(num_cpus=1, env_vars={"XDG_CACHE_HOME": str(cache)}, object_store_memory=80 << 20)
+    variables = {"XDG_CACHE_HOME": str(cache), **environment}
+    node = made.add_node(num_cpus=1, env_vars=variables, object_store_memory=80 << 20)
     made.wait_for_nodes()
     return node
