@@ -17,7 +17,12 @@ from app.training.train_queue import needed_clips
 from engine.errors import ProjectError
 from engine.storage.json_files import json_text
 
-_CONTRADICTED = (("clips", ":", "--clips"), ("again", False, "--again"), ("is_starting_over", False, "--start-over"))
+_CONTRADICTED = (
+    ("clips", ":", "--clips"),
+    ("again", False, "--again"),
+    ("is_starting_over", False, "--start-over"),
+    ("cluster", None, "--cluster"),
+)
 """Options that ask for more than that one clip is there in the end: name, default, as written."""
 
 

@@ -65,6 +65,7 @@ class Cluster:
         self._looks: dict[Any, tuple[Node, float]] = {}
         self._notes: SimpleQueue[str] = SimpleQueue()
         self._guard, self._is_closing = threading.RLock(), threading.Event()
+        self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
         self._kept = ExitStack()
         check_ray()
         try:
@@ -72,7 +73,7 @@ class Cluster:
             self._ray = ray_library()
             self._kept.callback(self._ray.shutdown)
             self._nonce = secrets.token_hex(16)
-            self._probe = project.live_dir / f"probe-{self._nonce}"
+            self._probe = project.live_dir.absolute() / f"probe-{self._nonce}"
             with atomic_path(self._probe, makes_parents=False) as partial:
                 partial.write_text(self._nonce, "ascii")
             self._kept.callback(discard, self._probe)
@@ -80,12 +81,13 @@ class Cluster:
         except BaseException:
             self.close()
             raise
-        self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
         self._watcher.start()
 
     def close(self) -> None:
         """Let go of the cluster; one that was started here ends."""
         self._is_closing.set()
+        if self._watcher.is_alive():
+            self._watcher.join(WATCH_EVERY_S)
         self._kept.close()
 
     # ---------------------------------------------------------------- places

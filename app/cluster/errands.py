@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
@@ -22,6 +23,8 @@ from app.training.process import TrainTask
 from engine.errors import CaptureError, DiskError
 from engine.storage.files import checked_path, disk_error, open_to_append
 
+logger = logging.getLogger(__name__)
+
 PART_BYTES = 4 << 20
 CHECKPOINT_EVERY_S = 240.0
 """Between two that are fetched: a lost computer costs at most that much of a clip."""
@@ -36,7 +39,8 @@ class SharedProject:
 
     def begin(self, remote: Remote) -> TrainTask:
         """See `Errand`."""
-        return self._task
+        task = self._task  # where it runs there is another working directory
+        return replace(task, project=task.project.absolute(), log=task.log.absolute())
 
     def receive(self, remote: Remote, events: Sequence[Any]) -> None:
         """See `Errand`."""
@@ -95,6 +99,12 @@ class CopiedProject:
                         raise DiskError("The trained clip was removed before it was fetched.", hint="Train it again.")
                     self._fetch_log(remote)
                     remote.call("forget")
+                    sent, received = (
+                        count.get(self._task.job.clip_index, 0) / 1e6
+                        for count in (self._cluster.bytes_sent, self._cluster.bytes_received)
+                    )
+                    clip, name = self._task.job.clip_index, self._node.name
+                    logger.info("clip %d: %.2f MB sent to %s, %.2f MB received", clip, sent, name, received)
                 case SnapshotWritten(revision=revision):
                     self._fetch(remote, self._files.snapshot(revision), "A snapshot")
                 case TrainingStopped(is_kept=True) | TrainingFailed():
