@@ -24,7 +24,7 @@ from engine.capture.capture import Capture
 from engine.children.folder import child_folder
 from engine.errors import EngineError, ProjectError, TrainingError
 from engine.parallel import n_cores
-from engine.storage.files import atomic_path, discard
+from engine.storage.files import PARTIAL_PREFIX, discard, disk_error
 
 logger = logging.getLogger(__name__)
 
@@ -73,9 +73,9 @@ class Cluster:
             self._ray = ray_library()
             self._kept.callback(self._ray.shutdown)
             self._nonce = secrets.token_hex(16)
-            self._probe = project.live_dir.absolute() / f"probe-{self._nonce}"
-            with atomic_path(self._probe, makes_parents=False) as partial:
-                partial.write_text(self._nonce, "ascii")
+            # of a name that the next one to open the project sweeps where this process has died
+            self._probe = project.live_dir.absolute() / f"{PARTIAL_PREFIX}{os.getpid()}-probe-{self._nonce}"
+            self._write_probe()
             self._kept.callback(discard, self._probe)
             self._look_until_known()
         except BaseException:
@@ -89,6 +89,13 @@ class Cluster:
         if self._watcher.is_alive():
             self._watcher.join(WATCH_EVERY_S)
         self._kept.close()
+
+    def _write_probe(self) -> None:
+        try:
+            self._probe.parent.mkdir(exist_ok=True)
+            self._probe.write_text(self._nonce, "ascii")
+        except OSError as error:
+            raise disk_error(error, what="A file for the other computers to find", path=self._probe) from error
 
     # ---------------------------------------------------------------- places
 

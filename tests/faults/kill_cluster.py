@@ -113,6 +113,7 @@ class ClusterKillTest:
         self._work, self._made, self._rng = work, made, rng
         self._capture = write_capture(work / "ring")
         self._expected = undisturbed(work / "undisturbed", self._capture)
+        self._deck: list[str] = []
         self.tally = KillTally()
 
     def run(self, n_kills: int) -> None:
@@ -160,7 +161,9 @@ class ClusterKillTest:
         return driver.poll()
 
     def _kill(self, driver: subprocess.Popen[bytes]) -> str:
-        kind = self._rng.choice(KINDS)
+        if not self._deck:  # as many of each
+            self._deck = self._rng.sample(KINDS, len(KINDS))
+        kind = self._deck.pop()
         if kind == "driver":
             driver.kill()
             driver.wait()
@@ -174,6 +177,7 @@ class ClusterKillTest:
             mark = "app.training.process" if kind == "worker" else "ray::Runner"
             found = [pid for pid, name in _processes_of(self._work / "scratch") if mark in name]
             if not found:
+                self._deck.append(kind)
                 return ""
             with suppress(ProcessLookupError):
                 os.kill(self._rng.choice(found), signal.SIGKILL)

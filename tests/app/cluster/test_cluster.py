@@ -147,7 +147,7 @@ def test_a_worker_that_dies_again_and_again_fails_in_the_end(ray_cluster, make_o
 
 def test_a_training_that_fails_is_not_tried_elsewhere(ray_cluster, make_opened) -> None:
     opened = clips_of_one(make_opened)
-    settings = replace(opened.project.settings, overrides={"static_steps": 2})  # the fake fails there
+    settings = replace(opened.project.settings, overrides={"static_steps": 1})  # the fake fails then
     opened.project.update(settings)
     with driving(opened, ray_cluster.address, make="tests.app.fakes:make_fake") as driver:
         driver.service.enqueue(0)
