@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 
 
 def memory_bytes() -> int | None:
@@ -11,3 +14,42 @@ def memory_bytes() -> int | None:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
         return None
+
+
+def free_memory_bytes(root: Path = Path("/")) -> int | None:
+    """Memory that new processes may take without anything being swapped out: of the machine, or of what a container or
+    a batch job may use. None where the system does not say, as outside Linux.
+
+    Args:
+        root: Of the file system; tests bring their own.
+    """
+    with suppress(OSError, ValueError, StopIteration):
+        lines = (root / "proc/meminfo").read_text(encoding="ascii").splitlines()
+        free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
+        return max(min((free, *_left_in_groups(root))), 0)
+    return None
+
+
+def _left_in_groups(root: Path) -> Iterator[int]:
+    """What is left of the limit of each control group of this process, in either version of them."""
+    with suppress(OSError):
+        for line in (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines():
+            _, controllers, name = line.split(":", 2)
+            if controllers == "":
+                place, names = root / "sys/fs/cgroup", ("memory.max", "memory.current", "inactive_file")
+            elif "memory" in controllers.split(","):
+                place = root / "sys/fs/cgroup/memory"
+                names = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+            else:
+                continue
+            group = place / name.strip("/")  # does not exist where a container sees its own group as the top
+            for folder in (group, *group.parents):
+                if folder.is_relative_to(place):
+                    with suppress(OSError, ValueError):  # "max" means without a limit
+                        yield _left_in_group(folder, *names)
+
+
+def _left_in_group(folder: Path, limit: str, usage: str, cache: str) -> int:
+    rows = dict(line.split() for line in (folder / "memory.stat").read_text(encoding="ascii").splitlines())
+    used = int((folder / usage).read_text(encoding="ascii")) - int(rows.get(cache, 0))  # the cache goes when asked
+    return int((folder / limit).read_text(encoding="ascii")) - used

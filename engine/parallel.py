@@ -1,10 +1,12 @@
-"""Ordered maps over cameras or blocks on a few threads. Only for kernels that release the GIL; owns no state."""
+"""How many cores a process may use, and ordered maps over cameras or blocks on as many threads. Only for kernels that
+release the GIL."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from itertools import pairwise
 from typing import TypeVar
 
@@ -12,11 +14,23 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+CORES_VARIABLE = "CLIPGSTREAM_CORES"
+"""Environment variable with the most cores that a process and its children use, so that several share a machine."""
+
+
 def n_cores() -> int:
-    """Cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    """Cores this process may use: those that the system gives it, or fewer where CORES_VARIABLE says so."""
+    n_there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with suppress(KeyError, ValueError):
+        return min(n_there, max(int(os.environ[CORES_VARIABLE]), 1))
+    return n_there
+
+
+def share_cores(n: int) -> None:
+    """Let this process use no more than n cores, and children that it starts from now on. Call it before kernels are
+    imported: numba reads how many threads it may have when it is loaded."""
+    os.environ[CORES_VARIABLE] = str(n)
+    os.environ.setdefault("NUMBA_NUM_THREADS", str(n))
 
 
 def map_ordered(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:

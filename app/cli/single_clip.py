@@ -19,6 +19,7 @@ from engine.storage.json_files import json_text
 
 _CONTRADICTED = (
     ("clips", ":", "--clips"),
+    ("workers", None, "--workers"),
     ("again", False, "--again"),
     ("is_starting_over", False, "--start-over"),
     ("cluster", None, "--cluster"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+from collections.abc import Sequence
 from functools import partial
 
 from app.cli.arguments import (
@@ -19,22 +20,31 @@ from app.cli.arguments import (
 from app.cli.chosen_project import open_for_training, project_to_plan, what_goes
 from app.cli.single_clip import train_single_clip
 from app.cli.terminal.progress import ProgressLine
-from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
+from app.cli.terminal.training_lines import (
+    PlanLines,
+    SequenceTable,
+    failure_text,
+    show_event,
+    show_outcome,
+    show_status,
+)
 from app.cli.training_settings import add_training_settings
 from app.cluster.cluster import Cluster
 from app.cluster.cluster_worker import ClusterWorker
-from app.cluster.forecast import training_bytes
 from app.document.storing.document_file import PROJECT_FILE
-from app.evaluation.headless import BAD_INPUT_KINDS, train_clips, train_document
+from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
+from app.plan.forecasts import plans_of_kinds
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
+from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
 from app.plan.speed import step_time
 from app.project.clips.clip_catalog import ClipCatalog
 from app.residuals.kept_reading import note_kept
 from app.status import TrainingStatus
+from app.training.due import is_due
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.storage.json_files import json_text
-from engine.text import duration_text
+from engine.text import duration_text, shown
 from engine.training.config import parse_overrides
 
 
@@ -52,6 +62,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
+    )
+    command.add_argument(
+        "--workers",
+        type=workers_argument,
+        metavar="N",
+        help="train N clips side by side, on as many cores and in as much memory as there is (default: 1)",
     )
     add_follow_links(command)
     add_training_settings(command)
@@ -90,12 +106,29 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
+def workers_argument(text: str) -> int:
+    """A number of workers, at least one."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a number of clips, 1 or more")
+    return int(text)
+
+
+def exit_code(outcomes: Sequence[ClipOutcome]) -> int:
+    """Of a training that ended like this: bad input only where nothing else went wrong."""
+    failed = [outcome for outcome in outcomes if outcome.state == "failed"]
+    if failed and all(outcome.kind in BAD_INPUT_KINDS for outcome in failed):
+        return EXIT_BAD_INPUT
+    return EXIT_FAILED if any(outcome.state in ("failed", "damaged") for outcome in outcomes) else EXIT_OK
+
+
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     if options.plan:
         return _plan(options)
     if options.clip is not None:
         return train_single_clip(options, launch)
+    if options.cluster is not None and options.workers is not None:
+        raise ProjectError("--cluster cannot be combined with --workers.", hint="Write --cluster local:N for N clips.")
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)
@@ -106,14 +139,24 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         clips = project.clips(capture.n_frames)
         chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
         holdout = capture.camera_indices(project.settings.holdout)
-        if options.cluster is not None:
-            cluster = Cluster(options.cluster, project, capture, n_bytes=training_bytes(project, capture, clips))
+        first = project.settings.reference_clip  # the others cannot begin before it
+        order = sorted(chosen, key=lambda clip_index: clip_index != first)
+        catalog = ClipCatalog(project, len(clips))
+        to_train = [clips[i] for i in order if options.again or is_due(catalog, i)]
+        if options.cluster is None:
+            sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
+        else:
+            kinds = plans_of_kinds(project, capture, to_train, catalog)
+            memory_mb = max((plan.memory_mb for plan in kinds.values()), default=0.0)
+            cluster = Cluster(options.cluster, project, capture, n_bytes=int(memory_mb * 1e6))
             launch = partial(ClusterWorker, cluster=cluster)
-        n_workers = 1 if cluster is None else cluster.n_slots
+            sequence = PlannedClips(SideBySide(cluster.n_slots), kinds)
+        n_workers = sequence.together.n_workers
         service = TrainingService(
-            project, clips, holdout=holdout, launch=launch, is_window_open=False, n_workers=n_workers
+            project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, n_workers=n_workers
         )
-        note_kept(service.catalog, project, capture)
+        service.set_live_view("off")
+        note_kept(catalog, project, capture)
         names = ", ".join(project.settings.holdout) or "none"
         line.say(
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
@@ -136,17 +179,25 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             if cluster is not None and service is not None:
                 service.n_workers = cluster.n_slots  # computers come and go
 
+        if sequence.together.why_fewer:
+            line.say(f"Note: {sequence.together.why_fewer}")
+        plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=options.quiet)
+        table = SequenceTable(line, project, to_train, sequence)
         outcomes = train_clips(
             service,
-            sorted(chosen, key=lambda clip_index: clip_index != first),
+            order,
             on_begin=lambda clip_index: plans.begin(clips[clip_index]),
             is_again=options.again,
             own=parse_overrides(options.own_assignments) or None,
             on_status=follow,
-            on_event=lambda event: show_event(line, event),
-            on_outcome=lambda outcome: (show_outcome(line, outcome), plans.end(outcome)),
+            on_event=lambda event: show_event(line, event, has_others=n_workers > 1),
+            on_outcome=lambda outcome: (
+                show_outcome(line, outcome, has_others=len(order) > 1),
+                plans.end(outcome),
+                table.end(outcome),
+            ),
         )
-        is_refused = outcomes[-1].state == "failed" and outcomes[-1].kind in BAD_INPUT_KINDS
+        is_refused = exit_code(outcomes) == EXIT_BAD_INPUT
         line.finish()
         if options.json:
             document = train_document(project, capture, outcomes)
@@ -167,14 +218,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         if is_refused and not was_folder:
             with contextlib.suppress(OSError):  # not empty: something was learned
                 options.project.rmdir()
-    last = outcomes[-1]
-    if last.state == "failed":
-        code = EXIT_BAD_INPUT if last.kind in BAD_INPUT_KINDS else EXIT_FAILED
-        return fail(code, " ".join(part for part in (last.message, last.hint) if part))
-    damaged = [outcome for outcome in outcomes if outcome.state == "damaged"]
-    if damaged:
-        return fail(EXIT_FAILED, "\n".join(f"{outcome.message} {outcome.hint}" for outcome in damaged))
-    return EXIT_OK
+    code = exit_code(outcomes)
+    return code if code == EXIT_OK else fail(code, failure_text(outcomes))
 
 
 def _plan(options: argparse.Namespace) -> int:

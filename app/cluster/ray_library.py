@@ -9,6 +9,8 @@ from typing import Any
 
 from engine.errors import ProjectError
 
+logger = logging.getLogger(__name__)
+
 
 def ray_library() -> Any:
     """The module.
@@ -24,6 +26,10 @@ def ray_library() -> Any:
     import ray.exceptions
 
     logging.getLogger("ray").setLevel(logging.ERROR)  # what it has to say comes as an error
+    import ray._private.worker
+
+    # pages about every process that ended, on the terminal; no setting turns them off
+    ray._private.worker.print_to_stdstream = lambda data, ignore_prefix=False: logger.debug("Ray says %s", data)
     return ray
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from app.project.project import Project
 from app.status import TrainingStatus
 from app.training.clip_run import ClipRun
 from app.training.messages import ENDINGS, ClipTrained, Event, TrainingFailed, WorkerDied
-from app.training.service import TrainingService
+from app.training.service import ClipEvent, TrainingService
 from app.training.train_queue import OwnSettings, needed_clips
 from app.training.training_status import training_status
 from engine.backends.table import process_backend
@@ -26,7 +26,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip
-from engine.errors import ProjectError
+from engine.errors import DiskError, ProjectError
 
 if TYPE_CHECKING:
     from engine.backends.backend import Backend
@@ -47,12 +47,13 @@ class ClipOutcome:
     """How the training of one clip ended.
 
     Attributes:
-        state: trained, skipped (it was trained before), stopped, failed, or damaged (its file cannot be read, or that
-            of a clip which it needs; it is left as it is).
+        state: trained, skipped (it was trained before), stopped, failed, damaged (its file cannot be read, or that
+            of a clip which it needs; it is left as it is), or left_out (another one failed before it began).
         step: Steps done.
         held_out_psnr, held_out_whole: dB, and its scope, see ClipRecord; None when not measured.
         seconds: Wall time of this run, preparation included.
         message, hint, kind: Of a failure or a damage.
+        left_out_by: The clip whose failure kept this one from being trained; None for none.
     """
 
     clip_index: int
@@ -64,6 +65,7 @@ class ClipOutcome:
     hint: str = ""
     kind: str = ""
     held_out_whole: bool = False
+    left_out_by: int | None = None
 
 
 def train_clips(
@@ -71,15 +73,16 @@ def train_clips(
     clip_indices: Sequence[int],
     *,
     on_status: Callable[[TrainingStatus], None],
-    on_event: Callable[[Event], None],
+    on_event: Callable[[ClipEvent], None],
     on_outcome: Callable[[ClipOutcome], object],
     on_begin: Callable[[int], None] = lambda clip_index: None,
     is_again: bool = False,
     own: OwnSettings | None = None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> list[ClipOutcome]:
-    """Train clips, as many in parallel as the service allows; after a failure no other one starts. KeyboardInterrupt
-    stops the training, keeps progress and is raised again.
+    """Train clips, as many in parallel as the service allows. Where one fails, those that do not need it are trained
+    all the same, unless it was the disk that failed. KeyboardInterrupt stops all trainings, keeps progress and is
+    raised again.
 
     Args:
         service: Queue and workers of the project.
@@ -95,17 +98,21 @@ def train_clips(
     """
     outcomes: list[ClipOutcome] = []
     waiting, begun = list(clip_indices), dict[int, float]()
+    lost: dict[int, int] = {}  # clips that cannot come now, and the one whose failure is behind it
 
     def end(outcome: ClipOutcome) -> None:
         outcomes.append(outcome)
         on_outcome(outcome)
-        if outcome.state == "failed":
-            waiting.clear()
+        if outcome.state in ("failed", "stopped", "left_out"):
+            failed = outcome.clip_index if outcome.left_out_by is None else outcome.left_out_by
+            lost[outcome.clip_index] = failed
+            if outcome.kind == DiskError.__name__:  # the others would train for hours and fail likewise
+                lost.update(dict.fromkeys(waiting, failed))
 
     while waiting or begun:
         while waiting and _has_room(service, waiting[0], begun):
             clip_index = waiting.pop(0)
-            left = _left_as_it_is(service, clip_index, is_again=is_again)
+            left = _left_as_it_is(service, clip_index, is_again=is_again) or _left_out(service, clip_index, lost)
             if left is not None:
                 end(left)
                 continue
@@ -116,7 +123,7 @@ def train_clips(
         runs = dict(service.runs)
         try:
             for clip_index, event in service.poll():
-                on_event(event)
+                on_event((clip_index, event))
                 if isinstance(event, ENDINGS) and clip_index in begun:
                     seconds = time.monotonic() - begun.pop(clip_index)
                     end(_outcome(service, clip_index, runs.get(clip_index), event, seconds))
@@ -129,8 +136,8 @@ def train_clips(
 
 
 def _has_room(service: TrainingService, clip_index: int, begun: Collection[int]) -> bool:
-    needed = needed_clips(service.project, clip_index)
-    return len(begun) < service.n_workers and not any(index in begun for index in needed)
+    n_here = sum(index not in service.elsewhere for index in begun)  # the others wait for other processes
+    return n_here < service.n_workers and not any(index in begun for index in needed_clips(service.project, clip_index))
 
 
 def _outcome(
@@ -165,6 +172,14 @@ def _left_as_it_is(service: TrainingService, clip_index: int, *, is_again: bool)
         return ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr, held_out_whole=known.held_out_whole)
     if (known.state == "damaged" and not is_again) or known.blocked_by is not None:
         return _left_alone(service, clip_index)
+    return None
+
+
+def _left_out(service: TrainingService, clip_index: int, lost: Mapping[int, int]) -> ClipOutcome | None:
+    """The outcome of a clip that cannot be trained, as another one failed; None for one that can."""
+    for other in (clip_index, *needed_clips(service.project, clip_index)):
+        if other in lost:
+            return ClipOutcome(clip_index, "left_out", left_out_by=lost[other])
     return None
 
 

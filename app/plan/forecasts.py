@@ -28,6 +28,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import EngineError
+from engine.training.config import TrainConfig
 from engine.training.plan.forecast import MeasuredClip
 from engine.training.plan.plan import StepSizes, StepTime, TrainingPlan, footage_of, make_plan, resumed_plan
 
@@ -75,6 +76,11 @@ class Plans:
 
 
 NO_PLANS, NOTHING = Plans(None, {}), SequenceForecast(0)
+
+
+def kind_of(project: Project, clip: Clip, config: TrainConfig) -> Kind:
+    """The kind of a clip. config: The project's settings."""
+    return is_source(project.settings, config, clip.clip_index), clip.n_frames
 
 
 def clip_forecast(plan: TrainingPlan | None, record: ClipRecord, *, begins_afresh: bool = False) -> SequenceForecast:
@@ -224,10 +230,10 @@ def _clip_parts(
     service: TrainingService, project: Project, kinds: Mapping[Kind, TrainingPlan], own: Sequence[int]
 ) -> list[SequenceForecast]:
     """One per clip, as if none trained. own: Those that begin afresh, with settings of their own."""
-    settings, config = project.settings, project.settings.config()
+    config = project.settings.config()
     return [
         clip_forecast(
-            kinds.get((is_source(settings, config, clip.clip_index), clip.n_frames)),
+            kinds.get(kind_of(project, clip, config)),
             service.catalog[clip.clip_index],
             begins_afresh=clip.clip_index in own,
         )
@@ -261,25 +267,44 @@ def _plans(request: ForecastRequest, timed: StepTime) -> Plans:
                 history=history,
                 catalog=request.catalog,
             )
-        kinds = _plans_of_kinds(request, timed, history)
+        kinds = plans_of_kinds(
+            request.project, request.capture, request.clips, request.catalog, step_time=timed, history=history
+        )
     except EngineError as error:  # training will say the same
         logger.info("clips cannot be planned: %s", error)
     return Plans(next_plan, kinds, free_mb)
 
 
-def _plans_of_kinds(
-    request: ForecastRequest, timed: StepTime, history: Sequence[MeasuredClip]
+def plans_of_kinds(
+    project: Project,
+    capture: Capture,
+    clips: Sequence[Clip],
+    catalog: ClipCatalog,
+    *,
+    step_time: StepTime = known_step_time,
+    history: Sequence[MeasuredClip] | None = None,
 ) -> dict[Kind, TrainingPlan]:
-    project, capture = request.project, request.capture.without(request.project.document.exclusions)
+    """One plan for every kind of these clips, without looking at pictures.
+
+    Args:
+        project, capture: As for `plan_clip`.
+        clips: Those of the project, or some of them.
+        catalog: Says which of them are trained.
+        step_time, history: As for `plan_clip`; by default nothing is timed.
+    Raises:
+        PreparationError: The capture does not fit the settings.
+    """
+    if history is None:
+        history = clip_history(project, len(project.clips(capture.n_frames)))
+    capture = capture.without(project.document.exclusions)
     config = project.settings.config()
     footage = footage_of(capture, capture.camera_indices(project.settings.holdout))
     found = project.headers.read(project.reference_path)
     reference: ClipHeader | None = None if found is None else found.header
     plans: dict[Kind, TrainingPlan] = {}
     # a clip says nothing of itself: one that is not finished can stand for those that are
-    for clip in sorted(request.clips, key=lambda clip: request.catalog[clip.clip_index].state == "trained"):
-        begins_with_other = is_source(project.settings, config, clip.clip_index)
-        kind = (begins_with_other, clip.n_frames)
+    for clip in sorted(clips, key=lambda clip: catalog[clip.clip_index].state == "trained"):
+        kind = begins_with_other, _ = kind_of(project, clip, config)
         if kind in plans:
             continue
         goes_on = begins_with_other and config.independent
@@ -290,6 +315,6 @@ def _plans_of_kinds(
             is_source=begins_with_other,
             reference=reference if begins_with_other else None,
             history=history,
-            step_time=timed,
+            step_time=step_time,
         )
     return plans

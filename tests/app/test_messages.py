@@ -29,8 +29,8 @@ def test_a_job_arrives_as_it_was_sent() -> None:
         exclusions=Exclusions(("a",), (ExcludedFrames(None, 0, 2),)),
         regions=(GateRegion("static", (0.0, 1.0, 2.0), (3.0, 4.0, 5.0)),),
     )
-    task = decoded(encoded(TrainTask(job, Path("p"), Path("logs/a.log"), "module:name")), TrainTask)
-    assert task == TrainTask(job, Path("p"), Path("logs/a.log"), "module:name")
+    task = decoded(encoded(TrainTask(job, Path("p"), Path("capture"), Path("logs/a.log"), "module:name")), TrainTask)
+    assert task == TrainTask(job, Path("p"), Path("capture"), Path("logs/a.log"), "module:name")
     assert [type(value) for value in task.job.overrides.values()] == [str, int, float, bool]
 
 

@@ -1,6 +1,7 @@
 """The whole path with nothing faked: the sample, made small, trained by a worker process, measured, rendered, shown."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from engine.backends import table
 from engine.backends.table import AUTO, BackendEntry, backend_called
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state
+from engine.parallel import n_cores
 from tests.app.conftest import poll_until
 from tests.built_once import BuiltOnce
 
@@ -49,6 +51,20 @@ def trained(tmp_path_factory: pytest.TempPathFactory, built_once: BuiltOnce) -> 
 
     folder = tmp_path_factory.mktemp("project")
     return built_once.copy("project", folder, train, sources=["app", "tests/app/test_real_training.py"]) / "p"
+
+
+@pytest.mark.skipif(n_cores() < 2, reason="two workers need two cores")
+def test_two_workers_train_the_clips_of_one_bit_for_bit(trained, tmp_path):
+    found = {}
+    for n_workers in (1, 2):  # on all cores one after the other, and on half of them at the same time
+        folder = shutil.copytree(trained, tmp_path / str(n_workers))
+        arguments = ["train", str(asset_path("sample")), "--project", str(folder), "--clips", "1:3", "--again"]
+        assert main([*arguments, "--workers", str(n_workers), "--quiet"]) == 0
+        logs = [(folder / "logs" / f"clip-{index:04d}.log").read_text() for index in (1, 2)]
+        assert all(f"with {n_cores() // n_workers} threads" in log for log in logs)
+        found[n_workers] = [read_clip_state(folder / "clips" / f"{index:04d}.safetensors") for index in (1, 2)]
+    assert [clip.fingerprint for clip in found[1]] == [clip.fingerprint for clip in found[2]]
+    assert found[1][0].fingerprint != found[1][1].fingerprint
 
 
 def test_a_process_computes_everything_with_its_back_end(trained, tmp_path, monkeypatch):

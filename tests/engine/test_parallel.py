@@ -40,3 +40,16 @@ def test_spans_follow_each_other_and_cover_every_row(n_rows, n_spans):
     assert [row for start, stop in spans for row in range(start, stop)] == list(range(n_rows))
     lengths = [stop - start for start, stop in spans]
     assert max(lengths) - min(lengths) <= 1
+
+
+@pytest.mark.parametrize(("value", "expected"), [("1", 1), ("3", 3), ("99", 4), ("0", 1), ("many", 4), ("", 4)])
+def test_a_process_uses_no_more_cores_than_it_was_told(monkeypatch, value, expected):
+    monkeypatch.setattr(parallel.os, "sched_getaffinity", lambda _: {0, 1, 2, 3}, raising=False)
+    monkeypatch.setenv(parallel.CORES_VARIABLE, value)
+    assert parallel.n_cores() == expected
+
+
+def test_children_are_told_as_well(monkeypatch):
+    monkeypatch.setattr(parallel.os, "environ", environment := {})
+    parallel.share_cores(2)
+    assert environment == {"CLIPGSTREAM_CORES": "2", "NUMBA_NUM_THREADS": "2"}

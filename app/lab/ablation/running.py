@@ -26,8 +26,7 @@ from app.lab.paper_tables import beside_ablations
 from app.project.opening.project_access import check_settings, create_project, open_project
 from app.project.project import Project
 from app.status import TrainingStatus
-from app.training.messages import Event
-from app.training.service import Launch, TrainingService
+from app.training.service import ClipEvent, Launch, TrainingService
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError, TrainingError
@@ -57,7 +56,7 @@ class Callbacks:
 
     on_variant: Callable[[str, int, int, int], None]
     on_status: Callable[[TrainingStatus], None]
-    on_event: Callable[[Event], None]
+    on_event: Callable[[ClipEvent], None]
     on_outcome: Callable[[ClipOutcome], None]
     on_row: Callable[[int, int, Any], None]
 
@@ -247,8 +246,9 @@ def _measured(
             )
         finally:
             service.close()
-        if outcomes[-1].state == "failed":
-            raise TrainingError(f"{variant.name}, seed {seed}: {outcomes[-1].message}", hint=outcomes[-1].hint)
+        failed = next((outcome for outcome in outcomes if outcome.state == "failed"), None)
+        if failed is not None:
+            raise TrainingError(f"{variant.name}, seed {seed}: {failed.message}", hint=failed.hint)
     finally:
         project.close()
     return measure(place, replace(scope, clips=task.chosen), callbacks.on_row, rates_of)

@@ -12,9 +12,9 @@ from msgspec import structs
 from app.document.project_settings import ProjectSettings
 from app.lab.machine import Machine
 from app.lab.report.page.parts import Section
-from app.lab.report.page.spans import MAX_SPANS, spans_text
 from app.lab.report.page.tables import Table, TableColumn
 from app.project.project_facts import ClipFacts, ProjectFacts
+from app.spans import MAX_SPANS, spans_text
 from engine.training.config import SETTINGS
 
 _PAIR = (TableColumn("what", "Name"), TableColumn("value", "Value"))

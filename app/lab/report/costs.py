@@ -9,11 +9,11 @@ from app.lab.bench.rows import Trade
 from app.lab.report.charts import SpeedPanel, draw_speed_error, draw_stacked, draw_training
 from app.lab.report.measured import MAX_CLIP_COLUMNS
 from app.lab.report.page.parts import Figure, Part, Section
-from app.lab.report.page.spans import spans_text
 from app.lab.report.page.tables import Table, TableColumn
 from app.project.clips.clip_bytes import COMPONENT_NAMES
 from app.project.clips.metrics_file import read_metrics
 from app.project.project_facts import ProjectFacts
+from app.spans import spans_text
 from app.training.curves import is_number
 from app.training.worker.stage_watch import KEEPING, TRAINING
 

@@ -268,7 +268,11 @@ class Claims:
             return  # the disk does not answer; what was seen last holds
         records = {token: read_holder(holder_path(self.folder, token)) for token in list_holders(self.folder)}
         with self._guard:
-            elsewhere = {key: self._judged(claim, records) for key, claim in claims.items() if key not in self._held}
+            elsewhere = {
+                key: self._judged(claim, records)
+                for key, claim in claims.items()
+                if key not in self._held and not self._was_released(claim)
+            }
             self._elsewhere = {key: other for key, other in elsewhere.items() if not other.is_dead}
             said = {other.holder.token for other in self._elsewhere.values() if other.holder is not None}
             self._others = tuple(record for token, record in records.items() if record is not None and token in said)
@@ -338,6 +342,10 @@ class Claims:
         if before is None or before[0] != state:
             self._seen[name] = (state, self._clock(), 0 if before is None else before[2] + 1)
         return Elsewhere(claim.key, record, is_dead=self._clock() - self._seen[name][1] >= DEAD_AFTER_S)
+
+    def _was_released(self, claim: ClaimFile) -> bool:
+        """Whether it was one's own, or is gone, since claims were listed."""
+        return not claim.path.exists() or claim.token() == self.token
 
     def _has_changed(self, claim: ClaimFile) -> bool:
         """Whether its holder has been heard of while this process watched."""

@@ -23,7 +23,7 @@ from engine.children.kind import Unwanted, find
 from engine.children.priority import lower_process
 from engine.errors import DiskError
 from engine.kernels.cache import use_kernel_cache
-from engine.parallel import n_cores
+from engine.parallel import n_cores, share_cores
 from engine.storage.files import disk_error, open_to_append
 
 logger = logging.getLogger(__name__)
@@ -106,4 +106,6 @@ def _set_threads(job: TrainJob) -> int:
     if job.is_window_open:  # before any thread is started, since threads take over the priority
         lower_process()
     share = n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside)
-    return use_threads(job.n_threads or share)
+    n_threads = job.n_threads or share
+    share_cores(n_threads)  # preparation, too, and its own children
+    return use_threads(n_threads)

@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from app.evaluation.headless import train_clips
-from app.project.claims.asks import ask_holder
+from app.project.claims.asks import Ask, ask_holder
 from app.project.claims.claims import Claims
 from app.project.disk.discarding import discard, training_of
 from app.project.opening.opened_project import OpenedProject
@@ -18,7 +18,7 @@ from app.training.messages import ClipTrained, TrainingFailed
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses, training_status
 from engine.errors import ProjectError
-from tests.app.conftest import inline
+from tests.app.conftest import DEADLINE_S, inline
 from tests.app.fakes import make_fake, make_slow
 from tests.app.training.test_train_queue import run_out, six
 
@@ -122,7 +122,8 @@ def test_others_can_pause_and_stop_it(pair) -> None:
     other.enqueue(1)
     other.poll()
     key = other.project.clip_name(1)
-    for ask, state in (("pause", "paused"), ("resume", "running")):
+    asks: list[tuple[Ask, str]] = [("pause", "paused"), ("resume", "running")]
+    for ask, state in asks:
         ask_holder(one.project.folder, key, ask)
         look(other)
         other.poll()
@@ -170,3 +171,31 @@ def test_settings_cannot_change_while_another_process_trains(pair) -> None:
     other.poll()
     with pytest.raises(ProjectError, match="trains clip 1"):
         discard(one.project, training_of(one.project))
+
+
+def test_clips_that_others_train_take_no_place_of_a_worker(pair) -> None:
+    one, _ = pair
+    other = make_service_like(one)
+    one.n_workers, other.n_workers = 2, 2
+    other.enqueue_all([1, 2])
+    look(other, one)
+    ended, until_s = list[int](), time.monotonic() + DEADLINE_S
+
+    def wait(_: float) -> None:
+        if set(ended) >= {3, 4, 5}:
+            other.poll()
+        look(other, one)
+        assert time.monotonic() < until_s
+
+    outcomes = train_clips(
+        one,
+        range(1, 6),
+        on_status=lambda status: None,
+        on_event=lambda event: None,
+        on_outcome=lambda outcome: ended.append(outcome.clip_index),
+        sleep=wait,
+    )
+    assert ended[:3] == [3, 4, 5], "while the others are in training elsewhere"
+    assert {outcome.state for outcome in outcomes} == {"trained"}
+    assert sorted(ended) == [1, 2, 3, 4, 5]
+    other.close()

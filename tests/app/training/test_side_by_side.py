@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import os
 from functools import partial
 
 import pytest
 
-from app.evaluation.headless import train_clips
+from app.evaluation.headless import ClipOutcome, train_clips
 from app.project.opening.opened_project import OpenedProject
+from app.training.jobs import train_job
 from app.training.messages import ClipTrained
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses, training_status
+from app.training.worker import worker
+from app.training.worker.interface import MakeTraining
 from app.training.worker.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
-from engine.errors import NonFiniteLoss
+from engine.errors import DiskError, NonFiniteLoss
+from engine.parallel import CORES_VARIABLE, n_cores
 from tests.app.conftest import inline
 from tests.app.fakes import make_fake, make_slow, write_trained
 from tests.app.training.test_train_queue import run_out, six
@@ -69,6 +74,7 @@ def test_each_is_paused_and_stopped_by_itself_or_all_of_them(six: OpenedProject)
     assert [status.state for status in statuses[1:4]] == ["paused", "training", "queued"]
     status = training_status(service)
     assert (status.clip_index, status.state, status.n_running) == (1, "paused", 2), "the one that began first"
+    assert [(row.clip_index, row.state) for row in status.trainings] == [(1, "paused"), (2, "running")]
     service.stop(2)
     while 2 in service.runs:
         service.poll()
@@ -98,40 +104,60 @@ def test_live_states_are_told_apart(six: OpenedProject) -> None:
     assert service.catalog[2].resume_step
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("n_workers", [1, 2, 3])
-def test_the_command_line_trains_several_and_begins_none_after_a_failure(six: OpenedProject, n_workers: int) -> None:
-    def fails(job, store, report):
-        if job.clip_index == 2:
-            raise NonFiniteLoss("The loss became nan.")
+def fails_in(failing: int, error: Exception) -> MakeTraining:
+    def make(job, store, report):
+        if job.clip_index == failing:
+            raise error
         return make_fake(job, store, report)
 
-    service, begun = make_service(six, fails, n_workers), []
+    return make
+
+
+def trained(service: TrainingService, begun: list[int] | None = None) -> dict[int, ClipOutcome]:
     outcomes = train_clips(
         service,
         range(6),
         on_status=lambda status: None,
         on_event=lambda event: None,
         on_outcome=lambda outcome: None,
-        on_begin=begun.append,
+        on_begin=(begun if begun is not None else []).append,
         sleep=lambda seconds: None,
     )
-    states = {outcome.clip_index: outcome.state for outcome in outcomes}
-    assert states[0] == states[1] == "trained"
-    assert states[2] == "failed"
-    assert begun == sorted(states)
-    assert len(begun) <= 2 + n_workers
-    again = make_service(six, make_fake, n_workers)
-    outcomes = train_clips(
-        again,
-        range(6),
-        on_status=lambda status: None,
-        on_event=lambda event: None,
-        on_outcome=lambda outcome: None,
-        sleep=lambda seconds: None,
-    )
-    assert sorted(outcome.clip_index for outcome in outcomes) == list(range(6))
-    assert {outcome.state for outcome in outcomes} == {"trained", "skipped"}
+    assert sorted(outcome.clip_index for outcome in outcomes) == list(range(6)), "each of them, once"
+    return {outcome.clip_index: outcome for outcome in outcomes}
+
+
+def states_of(outcomes: dict[int, ClipOutcome]) -> str:
+    """Their first letters: trained, skipped, failed, left_out."""
+    return "".join(outcomes[index].state[0] for index in range(6))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n_workers", [1, 2, 3])
+def test_a_failure_stops_only_clips_that_need_the_failed_one(six: OpenedProject, n_workers: int) -> None:
+    begun: list[int] = []
+    failing = fails_in(2, NonFiniteLoss("The loss became nan."))
+    assert states_of(trained(make_service(six, failing, n_workers), begun)) == "ttfttt"
+    assert sorted(begun) == list(range(6))
+    assert states_of(trained(make_service(six, make_fake, n_workers))) == "sstsss"
+
+
+@pytest.mark.parametrize("n_workers", [1, 2])
+def test_without_a_reference_clip_no_other_is_begun(six: OpenedProject, n_workers: int) -> None:
+    begun: list[int] = []
+    outcomes = trained(make_service(six, fails_in(0, NonFiniteLoss("nan")), n_workers), begun)
+    assert states_of(outcomes) == "flllll"
+    assert {outcome.left_out_by for outcome in outcomes.values()} == {None, 0}
+    assert begun == [0]
+
+
+def test_a_disk_that_fails_lets_no_other_clip_begin(six: OpenedProject) -> None:
+    write_trained(six, 0)
+    begun: list[int] = []
+    outcomes = trained(make_service(six, fails_in(2, DiskError("The disk is full."))), begun)
+    assert (outcomes[2].state, outcomes[1].state) == ("failed", "trained")
+    assert [outcomes[index].left_out_by for index in (4, 5)] == [2, 2]
+    assert set(begun) <= {1, 2, 3}, "those that trained next to it"
 
 
 @pytest.mark.parametrize(
@@ -140,3 +166,15 @@ def test_the_command_line_trains_several_and_begins_none_after_a_failure(six: Op
 )
 def test_they_share_the_cores(cores: int, is_window_open: bool, n_beside: int, expected: int) -> None:
     assert n_training_threads(cores, is_window_open=is_window_open, n_beside=n_beside) == expected
+
+
+def test_a_worker_computes_everything_with_its_share(six: OpenedProject, monkeypatch) -> None:
+    for name in (CORES_VARIABLE, "NUMBA_NUM_THREADS"):
+        monkeypatch.setenv(name, "")  # put back afterwards
+        monkeypatch.delenv(name)
+    monkeypatch.setattr(worker, "n_cores", lambda: 8)
+    monkeypatch.setattr(worker, "use_threads", lambda n: n)
+    job = train_job(six.project, six.clips[1], is_window_open=False, n_beside=4)
+    assert worker._set_threads(job) == 2
+    assert (os.environ[CORES_VARIABLE], os.environ["NUMBA_NUM_THREADS"]) == ("2", "2")
+    assert n_cores() <= 2

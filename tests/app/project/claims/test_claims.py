@@ -174,6 +174,21 @@ def test_what_others_train_is_seen_and_they_can_be_asked(tmp_path: Path) -> None
     assert other.take_asked() == []
 
 
+def test_what_is_released_while_others_are_looked_at_is_not_taken_for_anothers(tmp_path: Path, monkeypatch) -> None:
+    claims = make(tmp_path)
+    claims.take(KEY)
+    claims.take("0004")
+
+    def listed_then_released(folder: Path) -> dict[str, ClaimFile]:
+        found = list_claims(folder)
+        claims.release(KEY)
+        return found
+
+    monkeypatch.setattr("app.project.claims.claims.list_claims", listed_then_released)
+    claims.look()
+    assert claims.elsewhere == {}
+
+
 def test_clips_that_others_finish_are_noticed(tmp_path: Path) -> None:
     (tmp_path / CLAIMS).mkdir()
     (tmp_path / "clips").mkdir()

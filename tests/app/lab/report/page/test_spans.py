@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.lab.report.page.spans import MAX_SPANS, spans_text
 from app.lab.report.page.tables import MAX_FIRST_ROWS, MAX_LAST_ROWS, Table, TableColumn
+from app.spans import MAX_SPANS, spans_text
 from tests.app.lab.report.made_up import Page
 
 
