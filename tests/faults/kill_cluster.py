@@ -118,7 +118,7 @@ class ClusterKillTest:
 
     def run(self, n_kills: int) -> None:
         """Kill so often, then let the last project finish."""
-        while sum(self.tally.kills.values()) < n_kills:
+        while sum(self.tally.kills.values()) < n_kills and not self.tally.faults:
             self.tally.n_rounds += 1
             self._round(self._work / f"round-{self.tally.n_rounds}", n_kills)
 
@@ -131,7 +131,7 @@ class ClusterKillTest:
             if code == 0:
                 break
             if code is not None:
-                said = driver.stderr.read().decode(errors="replace") if driver.stderr else ""
+                said = (self._work / "stderr.txt").read_text(errors="replace")
                 self.tally.faults.append(f"{folder.name}: the driver ended with {code}: {said[-1500:]}")
                 return
             if time.monotonic() - began_s > LONGEST_RUN_S:
@@ -145,8 +145,10 @@ class ClusterKillTest:
     def _driver(self, folder: Path, *, is_blind: bool) -> subprocess.Popen[bytes]:
         code = "from tests.faults.kill_cluster import drive; from pathlib import Path; "
         code += f"drive({self._made.address!r}, Path({str(folder)!r}), is_blind={is_blind})"
-        environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(self._work / "scratch")}
-        return subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=environment, stderr=subprocess.PIPE)
+        paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+        environment = {**os.environ, "PYTHONPATH": paths, "TMPDIR": str(self._work / "scratch")}
+        with open(self._work / "stderr.txt", "wb") as errors:
+            return subprocess.Popen([sys.executable, "-c", code], cwd=ROOT, env=environment, stderr=errors)
 
     def _waited(self, driver: subprocess.Popen[bytes], folder: Path, *, is_last: bool) -> int | None:
         """Wait until something is trained, and a random time more. The driver's code where it has ended."""
