@@ -3,8 +3,8 @@
 # libraries it needs. Running it again costs a second: stamps in .venv remember what was installed.
 #
 #   ./setup.sh              everything `make run` needs
-#   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd), programs
-#                           of others that read exported files (from npm, 115 MB in tests/oracles/node_modules), and Ray
+#   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd), programs of
+#                           others that read exported files (from npm, 115 MB in tests/oracles/node_modules), SLURM and Ray
 #
 #   PYTHON=/path/to/python           take this interpreter (3.11, 3.12 or 3.13)
 #   CLIPGSTREAM_TORCH_INDEX=URL      take the CPU build of torch from this package index
@@ -173,9 +173,21 @@ check_browser() { # apart from the others: not every system has a package of thi
     fi
 }
 
+check_slurm() { # only root can start its daemons
+    if command -v slurmctld >/dev/null && command -v slurmd >/dev/null; then return 0; fi
+    if [ "$(id -u)" = 0 ] && apt_install slurm-wlm munge; then
+        say "installed SLURM with apt-get"
+    else
+        say "no SLURM, so the tests of its jobs are skipped; they need root and:  apt-get install -y slurm-wlm munge"
+    fi
+}
+
 check_system() {
     local missing
-    if [ "$WITH_TESTS" = yes ] && [ "$(uname -s)" = Linux ]; then check_browser; fi
+    if [ "$WITH_TESTS" = yes ] && [ "$(uname -s)" = Linux ]; then
+        check_browser
+        check_slurm
+    fi
     missing=$(missing_libraries)
     if [ "$WITH_TESTS" = yes ] && [ "$(uname -s)" = Linux ]; then
         command -v Xvfb >/dev/null || missing="$missing xvfb"

@@ -115,6 +115,24 @@ def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None,
     )
 
 
+def add_measuring_workers(command: argparse.ArgumentParser) -> None:
+    """The argument of every subcommand that can measure in several processes."""
+    command.add_argument(
+        "--workers",
+        dest="n_workers",
+        type=_count,
+        default=1,
+        metavar="N",
+        help="measure in N processes, at most one per core (default: 1); figures are the same",
+    )
+
+
+def _count(text: str) -> int:
+    if not text.strip().isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a count from 1")
+    return int(text)
+
+
 def path_argument(text: str) -> Path:
     """A path of the command line; text that cannot be a path is refused at once with exit code 2."""
     if not text.strip():

@@ -1,4 +1,4 @@
-"""The project that the arguments of `clipgstream train` ask for, made or opened."""
+"""The project that the arguments of a command that trains clips ask for, made or opened."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.cli.arguments import parse_cameras, parse_range
-from app.cli.training_settings import overrides_of
+from app.cli.arguments import add_follow_links, parse_cameras, parse_range, path_argument
+from app.cli.training_settings import add_training_settings, overrides_of
 from app.document.history import DocumentHistory
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
@@ -31,18 +31,35 @@ from engine.capture.capture import Capture, open_capture
 from engine.errors import DiskError, ProjectError
 from engine.training.presets import closest_preset
 
-_OF_TRAINING = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
+_OF_TRAINING = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides", "is_growing")
 """Settings that arguments of `train` ask for, and that all clips share."""
 _N_LOOKS, _LOOK_EVERY_S = 50, 0.1
 
 
-def open_for_training(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[Project, Capture]:
+def add_project_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments that choose a capture, a project, its settings and clips of it."""
+    command.add_argument("capture", type=path_argument, help="capture folder")
+    command.add_argument("--project", type=path_argument, required=True, help="project folder; created if missing")
+    command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    command.add_argument(
+        "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
+    )
+    add_follow_links(command)
+    add_training_settings(command)
+    command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
+    command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
+
+
+def open_for_training(
+    options: argparse.Namespace, say: Callable[[str], None], *, n_complete: int | None = None
+) -> tuple[Project, Capture]:
     """The project of the arguments, made or opened; what was given has to agree with what is finished there.
 
     Args:
         say: Told what was discarded.
+        n_complete: Frames that are complete of a capture that is still being recorded; None of any other one.
     """
-    settings, stored, capture = _chosen_settings(options)
+    settings, stored, capture = _chosen_settings(options, n_complete)
     if stored is None:
         return create_project(options.project, settings), capture
     project = open_project(options.project)
@@ -119,15 +136,20 @@ def what_goes(project: Project, options: argparse.Namespace) -> str:
     return progress_of(project).words if is_shared_change(stored, project.settings) else ""
 
 
-def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
+def _chosen_settings(
+    options: argparse.Namespace, n_complete: int | None = None
+) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
     """Settings that the arguments ask for, those of the project where there is one, and the capture."""
     overrides = overrides_of(options)
     exists = (options.project / PROJECT_FILE).is_file()
     stored = read_settings(options.project) if exists else None
     scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
     follow_links = options.follow_links or (stored is not None and stored.follow_links)
-    capture = open_capture(options.capture, scale=scale, follow_links=follow_links)
+    is_growing = n_complete is not None or (stored is not None and stored.is_growing)
+    capture = open_capture(options.capture, scale=scale, follow_links=follow_links, is_growing=is_growing)
     frames = stored.frames if stored is not None and stored.fingerprint == capture.fingerprint else None
+    if n_complete is not None and frames is None:
+        frames = (0, n_complete)
     if options.frames is not None:
         chosen = parse_range(options.frames, capture.n_frames, option="--frames", what="frames")
         frames = (chosen.start, chosen.stop)
@@ -153,7 +175,9 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
         "reference_clip": options.reference_clip,
     }
     changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    if capture.fingerprint != stored.fingerprint:
+    if is_growing and not stored.is_growing:  # a project of what was there of it, which nothing is trained of
+        changes |= {"is_growing": True, "fingerprint": capture.fingerprint}
+    elif capture.fingerprint != stored.fingerprint:
         raise ProjectError(
             "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
         )

@@ -12,6 +12,7 @@ from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import show_event, show_outcome, show_status
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
 from app.project.claims.claims import LOOK_EVERY_S, ClipClaimed
+from app.project.clips.clip_catalog import ClipCatalog
 from app.training.service import Launch, TrainingService
 from app.training.train_queue import needed_clips
 from engine.errors import ProjectError
@@ -41,16 +42,22 @@ def train_single_clip(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_clip(options)
     clips, clip_index = project.clips(capture.n_frames), options.clip
+    if project.settings.is_growing and clip_index >= len(clips):
+        return fail(EXIT_NOT_READY, f"Clip {clip_index} is still being recorded: {len(clips)} clips are complete.")
     if not 0 <= clip_index < len(clips):
         raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(clips) - 1}.")
     holdout = capture.camera_indices(project.settings.holdout)
-    service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False)
+    needed = needed_clips(project, clip_index)
+    is_chained = project.settings.config().follows_previous  # then it stands on all that are before it
+    catalog = ClipCatalog(project, len(clips), only=None if is_chained else (*needed, clip_index))
+    service = TrainingService(
+        project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, cpu=options.cpu
+    )
     service.set_live_view("off")
     try:
-        missing = [needed for needed in needed_clips(project, clip_index) if not project.is_trained(needed)]
+        missing = [index for index in needed if not project.is_trained(index)]
         if missing and service.catalog[clip_index].state != "trained":
             return fail(EXIT_NOT_READY, f"Clip {clip_index} needs clip {missing[0]}, which is not trained yet.")
-        service.claims.watch()
         _claim(service, clip_index, line)
         (outcome,) = train_clips(
             service,
@@ -81,6 +88,7 @@ def _claim(service: TrainingService, clip_index: int, line: ProgressLine) -> Non
                 raise
             if not is_told:
                 line.say(f"Clip {clip_index}: {error.message} Watching for a minute whether it lives.")
+                service.claims.watch()
                 is_told = True
             time.sleep(LOOK_EVERY_S)
             service.catalog.update(clip_index)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -12,12 +13,10 @@ from app.cli.arguments import (
     EXIT_FAILED,
     EXIT_NOT_READY,
     EXIT_OK,
-    add_follow_links,
     fail,
     parse_range,
-    path_argument,
 )
-from app.cli.chosen_project import open_for_training, project_to_plan, what_goes
+from app.cli.chosen_project import add_project_arguments, open_for_training, project_to_plan, what_goes
 from app.cli.single_clip import train_single_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import (
@@ -28,13 +27,13 @@ from app.cli.terminal.training_lines import (
     show_outcome,
     show_status,
 )
-from app.cli.training_settings import add_training_settings
 from app.cluster.cluster import Cluster
 from app.cluster.cluster_worker import ClusterWorker
 from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
 from app.plan.forecasts import plans_of_kinds
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
+from app.plan.sequence import plan_sequence, sequence_text
 from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
 from app.plan.speed import step_time
 from app.project.clips.clip_catalog import ClipCatalog
@@ -43,6 +42,7 @@ from app.status import TrainingStatus
 from app.training.due import is_due
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
 from engine.text import duration_text, shown
 from engine.training.config import parse_overrides
@@ -50,9 +50,7 @@ from engine.training.config import parse_overrides
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream train`."""
-    command.add_argument("capture", type=path_argument, help="capture folder")
-    command.add_argument("--project", type=path_argument, required=True, help="project folder; created if missing")
-    command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    add_project_arguments(command)
     command.add_argument(
         "--clip",
         type=int,
@@ -61,16 +59,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it",
     )
     command.add_argument(
-        "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
-    )
-    command.add_argument(
         "--workers",
         type=workers_argument,
         metavar="N",
-        help="train N clips side by side, on as many cores and in as much memory as there is (default: 1)",
+        help="train N clips side by side, on as many cores and in as much memory as there is (default: 1); with "
+        "--plan, what N machines would cost",
     )
-    add_follow_links(command)
-    add_training_settings(command)
     command.add_argument(
         "--again",
         action="store_true",
@@ -90,8 +84,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="first discard everything trained in the project, so that its settings can change; --plan shows what",
     )
-    command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
-    command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
+    command.add_argument(
+        "--cpu",
+        choices=PROCESSORS,
+        default=NATIVE,
+        help="portable: the same result on every kind of x86-64 processor, slower (default: native, all instructions)",
+    )
     command.add_argument(
         "--cluster",
         metavar="WHERE",
@@ -99,6 +97,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
+    )
+    command.add_argument(
+        "--price-per-hour", type=float, metavar="X", help="with --plan: price of a worker, in any unit, for the total"
     )
     command.add_argument(
         "--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output"
@@ -123,8 +124,10 @@ def exit_code(outcomes: Sequence[ClipOutcome]) -> int:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
+    _check_price(options)
     if options.plan:
         return _plan(options)
+    environment_of(options.cpu)  # refused before a project is made
     if options.clip is not None:
         return train_single_clip(options, launch)
     if options.cluster is not None and options.workers is not None:
@@ -153,7 +156,14 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             sequence = PlannedClips(SideBySide(cluster.n_slots), kinds)
         n_workers = sequence.together.n_workers
         service = TrainingService(
-            project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, n_workers=n_workers
+            project,
+            clips,
+            holdout=holdout,
+            launch=launch,
+            is_window_open=False,
+            catalog=catalog,
+            n_workers=n_workers,
+            cpu=options.cpu,
         )
         service.set_live_view("off")
         note_kept(catalog, project, capture)
@@ -222,6 +232,13 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     return code if code == EXIT_OK else fail(code, failure_text(outcomes))
 
 
+def _check_price(options: argparse.Namespace) -> None:
+    price = options.price_per_hour
+    if price is not None and not (options.plan and 0 <= price < math.inf):
+        problem = f"is {price}" if options.plan else "is of a plan"
+        raise ProjectError(f"--price-per-hour {problem}.", hint="Give a price of 0 or more together with --plan.")
+
+
 def _plan(options: argparse.Namespace) -> int:
     project, capture = project_to_plan(options)
     clips = project.clips(capture.n_frames)
@@ -233,7 +250,7 @@ def _plan(options: argparse.Namespace) -> int:
     kept = [] if is_afresh else order
     trained = [i for i in kept if catalog[i].state == "trained"]
     damaged = [i for i in kept if catalog[i].state == "damaged" or catalog[i].blocked_by is not None]
-    history = clip_history(project, len(clips))
+    history = clip_history(project, len(clips), catalog)
     plans = [
         plan_clip(
             project, capture, clips[i], step_time=step_time, history=history, catalog=catalog, is_afresh=is_afresh
@@ -241,8 +258,12 @@ def _plan(options: argparse.Namespace) -> int:
         for i in order
         if i not in trained and i not in damaged
     ]
+    sequence = None
+    if plans and (options.workers is not None or options.price_per_hour is not None):
+        n_workers, price = options.workers or 1, options.price_per_hour
+        sequence = plan_sequence(project, capture, plans, n_workers=n_workers, price_per_hour=price)
     if options.json:
-        document = plan_document(project, capture, plans, trained, damaged) | {"discards": discarded}
+        document = plan_document(project, capture, plans, trained, damaged, sequence) | {"discards": discarded}
         print(json_text(document, indent=2))
         return EXIT_OK
     if discarded:
@@ -262,4 +283,6 @@ def _plan(options: argparse.Namespace) -> int:
         print(
             f"All {len(plans)} clips: about {duration_text(seconds)}, at most {memory_text(sums['memory_mb'])}{stored}"
         )
+    if sequence is not None:
+        print("\n".join(sequence_text(sequence)))
     return EXIT_OK

@@ -3,6 +3,7 @@ continues from the last checkpoint."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -102,8 +103,10 @@ class ClusterWorker:
             return [StageReported(WAITING, 0.0)]
         started: list[FarChild[TrainTask, Event, None]] = []
 
-        def start(kind: ChildKind[TrainTask, Event, None], task: TrainTask) -> FarChild[TrainTask, Event, None]:
-            started.append(FarChild(kind, seat=seat, errand=self._errand(seat, task)))
+        def start(
+            kind: ChildKind[TrainTask, Event, None], job: TrainTask, *, environment: Mapping[str, str]
+        ) -> FarChild[TrainTask, Event, None]:
+            started.append(FarChild(kind, seat=seat, errand=self._errand(seat, job), environment=environment))
             return started[0]
 
         worker = ProcessWorker(replace(self.job, n_threads=seat.n_threads), self._project, self._make, start=start)

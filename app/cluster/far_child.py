@@ -6,7 +6,7 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Literal, Protocol, TypeVar
 
@@ -105,10 +105,14 @@ class FarChild(Child[Job, Event, Result]):
         kind: The kind of its work.
         seat: Where it runs.
         errand: Brings its job there, and its results back.
+        environment: Variables in addition to those of the process there.
     """
 
-    def __init__(self, kind: ChildKind[Job, Event, Result], *, seat: Seat, errand: Errand[Job]) -> None:
+    def __init__(
+        self, kind: ChildKind[Job, Event, Result], *, seat: Seat, errand: Errand[Job], environment: Mapping[str, str]
+    ) -> None:
         super().__init__(kind)
+        self._environment = dict(environment)
         self._errand, self._remote = errand, Remote(seat.runner())
         self._name = seat.node.name
         self._grace_s = 0.0
@@ -150,7 +154,7 @@ class FarChild(Child[Job, Event, Result]):
 
     def _run(self) -> Result:
         job = self._errand.begin(self._remote)
-        self.pid = self._remote.call("start", self.kind.place, encoded(job))
+        self.pid = self._remote.call("start", self.kind.place, encoded(job), self._environment)
         while True:
             said, ending = self._remote.call("exchange", self._told(), EXCHANGE_EVERY_S)
             events = [decoded(data, self.kind.event) for data in said]

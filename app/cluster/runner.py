@@ -74,15 +74,16 @@ class Runner:
         threading.Thread(target=self._watch, daemon=True).start()
 
     @_answered
-    def start(self, place: str, job: bytes) -> int | None:
+    def start(self, place: str, job: bytes, environment: dict[str, str]) -> int | None:
         """Start the child. Returns its process.
 
         Args:
             place: Of its kind.
             job: Encoded.
+            environment: Variables in addition to those of this process.
         """
         kind: ChildKind[Any, Any, Any] = find(place)
-        self._child = ChildProcess(kind, decoded(job, kind.job))
+        self._child = ChildProcess(kind, decoded(job, kind.job), environment=environment)
         return self._child.pid
 
     @_answered

@@ -253,7 +253,7 @@ def _running_part(run: ClipRun, whole: SequenceForecast) -> SequenceForecast:
 
 
 def _plans(request: ForecastRequest, timed: StepTime) -> Plans:
-    free_mb, history = None, clip_history(request.project, len(request.clips))
+    free_mb, history = None, clip_history(request.project, len(request.clips), request.catalog)
     with suppress(OSError):
         free_mb = shutil.disk_usage(request.project.folder).free / 1e6
     kinds, next_plan = {}, None

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.background.kernels import COMPILING
+from app.plan.sequence import SequencePlan
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.status import PlanStatus, SettingStatus
@@ -22,9 +23,21 @@ from engine.training.presets import PRESETS, closest_preset
 PLAN_SCHEMA = 3
 
 
-def clip_history(project: Project, n_clips: int) -> list[MeasuredClip]:
-    """Measurements of a project's finished clips, for planning the next one."""
-    found = (_measured(project, clip_index) for clip_index in range(n_clips))
+MAX_MEASURED = 200
+"""Finished clips that say what the next one costs, spread over all: more would not change a median."""
+
+
+def clip_history(project: Project, n_clips: int, catalog: ClipCatalog | None = None) -> list[MeasuredClip]:
+    """Measurements of a project's finished clips, for planning the next one.
+
+    Args:
+        catalog: Says which clips are finished; all files are looked for when None.
+    """
+    finished = range(n_clips) if catalog is None else catalog.finished
+    if catalog is not None and len(finished) > MAX_MEASURED:
+        reference = {project.settings.reference_clip}.intersection(finished)
+        finished = sorted({*finished[:: -(-len(finished) // MAX_MEASURED)], *reference})
+    found = (_measured(project, clip_index) for clip_index in finished)
     return [known for known in found if known is not None]
 
 
@@ -59,7 +72,7 @@ def plan_clip(
     if is_afresh:
         history, catalog = (), None
     elif history is None:
-        history = clip_history(project, len(project.clips(capture.n_frames)))
+        history = clip_history(project, len(project.clips(capture.n_frames)), catalog)
     found = None if base is None or is_afresh else project.headers.read(project.clip_path(base))
     plan = make_plan(
         footage_of(capture, capture.camera_indices(settings.holdout)),
@@ -214,6 +227,7 @@ def plan_document(
     plans: Sequence[TrainingPlan],
     trained: Sequence[int],
     damaged: Sequence[int] = (),
+    sequence: SequencePlan | None = None,
 ) -> dict[str, Any]:
     """The output of `train --plan --json`.
 
@@ -222,8 +236,12 @@ def plan_document(
         plans: Of the clips that are not trained yet.
         trained: Indices of chosen clips that are.
         damaged: Indices of chosen clips that are not trained because they, or what they need, cannot be read.
+        sequence: What all of it costs on several workers, if that was asked for.
     """
     rows = [plan.as_dict() | {"state": "planned"} for plan in plans]
+    if sequence is not None:
+        pairs = zip(rows, plans, strict=True)
+        rows = [row | {"moved_mb": round(sequence.moved_mb[plan.clip_index], 4)} for row, plan in pairs]
     rows += [{"clip_index": clip_index, "state": "trained"} for clip_index in trained]
     rows += [{"clip_index": clip_index, "state": "damaged"} for clip_index in damaged]
     return {
@@ -234,6 +252,7 @@ def plan_document(
         "settings": project.settings.config().difference(),
         "clips": sorted(rows, key=lambda row: row["clip_index"]),
         "forecast": totals(plans),
+        **({} if sequence is None else {"workers": sequence.as_dict()}),
     }
 
 

@@ -20,6 +20,7 @@ logs/                        one file per clip
 
 from __future__ import annotations
 
+import os
 import shutil
 from contextlib import suppress
 from dataclasses import replace
@@ -166,12 +167,12 @@ class Project:
     def has_finished_clips(self) -> bool:
         """Whether a clip is finished, damaged ones and those of other cuts included: what all clips share is fixed
         then."""
-        return any((self.folder / "clips").glob("*.safetensors"))
+        return _has_clip_files(self.folder / "clips")
 
     @property
     def has_progress(self) -> bool:
         """Whether anything was learned, finished or not."""
-        return any(any((self.folder / name).glob("*.safetensors")) for name in ("clips", "checkpoints"))
+        return any(_has_clip_files(self.folder / name) for name in ("clips", "checkpoints"))
 
     def clips(self, n_frames: int) -> list[Clip]:
         """The clips of a capture of that many frames; a single one where one field covers everything."""
@@ -241,9 +242,9 @@ class Project:
         self.history = history
 
     def update(self, settings: ProjectSettings) -> None:
-        """Replace the settings; see `change`. Another place of the capture alone is not a step of the history."""
-        before = self.settings
-        if replace(settings, capture=before.capture, follow_links=before.follow_links) == before:
+        """Replace the settings; see `change`. Another place of the capture alone, or its growth, is not a step of the
+        history."""
+        if self.settings.is_placed_as(settings):
             self.happen(Placed(settings))
         else:
             self.change(replace(self.document, settings=settings), "change settings")
@@ -281,3 +282,12 @@ class Project:
             shutil.rmtree(self.folder / name, ignore_errors=True)
         for name in (PROJECT_FILE, BACKUP_FILE, HISTORY_FILE):
             (self.folder / name).unlink(missing_ok=True)
+
+
+def _has_clip_files(folder: Path) -> bool:
+    """Looks no further than the first one: there may be thousands."""
+    try:
+        with os.scandir(folder) as entries:
+            return any(entry.name.endswith(".safetensors") for entry in entries)
+    except OSError:
+        return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import get_args
 
 from app.document.changes.timing_changes import TIME_EDITS, ChangeSegment
-from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
+from app.session.captures.capture_commands import CorrectCapture, FollowRecording, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, FillBehind, GoToStep, Redo, Undo
 from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
@@ -52,6 +52,7 @@ TITLES: dict[type, str] = {
     SetClipLength: "The clip length cannot be changed",
     SetTrainSetting: "The setting cannot be changed",
     SetPreset: "The preset cannot be chosen",
+    FollowRecording: "The recording cannot be followed",
     SynchroniseCameras: "The cameras cannot be synchronised",
     **dict.fromkeys(get_args(SelectionCommand), "The selection cannot be made"),
     MarkRegion: "The region cannot be marked",

@@ -9,7 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.document.changes.timing_changes import TimeEdit
-from app.session.captures.capture_commands import CalibrationCommand, DoctorCommand, SynchronisationCommand
+from app.session.captures.capture_commands import (
+    CalibrationCommand,
+    DoctorCommand,
+    FollowRecording,
+    SynchronisationCommand,
+)
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, FillBehind, HistoryCommand
 from app.session.editing.mark_commands import MarkCommand
@@ -68,6 +73,7 @@ Command = (
     | ExportCommand
     | DoctorCommand
     | CalibrationCommand
+    | FollowRecording
     | SynchronisationCommand
     | CancelJob
     | CloseQuestion

@@ -20,11 +20,13 @@ from app.session.captures.capture_commands import (
     CalibrationCommand,
     CorrectCapture,
     DoctorCommand,
+    FollowRecording,
     LookAtVideos,
     SynchronisationCommand,
 )
 from app.session.captures.capture_doctor import CaptureDoctor
 from app.session.captures.capture_opening import CaptureOpening
+from app.session.captures.recording_follower import RecordingFollower
 from app.session.captures.synchronising import Synchronising
 from app.session.clips.clip_commands import ClipCommand
 from app.session.clips.clip_work import ClipWork
@@ -190,6 +192,9 @@ class Session(SessionFace):
             lambda: self.project, live.is_finished, lambda: None if self.capture is None else self.capture.n_frames
         )
         self.filling = parts.add(Filling(self.document, jobs, self.notices))
+        self.recording = parts.add(
+            RecordingFollower(self.document, jobs, self.notices, live, take_capture=self.projects.take_capture)
+        )
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
         self.edits: EditsStatus = self.editing.status()
@@ -270,6 +275,8 @@ class Session(SessionFace):
                 if isinstance(command, LookAtVideos):
                     self.opening.close_page()
                 self.calibrating.obey(command)
+            case FollowRecording():
+                self.recording.obey(command)
             case _ if isinstance(command, SynchronisationCommand):
                 self.synchronising.obey(command)
             case CloseQuestion():

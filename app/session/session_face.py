@@ -25,6 +25,7 @@ from app.residuals.heat_map import HeatMap
 from app.residuals.residuals import Residuals
 from app.session.captures.capture_doctor import CaptureDoctor
 from app.session.captures.doctor_status import DoctorStatus
+from app.session.captures.recording_follower import RecordingFollower
 from app.session.clips.clip_work import ClipWork
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import ProjectSelecting
@@ -38,6 +39,7 @@ from app.status import (
     DependencyStatus,
     JobStatus,
     Overlays,
+    RecordingStatus,
     ResidualStatus,
     TrainingStatus,
     VersionStatus,
@@ -66,6 +68,7 @@ class SessionFace:
     versions: Versions
     clip_work: ClipWork
     selecting: ProjectSelecting
+    recording: RecordingFollower
     log: LogView
     asked: Asked
     _jobs: Jobs
@@ -111,6 +114,11 @@ class SessionFace:
     def recent(self) -> RecentProjects:
         """Projects opened lately."""
         return self.projects.recent
+
+    @property
+    def recording_status(self) -> RecordingStatus:
+        """Whether the recording of the open capture is followed."""
+        return self.recording.status()
 
     @property
     def question(self) -> Question | None:

@@ -48,6 +48,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     QueueStatus,
+    RecordingStatus,
     RegionsStatus,
     ResidualStatus,
     TrainingStatus,
@@ -157,6 +158,8 @@ class SessionView(Protocol):
     def exclusions(self) -> Exclusions: ...
     @property
     def doctor_status(self) -> DoctorStatus: ...
+    @property
+    def recording_status(self) -> RecordingStatus: ...
 
     # ---- the shown picture; the window changes these directly
     @property

@@ -12,9 +12,8 @@ from engine.errors import ProjectError
 
 
 def is_due(catalog: ClipCatalog, clip_index: int) -> bool:
-    """Whether a clip is not finished and up to date, and can be trained. A damaged one is for the user to decide on."""
-    record = catalog[clip_index]
-    return record.state not in ("trained", "damaged") and record.blocked_by is None
+    """Whether a clip is due, see ClipRecord.is_due."""
+    return clip_index in catalog.due
 
 
 def due_clips(catalog: ClipCatalog) -> list[int]:

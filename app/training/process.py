@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -14,6 +14,7 @@ from app.training.messages import ENDINGS, Command, Event, TrainingFailed, Train
 from engine.children.kind import ChildFailed, ChildKind
 from engine.children.process import MAX_EVENTS_PER_POLL, Child, ChildProcess
 from engine.errors import EngineError
+from engine.portable import environment_of
 
 BUILD = "app.training.worker.build:build_training"
 
@@ -46,7 +47,14 @@ TRAINING: ChildKind[TrainTask, Event, None] = ChildKind(
 )
 
 
-StartChild = Callable[[ChildKind[TrainTask, Event, None], TrainTask], Child[TrainTask, Event, None]]
+class StartChild(Protocol):
+    """Starts the process of a training: `ChildProcess`, or something that does so on another computer."""
+
+    def __call__(
+        self, kind: ChildKind[TrainTask, Event, None], job: TrainTask, *, environment: Mapping[str, str]
+    ) -> Child[TrainTask, Event, None]:
+        """environment: Variables in addition to those of the process."""
+        ...
 
 
 class Worker(Protocol):
@@ -88,7 +96,7 @@ class ProcessWorker:
         self._log_path = project.log_path(job.clip_index)
         self._has_ended = False
         task = TrainTask(job, project.folder, Path(project.settings.capture), self._log_path, make)
-        self.child = start(TRAINING, task)
+        self.child = start(TRAINING, task, environment=environment_of(job.cpu))
 
     def send(self, command: Command) -> None:
         """See `Worker`."""

@@ -18,7 +18,7 @@ from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.training.clip_run import ClipRun, HandedOver, ShownState
 from app.training.curves import CurveReader
-from app.training.due import check_needed, is_due, with_needed
+from app.training.due import check_needed, with_needed
 from app.training.jobs import train_job
 from app.training.messages import (
     LIVE_VIEWS,
@@ -32,10 +32,11 @@ from app.training.messages import (
 )
 from app.training.own_settings import with_own
 from app.training.process import ProcessWorker, Worker
-from app.training.train_queue import OwnSettings, TrainQueue, drop_hopeless, needed_clips
+from app.training.train_queue import FINISHED, OwnSettings, TrainQueue, drop_hopeless, needed_clips
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import DiskError, ProjectError
+from engine.portable import NATIVE, Processor
 from engine.training.preparation.stages import remove_stages
 
 Launch = Callable[[TrainJob, Project], Worker]
@@ -57,6 +58,7 @@ class TrainingService:
         curves: Reads the curves of clips that are looked at; stays open when the service is closed.
         n_workers: How many clips may train side by side. They share the cores.
         claims: Of this process; made here when None.
+        cpu: Passed on to workers, see TrainJob.
 
     Attributes:
         queue: Clips that wait.
@@ -79,9 +81,11 @@ class TrainingService:
         curves: CurveReader | None = None,
         n_workers: int = 1,
         claims: Claims | None = None,
+        cpu: Processor = NATIVE,
     ) -> None:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open, self.n_workers = launch, is_window_open, n_workers
+        self._cpu: Processor = cpu
         self.catalog = ClipCatalog(project, len(self.clips)) if catalog is None else catalog
         self.queue = TrainQueue()
         self.runs: dict[int, ClipRun] = {}
@@ -93,6 +97,8 @@ class TrainingService:
         self._begun: dict[int, OwnSettings] = {}  # own settings with which unfinished clips were begun
         self._dropped: list[int] = []
         self._n_runs = 0
+        self._next: int | None = None
+        self._next_of: tuple[tuple[int, ...], object] = ((), None)
         self.claims = Claims(project.folder, describe=self._described) if claims is None else claims
         self._ended_elsewhere: list[ClipEvent] = []
         self._known_elsewhere: Mapping[str, Elsewhere] = self.claims.elsewhere
@@ -104,7 +110,8 @@ class TrainingService:
         known = self.claims.elsewhere
         if self._elsewhere[0] is not known:
             indices = {key: self.project.index_of(key) for key in known}
-            found = {index: known[key] for key, index in indices.items() if index is not None}
+            n_clips = len(self.clips)
+            found = {index: known[key] for key, index in indices.items() if index is not None and index < n_clips}
             self._elsewhere = (known, found)
         return self._elsewhere[1]
 
@@ -156,6 +163,12 @@ class TrainingService:
         record = self.catalog[clip_index]
         return None if record.file is None else ShownState(record.file, record.revision)
 
+    def extend(self, clips: Sequence[Clip]) -> None:
+        """The capture has grown: these are all clips now, the present ones first. Whatever trains or waits does not
+        notice."""
+        self.clips = list(clips)
+        self.catalog.extend(len(self.clips))
+
     # ---------------------------------------------------------------- choosing clips
 
     @property
@@ -166,10 +179,13 @@ class TrainingService:
         Where the queue is held, it is the first of that.
         """
         if not self.runs and self.queue:
-            return next(iter(self.queue))
-        taken = {*self.queue, *self.runs, *self.elsewhere}
-        clips = (index for index in self.catalog.order if index not in taken)
-        return next((index for index in clips if is_due(self.catalog, index)), None)
+            return self.queue.first
+        of, elsewhere = (self.catalog.revision, self.queue.revision, self._n_runs, len(self.runs)), self.elsewhere
+        if of != self._next_of[0] or elsewhere is not self._next_of[1]:  # asked all the time
+            left = self.catalog.due.difference(self.queue, self.runs, elsewhere)
+            first = self.catalog.order[0]
+            self._next_of, self._next = (of, elsewhere), first if first in left else min(left, default=None)
+        return self._next
 
     @property
     def can_train_next(self) -> bool:
@@ -341,6 +357,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.live_view,
             n_beside=n_beside,
+            cpu=self._cpu,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)
         if refused is not None:
@@ -431,5 +448,6 @@ class TrainingService:
         if self.is_ending_after and self.queue:
             self.queue.is_held = True
         self.is_ending_after = False
-        self._dropped += self.drop_hopeless()
+        if self.catalog[clip_index].state not in FINISHED:  # else nothing has become hopeless by it
+            self._dropped += self.drop_hopeless()
         self._start_waiting()

@@ -14,6 +14,8 @@ from engine.training.config import TrainConfig
 
 OwnSettings = Mapping[str, SettingValue]
 """Training settings of one clip that differ from those of its project."""
+FINISHED = ("trained", "stale")
+"""States of a clip on which others can be trained."""
 
 
 class TrainQueue:
@@ -23,15 +25,14 @@ class TrainQueue:
         is_held: Whether the first of them waits until the user continues.
         failed: Why clips could not be trained, by clip; one that is tried again leaves.
         n_done, steps_done: Clips that ended since the queue was last empty, and the steps they had.
+        revision: Grows with every change of the clips that wait.
     """
 
     def __init__(self) -> None:
-        self._clips: list[int] = []
-        self._waiting: set[int] = set()  # the same: they may be thousands
-        self._own: dict[int, OwnSettings] = {}
+        self._clips: dict[int, OwnSettings | None] = {}  # they may be thousands
         self.is_held = False
         self.failed: dict[int, str] = {}
-        self.n_done = self.steps_done = 0
+        self.n_done = self.steps_done = self.revision = 0
 
     def __iter__(self) -> Iterator[int]:
         return iter(tuple(self._clips))
@@ -40,45 +41,48 @@ class TrainQueue:
         return len(self._clips)
 
     def __contains__(self, clip_index: object) -> bool:
-        return clip_index in self._waiting
+        return clip_index in self._clips
+
+    @property
+    def first(self) -> int | None:
+        """The clip that is next; None when none waits."""
+        return next(iter(self._clips), None)
 
     def own_settings(self, clip_index: int) -> OwnSettings | None:
         """Settings that a waiting clip was given; None for those of its project."""
-        return self._own.get(clip_index)
+        return self._clips.get(clip_index)
 
     def add(self, clip_index: int, own: OwnSettings | None = None) -> None:
         """Let a clip wait behind the others. One that waits keeps its place and takes over the settings."""
-        if own is not None:
-            self._own[clip_index] = dict(own)
-        if clip_index not in self._waiting:
-            self._clips.append(clip_index)
-            self._waiting.add(clip_index)
+        self._clips[clip_index] = self._clips.get(clip_index) if own is None else dict(own)
+        self.revision += 1
 
     def take(self, clip_index: int) -> OwnSettings | None:
         """A waiting clip waits no more. Returns its settings."""
-        self._clips.remove(clip_index)
-        self._waiting.discard(clip_index)
+        own = self._clips.pop(clip_index)
         self.failed.pop(clip_index, None)
-        return self._own.pop(clip_index, None)
+        self.revision += 1
+        return own
 
     def move(self, clip_index: int, position: int) -> None:
         """Put a waiting clip at a position, counted from 0 without it; held inside the queue."""
-        if clip_index in self._waiting:
-            self._clips.remove(clip_index)
-            self._clips.insert(min(max(position, 0), len(self._clips)), clip_index)
+        if clip_index in self._clips:
+            order = [index for index in self._clips if index != clip_index]
+            order.insert(min(max(position, 0), len(order)), clip_index)
+            self._clips = {index: self._clips[index] for index in order}
+            self.revision += 1
 
     def remove(self, clip_index: int) -> None:
         """Let a clip wait no more, if it does."""
-        if clip_index in self._waiting:
-            self._clips.remove(clip_index)
-            self._waiting.discard(clip_index)
-        self._own.pop(clip_index, None)
+        self._clips.pop(clip_index, None)
+        self.revision += 1
         if not self._clips:
             self.is_held = False
 
     def clear(self) -> None:
         """Let none wait."""
-        self._clips, self._waiting, self._own, self.is_held = [], set(), {}, False
+        self._clips, self.is_held = {}, False
+        self.revision += 1
 
     def note_end(self, n_steps: int) -> None:
         """A clip ended, in any way."""
@@ -116,7 +120,7 @@ def drop_hopeless(queue: TrainQueue, running: Iterable[int], project: Project, c
     config = project.settings.config()
     for clip_index in queue:
         needed = needed_clips(project, clip_index, config)
-        if any(other not in come and catalog[other].state not in ("trained", "stale") for other in needed):
+        if any(other not in come and catalog[other].state not in FINISHED for other in needed):
             dropped.append(clip_index)
         else:
             come.add(clip_index)

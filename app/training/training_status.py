@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 from app.project.claims.claims import Elsewhere
 from app.project.claims.holder_record import ClipProgress, MachineLoad, machine_name
+from app.project.clips.clip_catalog import ClipRecord
 from app.status import ClipStatus, MachineStatus, RunningClip, TrainingStatus
 from app.training.curves import Curves
 from app.training.messages import ClipTrained
@@ -34,12 +36,13 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
     is_reference = clip_index == settings.reference_clip or settings.config().independent
     number, n_stages = stage_number(stage, is_reference=is_reference) if step is None else (0, 0)
     done = 0.0 if run is None else run.stage.done
+    trainings = running_clips(service)
     return TrainingStatus(
         state=state,
         clip_index=clip_index,
         n_running=len(service.runs),
-        trainings=tuple(running_clips(service)),
-        machines=tuple(machines(service)),
+        trainings=trainings,
+        machines=tuple(machines(service, trainings)),
         step=0 if run is None else run.step,
         n_steps=0 if run is None else run.n_steps,
         progress=done if step is None else step.step / max(step.n_steps, 1),
@@ -60,11 +63,11 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
     )
 
 
-def running_clips(service: TrainingService) -> list[RunningClip]:
+def running_clips(service: TrainingService) -> tuple[RunningClip, ...]:
     """All clips in training, here and elsewhere, in the order of their indices."""
     found = [_running(run.progress) for run in service.runs.values() if run.ending is None]
     found += [_elsewhere(clip_index, other) for clip_index, other in service.elsewhere.items()]
-    return sorted(found, key=lambda clip: clip.clip_index)
+    return tuple(sorted(found, key=lambda clip: clip.clip_index))
 
 
 def _running(progress: ClipProgress) -> RunningClip:
@@ -91,13 +94,13 @@ def _elsewhere(clip_index: int, other: Elsewhere) -> RunningClip:
     return replace(known, clip_index=clip_index, machine=known.machine or machine, is_elsewhere=True, who=other.who)
 
 
-def machines(service: TrainingService) -> list[MachineStatus]:
-    """The computers that train clips, this one first, the others by name."""
+def machines(service: TrainingService, trainings: Sequence[RunningClip]) -> list[MachineStatus]:
+    """The computers that train these clips, this one first, the others by name."""
     here, known = machine_name(), dict[str, MachineLoad]()
     for holder in service.claims.others:
         known[holder.owner.host] = holder.load
     known[here] = service.claims.load
-    counts = Counter(clip.machine or here for clip in running_clips(service))
+    counts = Counter(clip.machine or here for clip in trainings)
     found = list[MachineStatus]()
     for name in sorted({*counts, here}, key=lambda name: (name != here, name)):
         load = known.get(name, MachineLoad(0))
@@ -124,6 +127,8 @@ class ClipStatuses:
         self._service = service
         self._statuses: list[ClipStatus] = []
         self._made_of: tuple[object, ...] = ()
+        self._records: list[ClipRecord] = []
+        self._places: set[tuple[str, int, str]] = set()
 
     def all(self, live_counts: tuple[int, int, int] | None = None) -> list[ClipStatus]:
         """All of them.
@@ -131,16 +136,31 @@ class ClipStatuses:
         Args:
             live_counts: A clip that trains, with its inherited and own anchors, if a state of it was loaded.
         """
-        service = self._service
-        queue, runs, elsewhere = service.queue, service.runs, service.elsewhere
-        made_of = (service.catalog.revision, tuple(queue), tuple(runs), tuple(queue.failed), tuple(elsewhere))
-        if self._made_of != made_of:
-            self._statuses = [self._status(index, None) for index in range(len(service.clips))]
-            self._made_of = made_of
-        for clip_index in (*runs, *elsewhere):
+        self._follow()
+        for clip_index in (*self._service.runs, *self._service.elsewhere):
             counts = live_counts[1:] if live_counts is not None and live_counts[0] == clip_index else None
             self._statuses[clip_index] = self._status(clip_index, counts)
         return list(self._statuses)
+
+    def _follow(self) -> None:
+        """Remake those that have changed, but for those that train."""
+        service = self._service
+        queue, runs, catalog, elsewhere = service.queue, service.runs, service.catalog, service.elsewhere
+        made_of = (catalog.revision, queue.revision, tuple(runs), tuple(queue.failed.items()), tuple(elsewhere))
+        if self._made_of == made_of:
+            return
+        places = {("waits", index, "") for index in queue} | {("trains", index, "") for index in runs}
+        places |= {("elsewhere", index, "") for index in elsewhere}
+        places |= {("failed", index, why) for index, why in queue.failed.items()}
+        if len(self._statuses) != len(catalog):
+            self._statuses = [self._status(index, None) for index in range(len(catalog))]
+        else:
+            changed = {index for _, index, _ in places ^ self._places}
+            pairs = zip(catalog.records, self._records, strict=True)
+            changed.update(index for index, (now, then) in enumerate(pairs) if now is not then)
+            for index in changed:
+                self._statuses[index] = self._status(index, None)
+        self._made_of, self._records, self._places = made_of, list(catalog.records), places
 
     def _status(self, clip_index: int, live_counts: tuple[int, int] | None) -> ClipStatus:
         record, run, queue = self._service.catalog[clip_index], self._service.runs.get(clip_index), self._service.queue

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Generic, cast
@@ -116,6 +116,7 @@ class ChildProcess(Child[Job, Event, Result]):
         kind: The kind of its work.
         job: Its job.
         folder: The folder the child removes where this process has died before it.
+        environment: Variables in addition to those of this process.
         sweep: Called with the child's number once it has died without an answer; removes what it would have removed
             itself.
     """
@@ -126,6 +127,7 @@ class ChildProcess(Child[Job, Event, Result]):
         job: Job,
         *,
         folder: Path | None = None,
+        environment: Mapping[str, str] | None = None,
         sweep: Callable[[int], None] = lambda pid: None,
     ) -> None:
         super().__init__(kind)
@@ -137,7 +139,7 @@ class ChildProcess(Child[Job, Event, Result]):
         try:
             with ExitStack() as kept:
                 self._said = kept.enter_context(tempfile.TemporaryFile())
-                self._process = _start(kind, folder, self._said)
+                self._process = _start(kind, folder, environment or {}, self._said)
                 kept.pop_all()
         except OSError as error:
             reason = f"{kind.what} could not be started ({error.strerror or error})"
@@ -220,10 +222,12 @@ class ChildProcess(Child[Job, Event, Result]):
         return ChildFailed(f"{self.kind.what} ended with code {code}", is_final=code >= 0)
 
 
-def _start(kind: ChildKind[Job, Event, Result], folder: Path | None, said: IO[bytes]) -> subprocess.Popen[bytes]:
+def _start(
+    kind: ChildKind[Job, Event, Result], folder: Path | None, added: Mapping[str, str], said: IO[bytes]
+) -> subprocess.Popen[bytes]:
     root = str(Path(engine.__file__).resolve().parents[1])
     paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    environment = {**os.environ, **added, "PYTHONPATH": os.pathsep.join(paths)}
     if kind.is_spreading:
         environment["OPENBLAS_NUM_THREADS"] = "1"
     command = [sys.executable, "-P", "-m", "engine.children", kind.place, *([str(folder)] if folder else [])]

@@ -35,7 +35,7 @@ from engine.model.clip_view import REACH_SPACINGS, reaches_of, render_model
 from engine.model.host_array import host_array
 from engine.model.reading import load_clip_model
 from engine.progress import Progress, ReportProgress, StepStats
-from engine.training.checkpoint import Checkpoint, damaged_checkpoint, read_checkpoint, write_checkpoint
+from engine.training.checkpoint import Checkpoint, damaged_checkpoint, name_of, read_checkpoint, write_checkpoint
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import named_parameters, schedule_of
 from engine.training.phases import phase_at, phases_of
@@ -96,6 +96,7 @@ class ClipTraining:
         self.reference, self.previous, self.backend = reference, previous, backend
         self._base = method.base(reference, previous)
         self.regions = tuple(regions)
+        self._shared: tuple[Backgrounds, str] | None = None
         self.holdout = sorted(set(holdout) - set(capture.excluded_cameras))
         self.camera_indices = _training_cameras(capture, self.holdout, self._base)
         if len(self.camera_indices) < 2:
@@ -523,7 +524,20 @@ class ClipTraining:
         state = ClipState(state.arrays | self._phase.arrays(), state.header)
         reaches = {role: host_array(reach) for role, reach in self._phase.reaches.items()}
         gains = host_array(self.gains).copy()
-        write_checkpoint(path, Checkpoint(state, gains, self.backgrounds, place, reaches, self._cameras.kept))
+        shared = self._name_of_shared()
+        backgrounds = None if shared else self.backgrounds
+        write_checkpoint(path, Checkpoint(state, gains, backgrounds, place, reaches, self._cameras.kept, shared))
+
+    def _name_of_shared(self) -> str:
+        """The name of the backgrounds that the reference clip has left, if they are this source clip's as they are;
+        else empty. Looked up once: they are read from a disk that others may use, too."""
+        if self._base is None:
+            return ""
+        if self._shared is None or self._shared[0] is not self.backgrounds:
+            found = self._preparation.shared_backgrounds()
+            is_shared = found is not None and found.equals(self.backgrounds)
+            self._shared = (self.backgrounds, name_of(self.backgrounds) if is_shared else "")
+        return self._shared[1]
 
     def restore_checkpoint(self, path: Path | str) -> None:
         """Continue from a checkpoint instead of `prepare`.
@@ -533,9 +547,14 @@ class ClipTraining:
         """
         frames = (self.clip.start, self.clip.n_frames, self.clip.clip_length)
         kept = read_checkpoint(path, frames=frames, camera_names=self.rig.names, seed=self.seed)
+        backgrounds = kept.backgrounds
+        if backgrounds is None:
+            backgrounds = self._preparation.shared_backgrounds()
+            if backgrounds is None or name_of(backgrounds) != kept.shared:
+                raise ProjectError("The backgrounds that the checkpoint was made with are gone.", path=path)
         self.pictures = self._preparation.read_pictures()
         try:
-            self._go_on(kept)
+            self._go_on(kept, backgrounds)
         except ProjectError as error:  # a rebuilt state knows no file
             raise ProjectError(error.message, hint=error.hint, path=error.path or path) from error
         except (
@@ -549,10 +568,10 @@ class ClipTraining:
         ) as error:
             raise damaged_checkpoint(error, path) from error
 
-    def _go_on(self, kept: Checkpoint) -> None:
+    def _go_on(self, kept: Checkpoint, backgrounds: Backgrounds) -> None:
         width, height = self.capture.picture_size
-        if kept.backgrounds.images.shape != (len(self.rig), height, width, 3) or kept.gains.shape != (len(self.rig), 3):
-            found = f"{kept.backgrounds.images.shape} and {kept.gains.shape}"
+        if backgrounds.images.shape != (len(self.rig), height, width, 3) or kept.gains.shape != (len(self.rig), 3):
+            found = f"{backgrounds.images.shape} and {kept.gains.shape}"
             raise ValueError(f"backgrounds and gains are {found}, not of {len(self.rig)} cameras of {width}x{height}")
         header, place = kept.state.header, kept.place
         drift = kept.state.drift
@@ -567,7 +586,7 @@ class ClipTraining:
             load_clip_model(kept.state, self.reference, backend=self.backend, is_learning=True),
             nn.Parameter(torch.from_numpy(kept.gains).to(self.backend.device, self.backend.dtype)),
             drift,
-            kept.backgrounds,
+            backgrounds,
             header.spacing,
             moving_spacing=header.moving_spacing,
             reasons=_reasons_in(kept.state),

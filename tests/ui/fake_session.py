@@ -82,6 +82,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     QueueStatus,
+    RecordingStatus,
     RegionsStatus,
     ResidualStatus,
     SeamStatus,
@@ -296,6 +297,7 @@ class FakeSession:
         self.cached: list[tuple[int, int]] = []  # what cached_frames answers
         self.project = None
         self.doctor_status = DoctorStatus()
+        self.recording_status = RecordingStatus()
         self.timeline, self.views = Timeline(), Views()
         self.bookmarks = Bookmarks()
         if has_capture:

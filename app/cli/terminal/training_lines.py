@@ -114,7 +114,7 @@ class PlanLines:
         step_time: StepTime,
         is_quiet: bool,
     ) -> None:
-        self._line, self._project, self._capture, self._is_quiet = line, project, capture, is_quiet
+        self._line, self._project, self.capture, self._is_quiet = line, project, capture, is_quiet
         self._catalog, self._step_time = catalog, step_time
         self._plans: dict[int, TrainingPlan] = {}
 
@@ -125,7 +125,7 @@ class PlanLines:
         try:
             plan = self._plans[clip.clip_index] = plan_clip(
                 self._project,
-                self._capture,
+                self.capture,
                 clip,
                 step_time=self._step_time,
                 catalog=self._catalog,

@@ -65,8 +65,14 @@ def list_holders(folder: Path) -> list[str]:
 
 def newest_claim(folder: Path, key: str) -> ClaimFile | None:
     """The claim of a clip that counts; None without one. folder: Of the project."""
-    numbers = [number for other, number in _numbered(folder) if other == key]
+    numbers = _numbers_of(folder, key)
     return ClaimFile(folder, key, max(numbers)) if numbers else None
+
+
+def is_unsurpassed(claim: ClaimFile) -> bool:
+    """Whether a claim is as it was made, and none that counts more was made after it. Looks at two files only."""
+    after = ClaimFile(claim.folder, claim.key, claim.number + 1)
+    return os.path.lexists(claim.path) and not os.path.lexists(after.path)
 
 
 def make_claim(claim: ClaimFile, token: str) -> bool:
@@ -97,7 +103,7 @@ def make_claim(claim: ClaimFile, token: str) -> bool:
 
 def remove_claim(claim: ClaimFile) -> None:
     """Remove a claim and all that count less, lowest first. Never fails; what the disk refuses counts as dead later."""
-    numbers = sorted(number for key, number in _numbered(claim.folder) if key == claim.key)
+    numbers = sorted(_numbers_of(claim.folder, claim.key))
     for number in [*(number for number in numbers if number < claim.number), claim.number]:
         with suppress(OSError):
             ClaimFile(claim.folder, claim.key, number).path.unlink(missing_ok=True)
@@ -106,6 +112,12 @@ def remove_claim(claim: ClaimFile) -> None:
 def _numbered(folder: Path) -> list[tuple[str, int]]:
     found = (_CLAIM.fullmatch(name) for name in _names(folder))
     return [(match["key"], int(match["number"])) for match in found if match and PROGRAM_NAME.fullmatch(match["key"])]
+
+
+def _numbers_of(folder: Path, key: str) -> list[int]:
+    prefix = f"{key}."  # hundreds of others are passed over quickly
+    found = (_CLAIM.fullmatch(name) for name in _names(folder) if name.startswith(prefix))
+    return [int(match["number"]) for match in found if match]
 
 
 def _names(folder: Path) -> list[str]:

@@ -19,11 +19,12 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
-from app.project.claims.asks import Ask, drop_ask, take_asks
+from app.project.claims.asks import Ask, drop_ask, take_ask
 from app.project.claims.claim_files import (
     CLAIMS,
     ClaimFile,
     holder_path,
+    is_unsurpassed,
     list_claims,
     list_holders,
     make_claim,
@@ -48,8 +49,12 @@ T = TypeVar("T")
 
 BEAT_EVERY_S = 5.0
 LOOK_EVERY_S = 2.0
+LOOK_SHARE = 0.05
+"""Share of the time that looking may take: where there are hundreds of others, it is done less often."""
 DEAD_AFTER_S = 60.0
 """A holder that has said nothing for so long has ended; one that was only slow notices that its claim is lost."""
+MAX_SAID_AT_ONCE = 16
+"""Clips in training up to which a further one is said at once; the record of hundreds takes a while to write."""
 _MAX_TRIES = 100
 
 
@@ -127,7 +132,7 @@ class Claims:
         self._asked: SimpleQueue[tuple[str, Ask]] = SimpleQueue()
         self._changed: SimpleQueue[str] = SimpleQueue()
         self._seen: dict[str, tuple[object, float, int]] = {}  # state of a holder, since when, and how many before it
-        self._clip_files: dict[str, tuple[int, int]] | None = None
+        self._clip_files: dict[str, int] | None = None
         self._clips_time: int | None = None
         self._is_clips_time_old = False
         self._load = MachineLoad(os.cpu_count() or 1)
@@ -151,7 +156,8 @@ class Claims:
                 return
             try:
                 (self.folder / CLAIMS).mkdir(exist_ok=True)  # not the project itself, which may be gone
-                self._say()
+                if len(self._held) < MAX_SAID_AT_ONCE:  # else with the next beat
+                    self._say()
                 self._held[key] = self._claimed(key)
             except OSError as error:
                 raise disk_error(error, what="The claim of the clip", path=self.folder / CLAIMS) from error
@@ -189,7 +195,8 @@ class Claims:
                 drop_ask(self.folder, key)
             self._lost.discard(key)
             self._be_silent_without_claims()
-        self._wake.set()
+            if not self._held:
+                self._wake.set()
 
     def _be_silent_without_claims(self) -> None:
         if not self._held:
@@ -237,7 +244,8 @@ class Claims:
         return set(_all_of(self._changed))
 
     def watch(self) -> None:
-        """Look also while nothing is claimed here."""
+        """Look at what others do, from now on, also while nothing is claimed here. Who only trains needs not: hundreds
+        of processes that all look at each other would keep a shared disk from anything else."""
         self._is_watching = True
         self._start()
 
@@ -254,16 +262,9 @@ class Claims:
 
     def look(self) -> None:
         """One round: say that this process lives, and see what others do. For the thread of the claims."""
-        self._load = machine_load()
-        with self._guard:
-            if self._held and self._clock() - self._beaten_s >= BEAT_EVERY_S:
-                with suppress(OSError):
-                    self._say()
-            for key in list(self._held):
-                self._check_held(key)
+        self.look_after_held()
         try:
             claims = list_claims(self.folder)
-            names = os.listdir(self.folder / CLAIMS) if claims else []
         except OSError:
             return  # the disk does not answer; what was seen last holds
         records = {token: read_holder(holder_path(self.folder, token)) for token in list_holders(self.folder)}
@@ -277,10 +278,23 @@ class Claims:
             said = {other.holder.token for other in self._elsewhere.values() if other.holder is not None}
             self._others = tuple(record for token, record in records.items() if record is not None and token in said)
             counting = {str(claim.path) for claim in claims.values()}
-            for asked in take_asks(self.folder, names, set(self._held)):
-                self._asked.put(asked)
             self._seen = {path: seen for path, seen in self._seen.items() if path in counting}
             self._look_at_clips()
+
+    def look_after_held(self) -> None:
+        """The part of a round for what is claimed here: say that this process lives, see whether a claim was lost and
+        what is asked. Looks at files of these clips only, however many others train."""
+        self._load = machine_load()
+        if self._held and self._clock() - self._beaten_s >= BEAT_EVERY_S:
+            with self._guard, suppress(OSError):
+                self._say()
+        for key, claim in list(self._held.items()):
+            if not is_unsurpassed(claim):
+                with self._guard:
+                    self._check_held(key)
+            ask = take_ask(self.folder, key)
+            if ask is not None:
+                self._asked.put((key, ask))
 
     def _start(self) -> None:
         if self._has_thread and (self._thread is None or not self._thread.is_alive()):
@@ -289,11 +303,16 @@ class Claims:
 
     def _run(self) -> None:
         while self._held or self._is_watching:
+            started_s = time.monotonic()
             try:
-                self.look()
+                if self._is_watching:
+                    self.look()
+                else:
+                    self.look_after_held()
             except Exception:  # the thread must go on: others take a silent process for dead
                 logger.exception("claims could not be looked at")
-            self._wake.wait(LOOK_EVERY_S)
+            took_s = time.monotonic() - started_s
+            self._wake.wait(min(max(LOOK_EVERY_S, took_s / LOOK_SHARE), BEAT_EVERY_S))
             self._wake.clear()
 
     def _say(self) -> None:
@@ -359,12 +378,9 @@ class Claims:
             if is_same and self._is_clips_time_old:
                 return
             self._is_clips_time_old = is_same  # looked at once more: times are coarse
-            found: dict[str, tuple[int, int]] = {}
-            with os.scandir(folder) as entries:
-                for entry in entries:
-                    if entry.name.endswith(".safetensors"):
-                        status = entry.stat(follow_symlinks=False)
-                        found[entry.name.removesuffix(".safetensors")] = (status.st_mtime_ns, status.st_size)
+            with os.scandir(folder) as entries:  # a file that replaces another one has another inode
+                files = [entry for entry in entries if entry.name.endswith(".safetensors")]
+                found = {entry.name.removesuffix(".safetensors"): entry.inode() for entry in files}
         except OSError:
             return
         before, self._clip_files = self._clip_files, found

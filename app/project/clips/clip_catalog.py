@@ -5,8 +5,9 @@ Read once when a project is opened, in one pass and on any thread; kept up to da
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,11 @@ class ClipRecord:
     inherits: str = ""
     held_out_whole: bool = False
 
+    @property
+    def is_due(self) -> bool:
+        """Whether it is not finished and up to date, and can be trained. A damaged one is for the user to decide on."""
+        return self.state not in ("trained", "damaged") and self.blocked_by is None
+
 
 @dataclass(frozen=True, slots=True)
 class Basis:
@@ -88,17 +94,29 @@ class ClipCatalog:
 
     Attributes:
         order: Indices of the clips as they are trained.
+        due: Those that are due, see ClipRecord.is_due.
         revision: Grows with every change.
 
     Args:
         project: Whose clips.
         n_clips: Number of clips of the capture.
         report: Receives the number of clips read so far, from time to time.
+        only: Clips to look at, for who trains one of thousands; the others count as untrained. All when None.
     """
 
-    def __init__(self, project: Project, n_clips: int, report: Callable[[int], None] = lambda n_read: None) -> None:
+    def __init__(
+        self,
+        project: Project,
+        n_clips: int,
+        report: Callable[[int], None] = lambda n_read: None,
+        *,
+        only: Collection[int] | None = None,
+    ) -> None:
         self._project = project
         self.order = project.training_order(n_clips)
+        self._after = dict(itertools.pairwise(self.order))
+        self._before = {after: before for before, after in self._after.items()}
+        self.due: set[int] = set()
         self.revision = 0
         self._clips: list[FoundHeader | None] = [None] * n_clips
         self._checkpoints: list[FoundHeader | None] = [None] * n_clips
@@ -106,18 +124,42 @@ class ClipCatalog:
         self._evaluated: dict[int, tuple[str, float]] = {}
         config = project.settings.config()
         self._inherits, self._goes_on = not config.independent, config.follows_previous
-        if project.has_progress:
-            for index in range(n_clips):
+        self._read_all(range(n_clips) if only is None else only, report)
+        self._judge_all()
+
+    def extend(self, n_clips: int) -> None:
+        """The capture has grown: there are so many clips now, the present ones first."""
+        later = range(len(self._clips), n_clips)
+        self.order = self._project.training_order(n_clips)
+        self._after = dict(itertools.pairwise(self.order))
+        self._before = {after: before for before, after in self._after.items()}
+        self._clips += [None] * len(later)
+        self._checkpoints += [None] * len(later)
+        self._read_all(later)
+        self.judge_anew()
+
+    def _read_all(self, indices: Collection[int], report: Callable[[int], None] = lambda n_read: None) -> None:
+        if self._project.has_progress:
+            for index in indices:
                 if index % REPORT_EVERY == 0:
                     report(index)
                 self._read(index)
-        self._records = self._judged()
 
     def __len__(self) -> int:
         return len(self._records)
 
     def __getitem__(self, clip_index: int) -> ClipRecord:
         return self._records[clip_index]
+
+    @property
+    def records(self) -> Sequence[ClipRecord]:
+        """All of them; one is another object once it has changed."""
+        return self._records
+
+    @property
+    def finished(self) -> list[int]:
+        """Clips with a finished file that can be read, up to date or not, in order."""
+        return [index for index in range(len(self)) if self._good(index) is not None]
 
     @property
     def n_trained(self) -> int:
@@ -130,14 +172,14 @@ class ClipCatalog:
         return self._has_finished_clips
 
     def update(self, clip_index: int) -> None:
-        """Read the files of one clip again; the others are judged anew by what was read before."""
+        """Read the files of one clip again; others that depend on it are judged anew by what was read before."""
         self._read(clip_index)
-        self._records = self._judged()
+        self._judge(clip_index)
         self.revision += 1
 
     def judge_anew(self) -> None:
         """The document has changed: judge all clips by what was read before."""
-        self._records = self._judged()
+        self._judge_all()
         self.revision += 1
 
     def note_evaluated(self, psnr: Sequence[float | None]) -> None:
@@ -164,7 +206,7 @@ class ClipCatalog:
         for index in range(len(self)):
             if path is not None and self._good(index) is not None and path == self._project.clip_path(index):
                 self._clips[index] = FoundHeader(None, reason, 0)
-                self._records = self._judged()
+                self._judge(index)
                 self.revision += 1
                 return True
         return False
@@ -222,24 +264,18 @@ class ClipCatalog:
         fingerprints = [None if header is None else header.fingerprint for header in headers]
         if replaced is not None:
             fingerprints[replaced] = "another"
-        first = self.order[0] if self.order else 0
         bases = [Basis()] * len(headers)
-        before: int | None = None
         for index in self.order:
-            bases[index] = self._basis(index, headers[index], fingerprints, bases, first=first, before=before)
-            before = index
+            bases[index] = self._basis(index, fingerprints.__getitem__, bases)
         return bases
 
-    def _basis(
-        self,
-        index: int,
-        header: ClipHeader | None,
-        fingerprints: Sequence[str | None],
-        bases: Sequence[Basis],
-        *,
-        first: int,
-        before: int | None,
-    ) -> Basis:
+    def _fingerprint(self, index: int) -> str | None:
+        header = self._good(index)
+        return None if header is None else header.fingerprint
+
+    def _basis(self, index: int, fingerprint: Callable[[int], str | None], bases: Sequence[Basis]) -> Basis:
+        """By the fingerprints of the first clip and the one before, and the basis of that."""
+        header, first, before = self._good(index), self.order[0], self._before.get(index)
         if header is None:
             needed = [first] if self._inherits and index != first else []
             needed += [before] if self._goes_on and before is not None else []
@@ -250,13 +286,13 @@ class ClipCatalog:
         if header.role == "source":
             if self._is_damaged(first):
                 return Basis(f"Clip {first}, which it was trained on, is damaged.", first)
-            if fingerprints[first] is None or fingerprints[first] != header.reference_fingerprint:
+            if fingerprint(first) is None or fingerprint(first) != header.reference_fingerprint:
                 return Basis(f"Clip {first}, the reference it was trained on, was retrained or is gone.")
         if header.previous_fingerprint is None or before is None:
             return Basis()
         if self._is_damaged(before):
             return Basis(f"Clip {before}, which it continues, is damaged.", before)
-        if fingerprints[before] is None or fingerprints[before] != header.previous_fingerprint:
+        if fingerprint(before) is None or fingerprint(before) != header.previous_fingerprint:
             return Basis(f"Clip {before}, which it continues, was retrained or is gone.")
         if bases[before].reason:
             return Basis(f"Clip {before}, which it continues, is out of date.", bases[before].blocked_by)
@@ -269,11 +305,39 @@ class ClipCatalog:
     def _blocker(self, index: int, bases: Sequence[Basis]) -> int | None:
         return index if self._is_damaged(index) else bases[index].blocked_by
 
-    def _judged(self) -> list[ClipRecord]:
-        records = [self._record(index, basis) for index, basis in enumerate(self._bases())]
-        self._n_trained = sum(record.state == "trained" for record in records)
+    def _judge_all(self) -> None:
+        self._basis_of = self._bases()
+        self._records = [self._record(index, basis) for index, basis in enumerate(self._basis_of)]
+        self._n_trained = sum(record.state == "trained" for record in self._records)
         self._has_finished_clips = self._project.has_finished_clips
-        return records
+        self.due = {index for index, record in enumerate(self._records) if record.is_due}
+
+    def _judge(self, clip_index: int) -> None:
+        """A clip was read again: judge it and those that follow from it. All stand on the first one; on another one
+        only the next in the order of training, and on that the next as long as something changes."""
+        if clip_index == self.order[0]:
+            self._judge_all()
+            return
+        index: int | None = clip_index
+        while index is not None:
+            basis = self._basis(index, self._fingerprint, self._basis_of)
+            is_same = basis == self._basis_of[index]
+            self._basis_of[index] = basis
+            self._note(index, self._record(index, basis))
+            if is_same and index != clip_index:
+                break
+            index = self._after.get(index)
+        self._has_finished_clips = self._clips[clip_index] is not None or self._project.has_finished_clips
+
+    def _note(self, index: int, record: ClipRecord) -> None:
+        if record == self._records[index]:
+            return
+        self._n_trained += (record.state == "trained") - (self._records[index].state == "trained")
+        self._records[index] = record
+        if record.is_due:
+            self.due.add(index)
+        else:
+            self.due.discard(index)
 
     def _record(self, index: int, basis: Basis) -> ClipRecord:
         found, kept = self._clips[index], self._checkpoints[index]

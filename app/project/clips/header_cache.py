@@ -4,13 +4,18 @@ only how far the cameras' exposure is from the reference clip's."""
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+from msgspec import structs
 
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import look_at_clip
 from engine.clip_files.kept_drift import mean_change, read_drift
 from engine.errors import ProjectError
+
+_ALIKE = ("camera_names", "decoder", "reference_fingerprint")
+"""Entries that most clips of a project have in common."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +40,10 @@ class HeaderCache:
 
     def __init__(self) -> None:
         self._known: dict[Path, tuple[tuple[int, int, int], FoundHeader]] = {}
+        self._last: ClipHeader | None = None
+
+    def __len__(self) -> int:
+        return len(self._known)
 
     def read(self, path: Path) -> FoundHeader | None:
         """The header of a clip, checkpoint or snapshot; None when there is no such file."""
@@ -47,9 +56,21 @@ class HeaderCache:
         identity = (status.st_mtime_ns, status.st_size, status.st_ino)
         known = self._known.get(path)
         if known is None or known[0] != identity:
-            known = (identity, _read(path, status.st_size))
+            found = _read(path, status.st_size)
+            if found.header is not None:
+                self._last = header = _sharing(found.header, self._last)
+                found = replace(found, header=header)
+            known = (identity, found)
             self._known[path] = known  # one assignment: another thread sees the old entry or the new one
         return known[1]
+
+
+def _sharing(header: ClipHeader, other: ClipHeader | None) -> ClipHeader:
+    """The same, with what is equal in both kept once: clips may be thousands, and name the same cameras."""
+    if other is None:
+        return header
+    equal = {name: kept for name in _ALIKE if getattr(header, name) == (kept := getattr(other, name))}
+    return structs.replace(header, **equal)
 
 
 def _read(path: Path, n_bytes: int) -> FoundHeader:

@@ -111,6 +111,13 @@ class LiveTraining(SessionPart):
         """The same project is open, with other settings."""
         self.open(opened)
 
+    def grow(self, opened: OpenedProject) -> None:
+        """Its capture has grown: what trains and waits goes on."""
+        assert self.service is not None
+        self._opened = opened
+        self.service.extend(opened.clips)
+        self._statuses = ClipStatuses(self.service)
+
     def _retire(self, service: TrainingService, opened: OpenedProject) -> None:
         self._forecasts.forget()
         self._unread, self._live_counts = {}, None

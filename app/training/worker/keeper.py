@@ -28,8 +28,9 @@ HELD_OUT_EVERY_S = 5.0
 HELD_OUT_SHARE = 0.03
 CHECKPOINT_EVERY_S = 25.0
 """From the start of one to the start of the next: a step and the writing included, a kill costs at most 30 s."""
-CHECKPOINT_SHARE = 0.5
-"""Only a disk on which writing takes longer than that delays the next one."""
+CHECKPOINT_SHARE = 0.01
+"""A disk on which one takes longer than a quarter of a second delays the next: hundreds of workers that share one, each
+with checkpoints of tens of megabytes, would keep it from all else and wait for it half of their time."""
 
 
 def _snapshot_cadence(live_view: str) -> Cadence:

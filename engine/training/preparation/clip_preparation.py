@@ -283,7 +283,16 @@ class ClipPreparation:
         if not self._method.has_light:
             return parts
         plain = range(reference.header.start, reference.header.start + reference.header.n_frames)
-        measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report, plain=plain)
+        measure_light(
+            model,
+            pictures,
+            self._cameras.rig,
+            backgrounds,
+            exposures,
+            self._report,
+            plain=plain,
+            is_looking_ahead=self._config.backgrounds == "capture",
+        )
         return parts
 
     def keep_backgrounds(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> None:
@@ -300,6 +309,10 @@ class ClipPreparation:
         kept = read_backgrounds(self._prep_dir, key)
         if kept is None or not kept.equals(backgrounds):
             write_backgrounds(self._prep_dir, backgrounds, key)
+
+    def shared_backgrounds(self) -> Backgrounds | None:
+        """The backgrounds that the reference clip has left for source clips; None where there are none."""
+        return read_backgrounds(self._prep_dir, self._key_of_corrected())
 
     # ---------------------------------------------------------------- the kept parts of an attempt
 

@@ -10,6 +10,8 @@ import pytest
 
 from app.project.clips.clip_catalog import ClipCatalog, anchor_counts
 from app.project.project import Project
+from app.training.messages import TrainJob
+from app.training.process import Worker
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses
 from engine.capture.clip import split_clips
@@ -21,6 +23,10 @@ from tests.clip_headers import changed, header_values, write_values
 
 def states(catalog: ClipCatalog) -> list[str]:
     return [catalog[index].state for index in range(len(catalog))]
+
+
+def never(job: TrainJob, project: Project) -> Worker:
+    raise AssertionError("nothing trains here")
 
 
 def state_by_definition(project: Project, clip_index: int) -> str:
@@ -68,6 +74,50 @@ def test_every_state_is_the_one_by_definition(tmp_path: Path, seed: int) -> None
     assert states(ClipCatalog(project, n_clips)) == expected
 
 
+@pytest.mark.parametrize("seed", range(25))
+def test_whatever_happens_it_says_what_one_made_anew_would_say(tmp_path: Path, seed: int) -> None:
+    drawn = random.Random(seed)
+    n_clips, first = 8, drawn.randrange(3)
+    overrides = {"field": "continue"} if drawn.random() < 0.6 else {}
+    project = make_project(tmp_path, reference_clip=first, overrides=overrides)
+    service = TrainingService(project, split_clips(n_clips, 1), holdout=(), launch=never)
+    catalog, statuses = service.catalog, ClipStatuses(service)
+
+    def change(index: int) -> None:
+        path = drawn.choice([project.clip_path, project.checkpoint_path])(index)
+        entries: dict[str, object] = {"fingerprint": drawn.choice([f"clip-{index}"] * 3 + ["another"])}
+        if index != first:
+            entries |= {"role": "source", "reference_fingerprint": drawn.choice([f"clip-{first}"] * 6 + ["older"])}
+            entries["previous_fingerprint"] = f"clip-{project.previous_index(index)}" if overrides else None
+        match drawn.choice(["write"] * 4 + ["remove", "spoil"]):
+            case "remove":
+                path.unlink(missing_ok=True)
+            case "spoil" if path.is_file():
+                spoil(path)
+            case _:
+                write_header(path, clip_header(index, **entries, step=drawn.randrange(6)))
+        catalog.update(index)
+
+    for _ in range(30):
+        index = drawn.randrange(n_clips)
+        change(index)
+        match drawn.choice(["wait", "leave", "fail", ""]):
+            case "wait":
+                service.queue.add(index)
+            case "leave":
+                service.queue.remove(index)
+            case "fail":
+                service.queue.failed[index] = f"reason {drawn.random()}"
+        new = ClipCatalog(project, n_clips)
+        assert catalog.records == new.records
+        assert (catalog.n_trained, catalog.has_finished_clips) == (new.n_trained, new.has_finished_clips)
+        assert catalog.due == new.due == {i for i, record in enumerate(new.records) if record.is_due}
+        assert statuses.all() == ClipStatuses(service).all()
+        free = [i for i in catalog.order if i in new.due and i not in service.queue]
+        expected = next(iter(service.queue), None) if service.queue else next(iter(free), None)
+        assert service.next_clip_index == expected
+
+
 @pytest.mark.slow
 def test_a_thousand_clips_that_go_on_from_each_other_are_read_in_one_pass(tmp_path: Path) -> None:
     n_clips = 1000
@@ -84,6 +134,12 @@ def test_a_thousand_clips_that_go_on_from_each_other_are_read_in_one_pass(tmp_pa
     assert states(catalog) == ["trained"] * 501 + ["stale"] * 499
     assert "Clip 500" in catalog[501].reason
     assert "out of date" in catalog[999].reason
+
+
+def test_who_trains_one_clip_reads_no_others(tmp_path: Path) -> None:
+    project = make_chain(tmp_path, 5)
+    assert states(ClipCatalog(project, 5, only=(0, 3))) == ["trained", "untrained", "untrained", "stale", "untrained"]
+    assert len(project.headers) == 2
 
 
 def test_each_header_is_read_once_while_its_file_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """ClipTraining from pixels: learning, freezing, resuming, stopping on bad numbers. The sample at quarter size."""
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,7 @@ from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.phases import phase_at
+from engine.training.preparation.cloud_preparation import Backgrounds, key_of_corrected, write_backgrounds
 from engine.training.preparation.method import Method
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
@@ -241,6 +243,27 @@ def test_resuming_in_any_phase_goes_through_the_changes_of_phase(tiny, tmp_path,
     assert finish(stopped).fingerprint == finish(resumed).fingerprint
     assert "moving" in resumed.model.roles()
     assert any(name.startswith("moving_decoder.") for name in resumed.state().arrays)
+
+
+def test_a_source_clips_checkpoint_only_names_the_backgrounds_that_all_share(setting, tmp_path):
+    prep_dir, kept = tmp_path / "prep", tmp_path / "kept.safetensors"
+    shutil.copytree(setting.prep_dir, prep_dir)
+    training = start(setting.capture, 1, prep_dir, reference=setting.reference)
+    training.prepare()
+    training.step()
+    key = key_of_corrected(setting.capture, training.clip, training.camera_indices, CONFIG)
+    write_backgrounds(prep_dir, training.backgrounds, key)  # as a reference clip does in the end
+    training.write_checkpoint(kept)
+    assert not {"resume.backgrounds", "resume.is_stable"} & read_clip_state(kept).arrays.keys()
+    other = start(setting.capture, 1, prep_dir, reference=setting.reference)
+    other.restore_checkpoint(kept)
+    assert other.backgrounds.equals(training.backgrounds)
+    training.step()
+    other.step()
+    assert other.state().fingerprint == training.state().fingerprint
+    write_backgrounds(prep_dir, Backgrounds(255 - training.backgrounds.images, training.backgrounds.is_stable), key)
+    with pytest.raises(ProjectError, match="backgrounds that the checkpoint was made with are gone"):
+        start(setting.capture, 1, prep_dir, reference=setting.reference).restore_checkpoint(kept)
 
 
 def test_a_checkpoint_of_another_clip_is_refused(setting, source, tmp_path):

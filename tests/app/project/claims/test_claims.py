@@ -200,6 +200,43 @@ def test_clips_that_others_finish_are_noticed(tmp_path: Path) -> None:
     assert claims.take_changed() == {KEY}
 
 
+def test_a_clip_that_replaces_another_of_the_same_size_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / CLAIMS).mkdir()
+    (tmp_path / "clips").mkdir()
+    path = tmp_path / "clips" / f"{KEY}.safetensors"
+    path.write_bytes(b"old")
+    claims = make(tmp_path)
+    claims.look()
+    (tmp_path / "new").write_bytes(b"new")
+    os.replace(tmp_path / "new", path)
+    claims.look()
+    assert claims.take_changed() == {KEY}
+
+
+def test_who_only_trains_looks_at_files_of_its_own_clips_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock()
+    claims = make(tmp_path, clock)
+    claims.take(KEY)
+    for index in range(4, 300):
+        make_claim(ClaimFile(tmp_path, f"{index:04d}", 1), "f" * 32)
+    ask_holder(tmp_path, KEY, "pause")
+    with monkeypatch.context() as patched:
+        for name in ("listdir", "scandir"):
+            patched.setattr(f"os.{name}", lambda *_: pytest.fail("hundreds that list each other keep a disk busy"))
+        clock.now_s += 10.0
+        before = read_holder(holder_path(tmp_path, claims.token))
+        claims.look_after_held()
+        after = read_holder(holder_path(tmp_path, claims.token))
+    assert before is not None
+    assert after is not None
+    assert after.beat == before.beat + 1
+    assert claims.take_asked() == [(KEY, "pause")]
+    assert not claims.is_lost(KEY)
+    make_claim(ClaimFile(tmp_path, KEY, 2), "e" * 32)
+    claims.look_after_held()
+    assert claims.is_lost(KEY)
+
+
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"x" * 5000, b"{}"])
 def test_damaged_claims_are_claims_until_a_minute_has_passed(tmp_path: Path, content: bytes) -> None:
     (tmp_path / CLAIMS).mkdir()

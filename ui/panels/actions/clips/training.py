@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from app.session.captures.capture_commands import FollowRecording
 from app.session.session_view import SessionView
 from app.session.training.train_commands import (
     AskTrainSettings,
@@ -134,6 +135,10 @@ def _show_log(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.wanted_panel = LOG
 
 
+def _follow_recording(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(FollowRecording(not session.recording_status.is_followed))
+
+
 def _toggle_log_loss(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     ui.curves.is_log = not ui.curves.is_log
 
@@ -142,6 +147,13 @@ ACTIONS = (
     Action("train.next", "Train the next clip, pause or resume", TRAIN, _train, keys=("T",), lacks=_cannot_train),
     Action("train.all", "Train every clip that is not finished", TRAIN, _train_all, keys=("Shift+T",)),
     Action("train.from_here", "Train this clip and all after it", TRAIN, _train_from_here),
+    Action(
+        "train.follow",
+        "Follow the recording: train each clip once it is recorded",
+        TRAIN,
+        _follow_recording,
+        is_on=lambda session: session.recording_status.is_followed,
+    ),
     Action("train.settings", "Train this clip with other settings", TRAIN, _ask_settings),
     Action(
         "train.stop",

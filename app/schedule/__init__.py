@@ -1,0 +1,1 @@
+"""Jobs for schedulers, each of which trains a project's clips by one command per clip."""
