@@ -23,6 +23,7 @@ _CONTRADICTED = (
     ("workers", None, "--workers"),
     ("again", False, "--again"),
     ("is_starting_over", False, "--start-over"),
+    ("cluster", None, "--cluster"),
 )
 """Options that ask for more than that one clip is there in the end: name, default, as written."""
 

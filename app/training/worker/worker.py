@@ -108,6 +108,7 @@ def _flush_output() -> None:
 def _set_threads(job: TrainJob) -> int:
     if job.is_window_open:  # before any thread is started, since threads take over the priority
         lower_process()
-    n_threads = n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside)
+    share = n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside)
+    n_threads = job.n_threads or share
     share_cores(n_threads)  # preparation, too, and its own children
     return use_threads(n_threads)
