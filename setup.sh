@@ -4,7 +4,7 @@
 #
 #   ./setup.sh              everything `make run` needs
 #   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd), programs of
-#                           others that read exported files (from npm, 115 MB in tests/oracles/node_modules), and SLURM
+#                           others that read exported files (from npm, 115 MB in tests/oracles/node_modules), SLURM and Ray
 #
 #   PYTHON=/path/to/python           take this interpreter (3.11, 3.12 or 3.13)
 #   CLIPGSTREAM_TORCH_INDEX=URL      take the CPU build of torch from this package index
@@ -207,6 +207,16 @@ check_system() {
 }
 
 # ---------------------------------------------------------------- programs that the tests ask
+cluster_key() { cksum <requirements-cluster.lock; }
+
+install_cluster() { # without it the tests of clusters are skipped
+    if pip install -qq --no-deps --retries 2 -r requirements-cluster.lock; then
+        stamp cluster "$(cluster_key)"
+    else
+        say "Ray could not be installed; the tests of clusters are skipped"
+    fi
+}
+
 oracles_key() { cat tests/oracles/package-lock.json setup.sh | cksum; }
 
 install_oracles() { # the Node that came with pyright brings npm along; without a registry their tests are skipped
@@ -245,4 +255,7 @@ else
 fi
 if [ "$WITH_TESTS" = yes ] && ! { [ -d tests/oracles/node_modules ] && is_stamped oracles "$(oracles_key)"; }; then
     install_oracles
+fi
+if [ "$WITH_TESTS" = yes ] && ! is_stamped cluster "$(cluster_key)"; then
+    install_cluster
 fi

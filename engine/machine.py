@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -53,3 +54,34 @@ def _left_in_group(folder: Path, limit: str, usage: str, cache: str) -> int:
     rows = dict(line.split() for line in (folder / "memory.stat").read_text(encoding="ascii").splitlines())
     used = int((folder / usage).read_text(encoding="ascii")) - int(rows.get(cache, 0))  # the cache goes when asked
     return int((folder / limit).read_text(encoding="ascii")) - used
+
+
+def processor_text() -> str:
+    """Maker, model and instruction sets of the first core, as the system reports them; a few lines at most."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
+            wanted = ("vendor_id", "cpu family", "model", "flags", "Features", "CPU part", "CPU implementer", "isa")
+            lines = []
+            for line in file:
+                if not line.strip() and lines:  # end of the first core: the rest repeats it
+                    break
+                if line.startswith(wanted):
+                    lines.append(line)
+            return "".join(lines)
+    except OSError:
+        import platform
+
+        return " ".join((platform.machine(), os.environ.get("PROCESSOR_IDENTIFIER", ""), _mac_brand()))
+
+
+def _mac_brand() -> str:
+    if sys.platform != "darwin":
+        return ""
+    import ctypes
+
+    with suppress(OSError, AttributeError):
+        value, size = ctypes.create_string_buffer(256), ctypes.c_size_t(256)
+        library = ctypes.CDLL(None)
+        if library.sysctlbyname(b"machdep.cpu.brand_string", value, ctypes.byref(size), None, 0) == 0:
+            return value.value.decode("utf-8", "replace")
+    return ""

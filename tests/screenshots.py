@@ -1,7 +1,7 @@
 """`python -m tests.screenshots [NAME ...]`: pictures of the window for the documents, see `make screenshots`.
 
-Opens a trained project and trains nothing. Each screen is a small function over a window that shows the project; a new
-one is a function and a row in SCREENS.
+Opens a trained project; only "two_clips_training" trains, in a copy. Each screen is a small function over a window that
+shows the project; a new one is a function and a row in SCREENS.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ from app.session.showing.look_commands import (  # noqa: E402
     ShowViews,
     ToggleOverlay,
 )
+from app.session.training.train_commands import TrainClips  # noqa: E402
 from engine.assets import asset_path  # noqa: E402
 from tests.ui.pilot import CTRL, Pilot  # noqa: E402
 from ui.panels.state import RESIDUALS  # noqa: E402
@@ -61,6 +62,8 @@ QUICK_PROJECT = REVIEWED / "project"
 SIZE = (1280, 800)
 JPEG_QUALITY = 88
 """A third of the bytes of a PNG, and letters are still sharp."""
+LEAST_SHARE = 0.2
+"""Steps that a clip in training has to have done."""
 TIMEOUT_S = 400.0
 """Kernels may have to be compiled first."""
 SHOWN_FOLDER, CAPTURES = Path("/projects"), Path("/captures")
@@ -235,6 +238,27 @@ def draw_objects(stage: Stage) -> None:
     stage.rest()
 
 
+def draw_two_clips(stage: Stage) -> None:
+    """Two clips that train at once, with the live state of the one at the playhead."""
+    session = stage.session
+    left = [index for index, found in enumerate(session.clip_states) if found.state != "trained"]
+    stage.studio.frame.ui.preferences.n_workers = 2
+    stage.studio.settle(2)
+    session.dispatch(SetFrame(session.clips[left[0]].start + 1))
+    session.dispatch(TrainClips(tuple(left)))
+
+    def is_seen() -> bool:
+        stage.studio.settle(2)
+        state = session.live_training.state_of(left[0])
+        rates = [one.steps_per_s for one in session.training.trainings]
+        shares = [one.step / max(one.n_steps, 1) for one in session.training.trainings]
+        is_live = state is not None and state.is_live
+        return is_live and len(rates) == 2 and min(rates) > 0 and min(shares) > LEAST_SHARE
+
+    stage.wait(is_seen, "two clips train")
+    stage.rest()
+
+
 def draw_preferences(stage: Stage) -> None:
     """Keys of one's own."""
     stage.show_trained()
@@ -303,6 +327,7 @@ SCREENS = (
     Screen("modes", draw_modes),
     Screen("palette", draw_palette),
     Screen("objects", draw_objects, size=(1080, 700)),
+    Screen("two_clips_training", draw_two_clips),
     Screen("preferences", draw_preferences, is_in_documents=False),
     Screen("light", draw_main, theme="light"),
     Screen("small", draw_main, size=(900, 600), is_in_documents=False),

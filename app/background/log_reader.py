@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,13 +41,14 @@ class LogLine:
 
 @dataclass(frozen=True, slots=True)
 class LogRequest:
-    """Files as they are now: size and time show whether they were read before."""
+    """Where to read. turn: Counts the requests: the same files may have grown."""
 
-    files: tuple[tuple[str, Path, int, int], ...]
+    places: tuple[tuple[str, Path], ...]
+    turn: int
 
 
 class LogView:
-    """The newest lines. Methods are for one thread and do not wait.
+    """The newest lines. Methods are for one thread and do not wait: the log of a clip may lie on a slow network.
 
     Args:
         path: The program's log; where it lies on this system when None.
@@ -54,7 +56,10 @@ class LogView:
 
     def __init__(self, path: Path | None = None) -> None:
         self._path = path
-        self.worker: LatestWorker[LogRequest, tuple[LogLine, ...]] = LatestWorker("log", _read)
+        self.worker: LatestWorker[LogRequest, tuple[LogLine, ...]] = LatestWorker("log", self._read)
+        self._turn = 0
+        self._found: tuple[tuple[str, Path, int, int], ...] = ()  # on the thread, as the next one
+        self._lines: tuple[LogLine, ...] = ()
 
     def lines(self, clip_index: int | None, clip_log: Path | None) -> Sequence[LogLine]:
         """Of the program and of one training, oldest first; those of a moment ago until new ones were read.
@@ -64,18 +69,21 @@ class LogView:
         """
         self._path = log_path() if self._path is None else self._path
         places = [("program", self._path)] + ([] if clip_log is None else [(f"clip {clip_index}", clip_log)])
-        files = []
-        for source, place in places:
-            try:
-                found = os.stat(place)
-            except OSError:
-                continue
-            files.append((source, place, found.st_size, found.st_mtime_ns))
-        request = LogRequest(tuple(files))
+        self._turn += 1
+        self.worker.request(LogRequest(tuple(places), self._turn))
         newest = self.worker.newest
-        if newest is None or newest[0] != request:
-            self.worker.request(request)
         return () if newest is None else newest[1]
+
+    def _read(self, request: LogRequest) -> tuple[LogLine, ...]:
+        """The same value as long as no file has changed."""
+        files = []
+        for source, place in request.places:
+            with suppress(OSError):
+                found = os.stat(place)
+                files.append((source, place, found.st_size, found.st_mtime_ns))
+        if self._found != tuple(files):
+            self._lines, self._found = _merged(files), tuple(files)
+        return self._lines
 
     def close(self) -> None:
         """End the thread."""
@@ -97,9 +105,9 @@ def parse_log(text: str, source: str) -> list[LogLine]:
     return lines
 
 
-def _read(request: LogRequest) -> tuple[LogLine, ...]:
+def _merged(files: Sequence[tuple[str, Path, int, int]]) -> tuple[LogLine, ...]:
     lines: list[LogLine] = []
-    for source, path, _, _ in request.files:
+    for source, path, _, _ in files:
         lines += parse_log(tail(path, MAX_LINES, max_bytes=MAX_BYTES), source)
     lines.sort(key=lambda line: line.time)  # stable: lines of one file keep their order
     return tuple(lines[-MAX_LINES:])

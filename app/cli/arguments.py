@@ -18,7 +18,9 @@ from engine.text import printable, shown
 
 logger = logging.getLogger(__name__)
 
-EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
+EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT = 0, 1, 2
+EXIT_STOPPED = 3
+"""Of `train --clip`: somebody stopped it, in a window or by another program; progress is kept."""
 EXIT_NOT_READY = 75
 """Of `train --clip`: nothing is wrong, but it cannot be done yet. The number of "try again later" in sysexits.h."""
 
@@ -113,6 +115,24 @@ def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None,
         default="float",
         help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
     )
+
+
+def add_measuring_workers(command: argparse.ArgumentParser) -> None:
+    """The argument of every subcommand that can measure in several processes."""
+    command.add_argument(
+        "--workers",
+        dest="n_workers",
+        type=_count,
+        default=1,
+        metavar="N",
+        help="measure in N processes, at most one per core (default: 1); figures are the same",
+    )
+
+
+def _count(text: str) -> int:
+    if not text.strip().isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a count from 1")
+    return int(text)
 
 
 def path_argument(text: str) -> Path:

@@ -31,7 +31,7 @@ from engine.capture.capture import Capture, open_capture
 from engine.errors import DiskError, ProjectError
 from engine.training.presets import closest_preset
 
-_OF_TRAINING = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
+_OF_TRAINING = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides", "is_growing")
 """Settings that arguments of `train` ask for, and that all clips share."""
 _N_LOOKS, _LOOK_EVERY_S = 50, 0.1
 
@@ -50,13 +50,16 @@ def add_project_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
 
 
-def open_for_training(options: argparse.Namespace, say: Callable[[str], None]) -> tuple[Project, Capture]:
+def open_for_training(
+    options: argparse.Namespace, say: Callable[[str], None], *, n_complete: int | None = None
+) -> tuple[Project, Capture]:
     """The project of the arguments, made or opened; what was given has to agree with what is finished there.
 
     Args:
         say: Told what was discarded.
+        n_complete: Frames that are complete of a capture that is still being recorded; None of any other one.
     """
-    settings, stored, capture = _chosen_settings(options)
+    settings, stored, capture = _chosen_settings(options, n_complete)
     if stored is None:
         return create_project(options.project, settings), capture
     project = open_project(options.project)
@@ -135,15 +138,20 @@ def what_goes(project: Project, options: argparse.Namespace) -> str:
     return progress_of(project).words if is_shared_change(stored, project.settings) else ""
 
 
-def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
+def _chosen_settings(
+    options: argparse.Namespace, n_complete: int | None = None
+) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
     """Settings that the arguments ask for, those of the project where there is one, and the capture."""
     overrides = overrides_of(options)
     exists = (options.project / PROJECT_FILE).is_file()
     stored = read_settings(options.project) if exists else None
     scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
     follow_links = options.follow_links or (stored is not None and stored.follow_links)
-    capture = open_capture(options.capture, scale=scale, follow_links=follow_links)
+    is_growing = n_complete is not None or (stored is not None and stored.is_growing)
+    capture = open_capture(options.capture, scale=scale, follow_links=follow_links, is_growing=is_growing)
     frames = stored.frames if stored is not None and stored.fingerprint == capture.fingerprint else None
+    if n_complete is not None and frames is None:
+        frames = (0, n_complete)
     if options.frames is not None:
         chosen = parse_range(options.frames, capture.n_frames, option="--frames", what="frames")
         frames = (chosen.start, chosen.stop)
@@ -169,7 +177,9 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
         "reference_clip": options.reference_clip,
     }
     changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    if capture.fingerprint != stored.fingerprint:
+    if is_growing and not stored.is_growing:  # a project of what was there of it, which nothing is trained of
+        changes |= {"is_growing": True, "fingerprint": capture.fingerprint}
+    elif capture.fingerprint != stored.fingerprint:
         raise ProjectError(
             "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
         )

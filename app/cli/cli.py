@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from typing import TextIO
 
 from app.background.logs import start_logging
-from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, PlainParser, add_backend, fail, parse
+from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, PlainParser, add_backend, fail, parse
 from app.cli.commands import COMMANDS
 from app.training.process import ProcessWorker
 from app.training.service import Launch
@@ -26,6 +26,8 @@ from engine.kernels.cache import use_kernel_cache
 from engine.text import printable
 
 logger = logging.getLogger(__name__)
+
+EXIT_INTERRUPTED = 130
 
 
 def build_parser(used: Collection[str]) -> PlainParser:

@@ -52,6 +52,12 @@ COMMANDS = {
     "train": Command(
         "train clips of a capture, or resume training", "app.cli.train_command", _GOES_ON, has_backend=True
     ),
+    "follow": Command(
+        "train the clips of a capture while it is still being recorded",
+        "app.cli.captures.follow_command",
+        _GOES_ON,
+        has_backend=True,
+    ),
     "schedule": Command(
         "write a job for SLURM, OpenJD or a shell that trains the clips on many computers",
         "app.cli.schedule_command",

@@ -8,12 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from app.cli.arguments import EXIT_OK, add_figure_choices, parse_range, path_argument
+from app.cli.arguments import EXIT_OK, add_figure_choices, add_measuring_workers, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.cli.terminal.results import write_text
 from app.document.changes.object_changes import object_named
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
+from app.evaluation.measuring_children import measuring_here
 from app.evaluation.speed.frame_rates import DEFINITION, frame_rates
 from app.export.staging import check_target
 from app.objects.object_figures import object_figures
@@ -28,6 +29,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     command.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
     add_figure_choices(command, default="all", said="all")
+    add_measuring_workers(command)
     command.add_argument(
         "--fps",
         action="store_true",
@@ -48,14 +50,16 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         chosen = opened.trained
     line = ProgressLine(is_quiet=options.quiet)
     progress = row_progress(line, "Measuring")
-    document = evaluate_project(
-        opened,
-        clip_indices=chosen,
-        metrics=options.metrics,
-        precision=options.precision,
-        on_progress=progress,
-        say=line.say,
-    )
+    with measuring_here(options.n_workers) as measuring:
+        document = evaluate_project(
+            opened,
+            clip_indices=chosen,
+            metrics=options.metrics,
+            precision=options.precision,
+            on_progress=progress,
+            say=line.say,
+            measuring=measuring,
+        )
     if one is not None:
         document["object"] = object_figures(opened, one, chosen, _object_progress(line, one.name))
     line.finish()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_INTERRUPTED, EXIT_NOT_READY, EXIT_OK, fail
+from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_NOT_READY, EXIT_OK, EXIT_STOPPED, fail
 from app.cli.chosen_project import open_for_clip
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import show_event, show_outcome, show_status
@@ -23,6 +23,7 @@ _CONTRADICTED = (
     ("workers", None, "--workers"),
     ("again", False, "--again"),
     ("is_starting_over", False, "--start-over"),
+    ("cluster", None, "--cluster"),
 )
 """Options that ask for more than that one clip is there in the end: name, default, as written."""
 
@@ -30,8 +31,8 @@ _CONTRADICTED = (
 def train_single_clip(options: argparse.Namespace, launch: Launch) -> int:
     """Train the clip of the arguments, if nobody has and nobody does. Returns the exit code.
 
-    0: it is trained, now or before. 75: not yet possible, try again later. 1: it failed, and 130: it was stopped;
-    trying again continues from its checkpoint. 2: bad input; trying again does not help.
+    0: it is trained, now or before. 75: not yet possible, try again later. 1: it failed; trying again continues from
+    its checkpoint. 2: bad input; trying again does not help. 3: somebody stopped it.
     """
     for name, default, written in _CONTRADICTED:
         if getattr(options, name) != default:
@@ -41,13 +42,17 @@ def train_single_clip(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_clip(options)
     clips, clip_index = project.clips(capture.n_frames), options.clip
+    if project.settings.is_growing and clip_index >= len(clips):
+        return fail(EXIT_NOT_READY, f"Clip {clip_index} is still being recorded: {len(clips)} clips are complete.")
     if not 0 <= clip_index < len(clips):
         raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(clips) - 1}.")
     holdout = capture.camera_indices(project.settings.holdout)
     needed = needed_clips(project, clip_index)
     is_chained = project.settings.config().follows_previous  # then it stands on all that are before it
     catalog = ClipCatalog(project, len(clips), only=None if is_chained else (*needed, clip_index))
-    service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog)
+    service = TrainingService(
+        project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, cpu=options.cpu
+    )
     service.set_live_view("off")
     try:
         missing = [index for index in needed if not project.is_trained(index)]
@@ -96,6 +101,6 @@ def _exit_code(outcome: ClipOutcome) -> int:
     if outcome.kind == ClipClaimed.__name__:
         return fail(EXIT_NOT_READY, said)
     if outcome.state == "stopped":
-        return fail(EXIT_INTERRUPTED, f"The training of clip {outcome.clip_index} was stopped; progress is kept.")
+        return fail(EXIT_STOPPED, f"The training of clip {outcome.clip_index} was stopped; progress is kept.")
     is_input = outcome.state == "damaged" or outcome.kind in BAD_INPUT_KINDS
     return fail(EXIT_BAD_INPUT if is_input else EXIT_FAILED, said)

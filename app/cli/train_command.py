@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import math
 from collections.abc import Sequence
+from functools import partial
 
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
@@ -26,17 +27,22 @@ from app.cli.terminal.training_lines import (
     show_outcome,
     show_status,
 )
+from app.cluster.cluster import Cluster
+from app.cluster.cluster_worker import ClusterWorker
 from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
+from app.plan.forecasts import plans_of_kinds
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.sequence import plan_sequence, sequence_text
-from app.plan.side_by_side import plan_here
+from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
 from app.plan.speed import step_time
 from app.project.clips.clip_catalog import ClipCatalog
 from app.residuals.kept_reading import note_kept
+from app.status import TrainingStatus
 from app.training.due import is_due
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
 from engine.text import duration_text, shown
 from engine.training.config import parse_overrides
@@ -79,6 +85,17 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="first discard everything trained in the project, so that its settings can change; --plan shows what",
     )
     command.add_argument(
+        "--cpu",
+        choices=PROCESSORS,
+        default=NATIVE,
+        help="portable: the same result on every kind of x86-64 processor, slower (default: native, all instructions)",
+    )
+    command.add_argument(
+        "--cluster",
+        metavar="WHERE",
+        help="train on the computers of a Ray cluster: auto, HOST:PORT, or local:N for N clips side by side here",
+    )
+    command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
     command.add_argument(
@@ -110,13 +127,17 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     _check_price(options)
     if options.plan:
         return _plan(options)
+    environment_of(options.cpu)  # refused before a project is made
     if options.clip is not None:
         return train_single_clip(options, launch)
+    if options.cluster is not None and options.workers is not None:
+        raise ProjectError("--cluster cannot be combined with --workers.", hint="Write --cluster local:N for N clips.")
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)
     is_refused, outcomes = False, []
     service: TrainingService | None = None
+    cluster: Cluster | None = None
     try:
         clips = project.clips(capture.n_frames)
         chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
@@ -125,10 +146,24 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         order = sorted(chosen, key=lambda clip_index: clip_index != first)
         catalog = ClipCatalog(project, len(clips))
         to_train = [clips[i] for i in order if options.again or is_due(catalog, i)]
-        sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
+        if options.cluster is None:
+            sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
+        else:
+            kinds = plans_of_kinds(project, capture, to_train, catalog)
+            memory_mb = max((plan.memory_mb for plan in kinds.values()), default=0.0)
+            cluster = Cluster(options.cluster, project, capture, n_bytes=int(memory_mb * 1e6))
+            launch = partial(ClusterWorker, cluster=cluster)
+            sequence = PlannedClips(SideBySide(cluster.n_slots), kinds)
         n_workers = sequence.together.n_workers
         service = TrainingService(
-            project, clips, holdout=holdout, launch=launch, is_window_open=False, catalog=catalog, n_workers=n_workers
+            project,
+            clips,
+            holdout=holdout,
+            launch=launch,
+            is_window_open=False,
+            catalog=catalog,
+            n_workers=n_workers,
+            cpu=options.cpu,
         )
         service.set_live_view("off")
         note_kept(catalog, project, capture)
@@ -137,8 +172,23 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
-        for sentence in capture.warnings:
+        for sentence in (*capture.warnings, *(() if cluster is None else cluster.words)):
             line.say(f"Note: {sentence}")
+        first = project.settings.reference_clip  # the others cannot begin before it
+        plans = PlanLines(
+            line,
+            project,
+            capture,
+            catalog=service.catalog,
+            step_time=step_time,
+            is_quiet=options.quiet,
+        )
+
+        def follow(status: TrainingStatus) -> None:
+            show_status(line, status)
+            if cluster is not None and service is not None:
+                service.n_workers = cluster.n_slots  # computers come and go
+
         if sequence.together.why_fewer:
             line.say(f"Note: {sequence.together.why_fewer}")
         plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=options.quiet)
@@ -149,7 +199,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             on_begin=lambda clip_index: plans.begin(clips[clip_index]),
             is_again=options.again,
             own=parse_overrides(options.own_assignments) or None,
-            on_status=table.show if n_workers > 1 else lambda status: show_status(line, status),
+            on_status=follow,
             on_event=lambda event: show_event(line, event, has_others=n_workers > 1),
             on_outcome=lambda outcome: (
                 show_outcome(line, outcome, has_others=len(order) > 1),
@@ -160,7 +210,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         is_refused = exit_code(outcomes) == EXIT_BAD_INPUT
         line.finish()
         if options.json:
-            print(json_text(train_document(project, capture, outcomes), indent=2))
+            document = train_document(project, capture, outcomes)
+            print(json_text(document if cluster is None else document | {"cluster": cluster.document()}, indent=2))
     except (CaptureError, ProjectError) as error:
         is_refused = not isinstance(error, DiskError)
         raise
@@ -168,6 +219,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         line.finish()
         if service is not None:
             service.close()
+        if cluster is not None:
+            cluster.close()
         has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
         if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
             project.remove_files()

@@ -43,7 +43,7 @@ class Redone:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """The capture is found in another place, or may follow links now. Not a step: undo does not take it back.
+    """The capture lies in another place, may follow links now, or has grown. Not a step: undo does not take it back.
 
     Attributes:
         settings: Of the document, with the new place.
@@ -147,11 +147,8 @@ class DocumentHistory:
 
     def _in_place(self, document: ProjectDocument) -> ProjectDocument:
         """A document of another time, with the capture where it is now."""
-        now, then = self.present.settings, document.settings
-        if (now.capture, now.follow_links) == (then.capture, then.follow_links):
-            return document
-        settings = replace(then, capture=now.capture, follow_links=now.follow_links)
-        return replace(document, settings=settings)
+        settings = document.settings.placed_as(self.present.settings)
+        return document if settings == document.settings else replace(document, settings=settings)
 
 
 class _Finding:

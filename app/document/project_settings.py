@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Annotated
 
@@ -33,6 +33,7 @@ class ProjectSettings:
         frames: First frame of the capture that is worked on, and the one after the last; None for all.
         clip_bounds: Where clips were split or merged: the first frame of every clip, and at the end the number of
             frames. None where every clip has clip_length frames, the last one the rest.
+        is_growing: Whether the capture may still be recorded; see `open_capture`. `frames` are those taken in so far.
     """
 
     capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
@@ -47,6 +48,7 @@ class ProjectSettings:
     frames: tuple[Annotated[int, Meta(ge=0, lt=2**31)], Annotated[int, Meta(ge=1, lt=2**31)]] | None = None
 
     clip_bounds: tuple[Annotated[int, Meta(ge=0, lt=2**31)], ...] | None = None
+    is_growing: bool = False
 
     def clips(self, n_frames: int) -> list[Clip]:
         """The clips of a capture of that many frames.
@@ -58,12 +60,26 @@ class ProjectSettings:
             return split_clips(n_frames, n_frames)
         if self.clip_bounds is None:
             return split_clips(n_frames, self.clip_length)
+        if self.is_growing and n_frames > self.clip_bounds[-1]:
+            later = range(self.clip_bounds[-1] + self.clip_length, n_frames, self.clip_length)
+            return cut_clips((*self.clip_bounds, *later, n_frames), self.clip_length)
         if self.clip_bounds[-1] != n_frames:
             raise ProjectError(
                 f"The clips of the project end at frame {self.clip_bounds[-1]}, the capture at frame {n_frames}.",
                 hint="Put the original capture back, or make a new project.",
             )
         return cut_clips(self.clip_bounds, self.clip_length)
+
+    def placed_as(self, now: ProjectSettings) -> ProjectSettings:
+        """These settings with what nobody chooses as it is now: where the capture lies, and how far it has grown."""
+        frames = now.frames if self.is_growing and now.is_growing else self.frames
+        return replace(self, capture=now.capture, follow_links=now.follow_links, frames=frames)
+
+    def is_placed_as(self, other: ProjectSettings) -> bool:
+        """Whether nothing differs except what nobody chooses; a capture that grows does not lose frames."""
+        known, now = self.frames or (0, 0), other.frames or (0, 0)
+        is_longer = known[0] == now[0] and known[1] <= now[1]
+        return (is_longer or not self.is_growing) and self.placed_as(other) == other
 
     def config(self) -> TrainConfig:
         """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""

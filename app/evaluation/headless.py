@@ -81,6 +81,7 @@ def train_clips(
     on_begin: Callable[[int], None] = lambda clip_index: None,
     is_again: bool = False,
     own: OwnSettings | None = None,
+    more: Callable[[], Sequence[int] | None] = lambda: None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> list[ClipOutcome]:
     """Train clips, as many in parallel as the service allows. Where one fails, those that do not need it are trained
@@ -94,16 +95,18 @@ def train_clips(
         on_begin: Receives the index of each clip before it is trained; not of those left as they are.
         is_again: Train also clips that are trained or damaged; their former state becomes a version.
         own: Settings for these clips alone; their trainings then begin afresh.
+        more: Asked all the time for further clips, which may have come up meanwhile; None once there will be no more.
         sleep: Waits some seconds between looks.
     Raises:
         ProjectError: A clip cannot be trained, for instance because its reference is not.
         KeyboardInterrupt: After the workers have ended and their checkpoints are written.
     """
     outcomes: list[ClipOutcome] = []
-    waiting, begun = deque(clip_indices), dict[int, float]()
+    waiting, begun, may_come = deque(clip_indices), dict[int, float](), True
     lost: dict[int, int] = {}  # clips that cannot come now, and the one whose failure is behind it
 
     def end(outcome: ClipOutcome) -> None:
+        nonlocal may_come
         outcomes.append(outcome)
         on_outcome(outcome)
         if outcome.state in ("failed", "stopped", "left_out"):
@@ -111,21 +114,28 @@ def train_clips(
             lost[outcome.clip_index] = failed
             if outcome.kind == DiskError.__name__:  # the others would train for hours and fail likewise
                 lost.update(dict.fromkeys(waiting, failed))
+            is_end = outcome.kind == DiskError.__name__ or outcome.clip_index == service.catalog.order[0]
+            may_come = may_come and not is_end
 
-    while waiting or begun:
-        while waiting and _has_room(service, waiting[0], begun):
-            clip_index = waiting.popleft()
-            left = _left_as_it_is(service, clip_index, is_again=is_again) or _left_out(service, clip_index, lost)
-            if left is not None:
-                end(left)
-                continue
-            on_begin(clip_index)
-            service.add(clip_index, own)
-            begun[clip_index] = time.monotonic()
-        service.go_on()
-        runs = dict(service.runs)
-        looked_s = time.monotonic()
-        try:
+    try:
+        while True:
+            further = more() if may_come else None
+            may_come = further is not None
+            waiting += further or ()
+            if not (waiting or begun or may_come):
+                return outcomes
+            while waiting and _has_room(service, waiting[0], begun):
+                clip_index = waiting.popleft()
+                left = _left_as_it_is(service, clip_index, is_again=is_again) or _left_out(service, clip_index, lost)
+                if left is not None:
+                    end(left)
+                    continue
+                on_begin(clip_index)
+                service.add(clip_index, own)
+                begun[clip_index] = time.monotonic()
+            service.go_on()
+            runs = dict(service.runs)
+            looked_s = time.monotonic()
             for clip_index, event in service.poll():
                 on_event((clip_index, event))
                 if isinstance(event, ENDINGS) and clip_index in begun:
@@ -134,10 +144,9 @@ def train_clips(
             on_status(training_status(service))
             took_s = time.monotonic() - looked_s
             sleep(min(max(POLL_EVERY_S, took_s / LOOKING_SHARE), POLL_AT_LEAST_EVERY_S))
-        except KeyboardInterrupt:
-            service.close(timeout_s=STOP_TIMEOUT_S)
-            raise
-    return outcomes
+    except KeyboardInterrupt:
+        service.close(timeout_s=STOP_TIMEOUT_S)
+        raise
 
 
 def _has_room(service: TrainingService, clip_index: int, begun: Collection[int]) -> bool:

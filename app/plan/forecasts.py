@@ -10,17 +10,17 @@ import logging
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from app.background.latest import LatestWorker
 from app.plan.planning import clip_history, plan_clip, plan_status, sum_known
 from app.plan.speed import known_step_time, step_time
+from app.project.claims.holder_record import ClipProgress
 from app.project.clips.clip_catalog import ClipCatalog, ClipRecord
 from app.project.disk.discarding import progress_of
 from app.project.project import Project
 from app.status import PlanStatus, QueuedClip, QueueStatus, SequenceForecast
-from app.training.clip_run import ClipRun
 from app.training.due import due_clips, stale_clips
 from app.training.own_settings import is_source
 from app.training.service import TrainingService
@@ -108,6 +108,29 @@ def together(parts: Sequence[SequenceForecast]) -> SequenceForecast:
     )
 
 
+def at_once(
+    going: Sequence[SequenceForecast], planned_s: Sequence[float | None], rest: SequenceForecast
+) -> SequenceForecast:
+    """Clips that train and those after them, as many at a time as train now.
+
+    What they take from one another, as they share cores, shows in how much longer than planned they take; until that is
+    known, several at a time are expected to take as long as one after the other.
+
+    Args:
+        going: What is left of those that train, by their own speed.
+        planned_s: Seconds left of each of them if it trained alone.
+        rest: Clips that come after them, each as if it trained alone.
+    """
+    n, whole = len(going), together([*going, rest])
+    own_s = [part.seconds for part in going]
+    known = [(own, alone) for own, alone in zip(own_s, planned_s, strict=True) if own and alone]
+    if n < 2 or whole.seconds is None or not known:
+        return whole
+    times_longer = sum(own for own, _ in known) / sum(alone for _, alone in known)
+    seconds = (sum_known(own_s) or 0.0) / n + (rest.seconds or 0.0) * times_longer / n
+    return replace(whole, seconds=max(seconds, *(own or 0.0 for own in own_s)))
+
+
 @dataclass(frozen=True, slots=True)
 class Waiting:
     """The waiting clips and the work left, without the clip that trains."""
@@ -172,10 +195,11 @@ class Forecasts:
         """The queue as it is shown, its figures a moment later."""
         _, newest = self._ask(service, project, capture, can_measure=can_measure)
         plans = NO_PLANS if newest is None else newest[1]
-        runs, waiting = service.runs, self._waiting(service, project, plans.kinds)
-        going = [_running_part(run, self._parts[index]) for index, run in runs.items()]
-        queued, everything = together([*going, waiting.queued]), together([*going, waiting.everything])
-        n_done = service.queue.steps_done + sum(run.step for run in runs.values())
+        waiting, running = self._waiting(service, project, plans.kinds), service.progress
+        going = [_running_part(one, self._parts[index]) for index, one in running.items()]
+        alone_s = [_planned_left_s(one, self._parts[index]) for index, one in running.items()]
+        queued, everything = (at_once(going, alone_s, rest) for rest in (waiting.queued, waiting.everything))
+        n_done = service.queue.steps_done + sum(one.step for one in running.values())
         return QueueStatus(
             waiting=waiting.clips,
             failed=tuple(sorted(service.queue.failed.items())),
@@ -187,13 +211,13 @@ class Forecasts:
             progress=n_done / max(n_done + queued.n_steps, 1),
             n_done=service.queue.n_done,
             free_mb=plans.free_mb,
-            live_view=service.live_view,
+            live_view=service.looked_at.mode,
         )
 
     def _waiting(self, service: TrainingService, project: Project, kinds: Mapping[Kind, TrainingPlan]) -> Waiting:
         """The part that does not depend on the clip that trains; made anew only when something has changed, since
         clips may be thousands and this is asked for at every change of the picture."""
-        queue, running = service.queue, tuple(service.runs)
+        queue, running = service.queue, service.in_training
         clips = tuple(queue)
         own = tuple(index for index in clips if queue.own_settings(index) is not None)
         waiting_of = (id(service), service.catalog.revision, kinds, running, clips, own)
@@ -201,12 +225,12 @@ class Forecasts:
             return self._kept
         self._waiting_of = waiting_of
         parts = self._parts = _clip_parts(service, project, kinds, own)
-        due = {*due_clips(service.catalog), *clips}.difference(running)
+        due, coming = {*due_clips(service.catalog), *clips}.difference(running), running.union(clips)
         self._kept = Waiting(
             tuple(QueuedClip(index, parts[index].n_steps, parts[index].seconds, index in own) for index in clips),
-            together([parts[index] for index in clips]),
+            together([parts[index] for index in clips if index not in running]),
             together([parts[index] for index in sorted(due)]),
-            together([parts[index] for index in stale_clips(service.catalog) if index not in {*queue, *running}]),
+            together([parts[index] for index in stale_clips(service.catalog) if index not in coming]),
         )
         return self._kept
 
@@ -241,12 +265,17 @@ def _clip_parts(
     ]
 
 
-def _running_part(run: ClipRun, whole: SequenceForecast) -> SequenceForecast:
+def _running_part(run: ClipProgress, whole: SequenceForecast) -> SequenceForecast:
     """The work left on the clip that trains: by its own speed once it has one, else by its plan."""
     if not run.n_steps:
         return whole
-    left_s = None if whole.seconds is None else whole.seconds * (1.0 - run.step / run.n_steps)
+    left_s = _planned_left_s(run, whole)
     return SequenceForecast(1, run.n_steps - run.step, left_s if run.eta_s is None else run.eta_s, whole.disk_mb)
+
+
+def _planned_left_s(run: ClipProgress, whole: SequenceForecast) -> float | None:
+    share = run.step / run.n_steps if run.n_steps else 0.0
+    return None if whole.seconds is None else whole.seconds * (1.0 - share)
 
 
 # ---------------------------------------------------------------- on the thread

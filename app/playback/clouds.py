@@ -73,7 +73,7 @@ class Clouds:
             return
         capture = opened.capture
 
-        job = CloudJob(capture.path, opened.holdout, path, capture.frames, capture.follow_links)
+        job = CloudJob(capture.path, opened.holdout, path, capture.frames, capture.follow_links, capture.is_growing)
 
         def work(context: JobContext) -> Path:
             return make_cloud(job, context)

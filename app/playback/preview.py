@@ -77,7 +77,7 @@ class CloudJob(msgspec.Struct, frozen=True):
         capture: The capture.
         holdout: Cameras to leave out, as training does.
         path: File for the cloud.
-        frames, follow_links: As of the capture, see engine.capture.capture.
+        frames, follow_links, is_growing: As of the capture, see engine.capture.capture.
     """
 
     capture: Path
@@ -85,6 +85,7 @@ class CloudJob(msgspec.Struct, frozen=True):
     path: Path
     frames: tuple[int, int] | None = None
     follow_links: bool = False
+    is_growing: bool = False
 
 
 FIRST_CLOUD: ChildKind[CloudJob, str, None] = ChildKind(
@@ -129,7 +130,7 @@ def write_cloud(job: CloudJob, parent: Parent[str]) -> None:
     parent.report("loading")
     from engine.cloud.stereo.static_cloud import build_static_cloud
 
-    capture = open_capture(job.capture, frames=job.frames, follow_links=job.follow_links)
+    capture = open_capture(job.capture, frames=job.frames, follow_links=job.follow_links, is_growing=job.is_growing)
     widest = int(capture.rig.image_sizes[:, 0].max())
     if widest > CLOUD_WIDTH_PX:
         capture = capture.resized(CLOUD_WIDTH_PX / widest, job.frames)

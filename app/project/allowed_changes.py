@@ -65,6 +65,8 @@ def discard_unfitting(project: Project, before: ProjectSettings, after: ProjectS
 
 def is_shared_change(before: ProjectSettings, after: ProjectSettings) -> bool:
     """Whether something differs that every clip depends on."""
+    if before.is_placed_as(after):
+        return False
     placed = replace(after, capture=before.capture, follow_links=before.follow_links)
     return placed != before and not is_other_cut(before, placed)
 

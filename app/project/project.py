@@ -243,9 +243,9 @@ class Project:
         self.history = history
 
     def update(self, settings: ProjectSettings) -> None:
-        """Replace the settings; see `change`. Another place of the capture alone is not a step of the history."""
-        before = self.settings
-        if replace(settings, capture=before.capture, follow_links=before.follow_links) == before:
+        """Replace the settings; see `change`. Another place of the capture alone, or its growth, is not a step of the
+        history."""
+        if self.settings.is_placed_as(settings):
             self.happen(Placed(settings))
         else:
             self.change(replace(self.document, settings=settings), "change settings")

@@ -188,6 +188,7 @@ def measure(job: MeasureJob, talk: Talking) -> None:
         frames=job.frames,
         cache_bytes=CAPTURE_CACHE_BYTES,
         follow_links=job.follow_links,
+        is_growing=project.settings.is_growing,
     )
     capture = capture.without(project.document.exclusions)
     opened = open_trained(project, capture)

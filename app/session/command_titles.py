@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import get_args
 
 from app.document.changes.timing_changes import TIME_EDITS, ChangeSegment
-from app.session.captures.capture_commands import CorrectCapture, SynchroniseCameras
+from app.session.captures.capture_commands import CorrectCapture, FollowRecording, SynchroniseCameras
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, FillBehind, GoToStep, Redo, Undo
 from app.session.editing.mark_commands import MarkBox, MarkRegion, RemoveRegion
@@ -20,6 +20,8 @@ from app.session.projects.project_commands import AskStartOver, StartOver
 from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SetTrainSetting
 from app.session.training.train_commands import (
     AskTrainSettings,
+    JoinCluster,
+    LeaveCluster,
     RemoveVersion,
     RestoreVersion,
     TrainAll,
@@ -42,6 +44,8 @@ TITLES: dict[type, str] = {
     TrainClips: "The clips cannot be trained",
     TrainStale: "The clips cannot be trained",
     TrainAll: "The clips cannot be trained",
+    JoinCluster: "The cluster cannot be joined",
+    LeaveCluster: "The cluster cannot be left now",
     AskTrainSettings: "The clip cannot be trained",
     **dict.fromkeys(get_args(ExclusionCommand), "The exclusion cannot be changed"),
     **dict.fromkeys(get_args(MendCommand), "Mending cannot start"),
@@ -52,6 +56,7 @@ TITLES: dict[type, str] = {
     SetClipLength: "The clip length cannot be changed",
     SetTrainSetting: "The setting cannot be changed",
     SetPreset: "The preset cannot be chosen",
+    FollowRecording: "The recording cannot be followed",
     SynchroniseCameras: "The cameras cannot be synchronised",
     **dict.fromkeys(get_args(SelectionCommand), "The selection cannot be made"),
     MarkRegion: "The region cannot be marked",

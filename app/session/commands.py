@@ -9,7 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.document.changes.timing_changes import TimeEdit
-from app.session.captures.capture_commands import CalibrationCommand, DoctorCommand, SynchronisationCommand
+from app.session.captures.capture_commands import (
+    CalibrationCommand,
+    DoctorCommand,
+    FollowRecording,
+    SynchronisationCommand,
+)
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, FillBehind, HistoryCommand
 from app.session.editing.mark_commands import MarkCommand
@@ -24,7 +29,7 @@ from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import ProjectCommand
 from app.session.projects.setting_commands import SettingCommand
 from app.session.showing.look_commands import LookCommand
-from app.session.training.train_commands import HoldCommand, TrainCommand
+from app.session.training.train_commands import ClusterCommand, HoldCommand, TrainCommand
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +57,7 @@ Command = (
     | SettingCommand
     | TrainCommand
     | HoldCommand
+    | ClusterCommand
     | ClipCommand
     | ExclusionCommand
     | MendCommand
@@ -68,6 +74,7 @@ Command = (
     | ExportCommand
     | DoctorCommand
     | CalibrationCommand
+    | FollowRecording
     | SynchronisationCommand
     | CancelJob
     | CloseQuestion

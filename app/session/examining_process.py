@@ -24,6 +24,8 @@ class ExamineJob(msgspec.Struct, frozen=True):
     capture: Path
     scale: float
     follow_links: bool
+    frames: tuple[int, int] | None = None
+    is_growing: bool = False
 
 
 EXAMINING: ChildKind[ExamineJob, Progress, Diagnosis] = ChildKind(
@@ -50,7 +52,13 @@ def examine_apart(capture: Capture, report: ReportProgress) -> Diagnosis:
         nonlocal seen
         seen = progress
 
-    job = ExamineJob(capture.path, capture.scale, capture.follow_links)
+    job = ExamineJob(
+        capture.path,
+        capture.scale,
+        capture.follow_links,
+        frames=capture.frames if capture.is_growing else None,  # others lack some of them
+        is_growing=capture.is_growing,
+    )
     try:
         return run_child(EXAMINING, job, report=see, alive=lambda: report(seen))
     except ChildFailed as error:
@@ -71,6 +79,11 @@ def examine_here(job: ExamineJob, parent: Parent[Progress]) -> Diagnosis:
 
     parent.report(Progress("Capture doctor", 0.0, "opening the capture"))
     capture = open_capture(
-        job.capture, scale=job.scale, cache_bytes=ONE_PASS_CACHE_BYTES, follow_links=job.follow_links
+        job.capture,
+        scale=job.scale,
+        frames=job.frames,
+        cache_bytes=ONE_PASS_CACHE_BYTES,
+        follow_links=job.follow_links,
+        is_growing=job.is_growing,
     )
     return examine(capture, report=parent.report)

@@ -50,6 +50,10 @@ class Filling(SessionPart):
         """The same project is open, with other settings."""
         self.open(opened)
 
+    def grow(self, opened: OpenedProject) -> None:
+        """Its capture has grown: running work goes on."""
+        self._opened = opened
+
     def close(self) -> None:
         """End the work."""
         self._stop()

@@ -22,6 +22,10 @@ class SessionPart:
     def reopen(self, opened: OpenedProject) -> None:
         """The same project is open, with other settings."""
 
+    def grow(self, opened: OpenedProject) -> None:
+        """The capture of the same project has more frames and clips now; the others are as they were."""
+        self.reopen(opened)
+
     def check_idle(self) -> None:
         """Check that it writes no clips, so that they may be cut otherwise or copied. Raises ProjectError."""
 
@@ -72,6 +76,10 @@ class SessionParts(SessionPart):
     def reopen(self, opened: OpenedProject) -> None:
         for part in self._parts:
             part.reopen(opened)
+
+    def grow(self, opened: OpenedProject) -> None:
+        for part in self._parts:
+            part.grow(opened)
 
     def check_idle(self) -> None:
         for part in self._parts:

@@ -75,6 +75,7 @@ class LeaveQuestion:
         clip_index: The clip that trains.
         step, n_steps: How far it is; zeros before its first step.
         n_waiting: Clips that wait.
+        n_beside: Others that train here.
     """
 
     name: str
@@ -82,6 +83,7 @@ class LeaveQuestion:
     step: int
     n_steps: int
     n_waiting: int
+    n_beside: int = 0
 
 
 @dataclass(frozen=True, slots=True)

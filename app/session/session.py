@@ -20,11 +20,13 @@ from app.session.captures.capture_commands import (
     CalibrationCommand,
     CorrectCapture,
     DoctorCommand,
+    FollowRecording,
     LookAtVideos,
     SynchronisationCommand,
 )
 from app.session.captures.capture_doctor import CaptureDoctor
 from app.session.captures.capture_opening import CaptureOpening
+from app.session.captures.recording_follower import RecordingFollower
 from app.session.captures.synchronising import Synchronising
 from app.session.clips.clip_commands import ClipCommand
 from app.session.clips.clip_work import ClipWork
@@ -69,8 +71,9 @@ from app.session.showing.look_commands import LookCommand
 from app.session.showing.showing import Showing
 from app.session.timing.time_edits import apply_time_edit
 from app.session.training.clip_versions import Versions
+from app.session.training.cluster_joining import ClusterJoining, Connect
 from app.session.training.live_training import LiveTraining
-from app.session.training.train_commands import HoldCommand, TrainCommand
+from app.session.training.train_commands import ClusterCommand, HoldCommand, TrainCommand
 from app.session.training.training_verbs import TrainingVerbs
 from app.status import ClipStatus, PlanStatus, ProjectStatus, QueueStatus, RegionsStatus, TrainingStatus, UsageStatus
 from app.training.process import ProcessWorker
@@ -88,6 +91,7 @@ class Session(SessionFace):
         projects: The open project, and those opened lately.
         showing: The shown picture, and everything that prepares it.
         live_training, versions: The training, and earlier versions of clips.
+        joining: The cluster that clips train on, if any.
         document: The edited document, and the way back.
         log: Lines of program and training.
         opening: The questions about a capture that has no project yet.
@@ -102,6 +106,7 @@ class Session(SessionFace):
     Args:
         project_dir: Folder for the project of the next capture; one in the folder of projects when None.
         launch: Starts a training worker; a process by default.
+        connect: Joins a cluster; None where the program cannot.
         settings: Preferences; the user's own when None.
         opener: Opens captures; tests bring their own.
         is_preloading: Build a first cloud of a new capture, and load the drawing code at once. Loading takes a second
@@ -114,6 +119,7 @@ class Session(SessionFace):
         *,
         project_dir: Path | None = None,
         launch: Launch = ProcessWorker,
+        connect: Connect | None = None,
         settings: Settings | None = None,
         opener: Callable[..., Opened] = open_for_window,
         is_preloading: bool = True,
@@ -162,6 +168,7 @@ class Session(SessionFace):
         parts.add(showing)
         self.selecting = parts.add(ProjectSelecting(ShownToSelect(showing)))
         self.camera_paths = parts.add(CameraPaths(self.document))
+        self.joining = parts.add(ClusterJoining(connect, live, jobs, self.notices))
         self.versions = parts.add(Versions(jobs, self.notices, lambda: live.service))
         self.clip_work = parts.add(ClipWork(jobs, self.notices, live, self.document, self.asked.put_if_free))
         self.mending = parts.add(ProjectMending(live, lambda: self.overlays))
@@ -190,6 +197,9 @@ class Session(SessionFace):
             lambda: self.project, live.is_finished, lambda: None if self.capture is None else self.capture.n_frames
         )
         self.filling = parts.add(Filling(self.document, jobs, self.notices))
+        self.recording = parts.add(
+            RecordingFollower(self.document, jobs, self.notices, live, take_capture=self.projects.take_capture)
+        )
         self.project_status: ProjectStatus | None = None
         self.selection = SelectionStatus()
         self.edits: EditsStatus = self.editing.status()
@@ -229,6 +239,8 @@ class Session(SessionFace):
                 self.asked.put(self._verbs.obey(command))
             case _ if isinstance(command, HoldCommand):
                 self._verbs.obey(command)
+            case _ if isinstance(command, ClusterCommand):
+                self.joining.obey(command)
             case _ if isinstance(command, ClipCommand):
                 self.asked.put(None)
                 self.asked.put(self.clip_work.obey(command))
@@ -270,6 +282,8 @@ class Session(SessionFace):
                 if isinstance(command, LookAtVideos):
                     self.opening.close_page()
                 self.calibrating.obey(command)
+            case FollowRecording():
+                self.recording.obey(command)
             case _ if isinstance(command, SynchronisationCommand):
                 self.synchronising.obey(command)
             case CloseQuestion():
@@ -308,12 +322,12 @@ class Session(SessionFace):
 
     def _is_training(self) -> bool:
         """Whether cores are for a training now."""
-        return self.live_training.is_busy and self.training.state != "paused"
+        return self.live_training.is_computing
 
     def _news_key(self) -> tuple[object, ...]:
         """Differs whenever a thread has finished something, or there is other news."""
         jobs = tuple((job.name, job.done, job.message) for job in self.jobs)
-        log = None if self.log.worker.newest is None else self.log.worker.newest[0]
+        log = None if self.log.worker.newest is None else self.log.worker.newest[1]
         return self._parts.finished, log, jobs, self.notices.revision
 
     def _fail(self, job_name: str, error: Exception) -> None:

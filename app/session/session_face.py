@@ -25,6 +25,7 @@ from app.residuals.heat_map import HeatMap
 from app.residuals.residuals import Residuals
 from app.session.captures.capture_doctor import CaptureDoctor
 from app.session.captures.doctor_status import DoctorStatus
+from app.session.captures.recording_follower import RecordingFollower
 from app.session.clips.clip_work import ClipWork
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import ProjectSelecting
@@ -38,6 +39,7 @@ from app.status import (
     DependencyStatus,
     JobStatus,
     Overlays,
+    RecordingStatus,
     ResidualStatus,
     TrainingStatus,
     VersionStatus,
@@ -66,6 +68,7 @@ class SessionFace:
     versions: Versions
     clip_work: ClipWork
     selecting: ProjectSelecting
+    recording: RecordingFollower
     log: LogView
     asked: Asked
     _jobs: Jobs
@@ -111,6 +114,11 @@ class SessionFace:
     def recent(self) -> RecentProjects:
         """Projects opened lately."""
         return self.projects.recent
+
+    @property
+    def recording_status(self) -> RecordingStatus:
+        """Whether the recording of the open capture is followed."""
+        return self.recording.status()
 
     @property
     def question(self) -> Question | None:
@@ -198,11 +206,18 @@ class SessionFace:
         """An earlier version of a clip as a file to show; None until it was read, and where it cannot be shown."""
         return self.versions.state(clip_index, version)
 
-    def log_lines(self) -> Sequence[LogLine]:
-        """Lines of the program, and of the training of the clip that trains or is looked at; in the order of time."""
+    def log_lines(self, clip_index: int | None = None) -> Sequence[LogLine]:
+        """Lines of the program and of the training of a clip, in the order of time.
+
+        Args:
+            clip_index: When None, the clip at the playhead if it trains, else the one that leads the training, else the
+                one at the playhead.
+        """
         clip, project = self.timeline.clip, self.project
-        trains = self.training.state not in ("idle", "failed")
-        clip_index = self.training.clip_index if trains or clip is None else clip.clip_index
+        if clip_index is None and clip is not None:
+            clip_index = clip.clip_index
+            if self.training.state not in ("idle", "failed") and self.training.of_clip(clip_index) is None:
+                clip_index = self.training.clip_index
         if project is None or clip_index is None:
             return self.log.lines(None, None)
         return self.log.lines(clip_index, project.log_path(clip_index))

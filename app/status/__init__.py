@@ -35,7 +35,7 @@ from app.status.training import (
     UsageStatus,
     VersionStatus,
 )
-from app.status.work import LEAST_TOLD, JobStatus, OpeningForecast, ProjectStatus, RegionsStatus
+from app.status.work import LEAST_TOLD, JobStatus, OpeningForecast, ProjectStatus, RecordingStatus, RegionsStatus
 
 __all__ = [
     "BLINK_HZ",
@@ -60,6 +60,7 @@ __all__ = [
     "ProjectStatus",
     "QueueStatus",
     "QueuedClip",
+    "RecordingStatus",
     "RegionsStatus",
     "ResidualStatus",
     "RunningClip",

@@ -22,6 +22,7 @@ class RunningClip:
         eta_s: Seconds until it is finished; None when unknown.
         held_out_psnr: dB; None when not measured.
         since_s: For how long it trains already.
+        worker: Which of the workers of this process, from 1; 0 of another one.
     """
 
     clip_index: int
@@ -36,6 +37,7 @@ class RunningClip:
     eta_s: float | None = None
     held_out_psnr: float | None = None
     since_s: float = 0.0
+    worker: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +65,11 @@ class TrainingStatus:
 
     Attributes:
         state: idle, starting, preparing, running, paused, stopping or failed.
-        clip_index: Clip of the worker, or of the last one that failed; None when idle. Of several that train, the one
-            that began first: everything else here is about that one.
+        clip_index: Clip of the worker, or of the last one that failed; None when idle. Of several that train here, the
+            one at the playhead, else the one that began first: everything else here is about that one.
         n_running: How many clips this process trains.
+        n_workers: How many it may train side by side.
+        why_fewer: Why that is less than was asked for, one sentence; empty where it is not.
         trainings: All clips in training, here and elsewhere, in the order of their indices.
         machines: Computers that train them, this one first.
         step, n_steps: Optimiser steps of that clip.
@@ -88,6 +92,8 @@ class TrainingStatus:
     state: str = "idle"
     clip_index: int | None = None
     n_running: int = 0
+    n_workers: int = 1
+    why_fewer: str = ""
     trainings: tuple[RunningClip, ...] = ()
     machines: tuple[MachineStatus, ...] = ()
     step: int = 0
@@ -107,6 +113,34 @@ class TrainingStatus:
     next_clip_index: int | None = None
     resume_step: int | None = None
     queue: tuple[int, ...] = ()
+
+    @property
+    def is_going(self) -> bool:
+        """Whether something trains here."""
+        return self.state not in ("idle", "failed")
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether all that trains here is paused."""
+        return all(state == "paused" for state in self._states_here)
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether all that trains here was told to end."""
+        return all(state == "stopping" for state in self._states_here)
+
+    @property
+    def _states_here(self) -> list[str]:
+        return [one.state for one in self.trainings if not one.is_elsewhere] or [self.state]
+
+    @property
+    def is_anywhere(self) -> bool:
+        """Whether something trains, here or elsewhere."""
+        return self.is_going or bool(self.trainings)
+
+    def of_clip(self, clip_index: int) -> RunningClip | None:
+        """The training of a clip; None where it does not train."""
+        return next((one for one in self.trainings if one.clip_index == clip_index), None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,19 @@ class ProjectStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordingStatus:
+    """The recording of the open capture.
+
+    Attributes:
+        is_followed: Whether frames are taken in as they come.
+        words: What is waited for; empty where nothing is.
+    """
+
+    is_followed: bool = False
+    words: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class RegionsStatus:
     """Where the user marks static and moving parts.
 

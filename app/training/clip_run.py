@@ -26,6 +26,7 @@ from app.training.messages import (
     HeldOutMeasured,
     Pause,
     Resume,
+    SetSnapshots,
     SnapshotWritten,
     StageReported,
     StepReported,
@@ -95,6 +96,8 @@ class ClipRun:
         stage, last_step: The worker's last reports.
         check: Raises ProjectError where a clip may no longer be put in its place by this process.
         pid, machine: Process of the worker, and its computer; None and empty before it has reported them.
+        worker_number: Which of the workers side by side it has, from 1.
+        live_view: How often its worker writes snapshots now, one of LIVE_VIEWS.
         began_s: When it was started, by time.monotonic.
         ending: How it ended; None while it continues.
     """
@@ -111,6 +114,8 @@ class ClipRun:
     last_step: StepReported | None = None
     pid: int | None = None
     machine: str = ""
+    worker_number: int = 1
+    live_view: str = "live"
     began_s: float = field(default_factory=time.monotonic)
     is_paused: bool = False
     is_stopping: bool = False
@@ -195,6 +200,12 @@ class ClipRun:
         if self.is_paused:
             self.is_paused = False
             self.worker.send(Resume())
+
+    def show(self, live_view: str) -> None:
+        """Write snapshots this often from now on."""
+        if live_view != self.live_view:
+            self.live_view = live_view
+            self.worker.send(SetSnapshots(live_view))
 
     def stop(self, *, keep: bool = True) -> None:
         """End it after the current step."""

@@ -12,6 +12,7 @@ from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.clip_files.clip_header import SettingValue
 from engine.gate.regions import GateRegion
+from engine.portable import NATIVE, Processor
 
 LIVE_VIEWS = ("off", "low", "live")
 """How often a worker writes snapshots: never, now and then, or as often as they are looked at."""
@@ -31,13 +32,15 @@ class TrainJob(Struct, frozen=True):
         fingerprint: Of the capture.
         scale, seed, overrides: As in the project.
         holdout: Camera indices never trained on.
-        frames: Of the capture, as in the project.
+        frames: Of the capture, as in the project, or up to the clip's last one where nothing may look further.
         exclusions, regions: As in the project.
         backend: Name of the back end.
+        cpu: Whether its numbers are to be the same on every kind of processor, see engine.portable.
         is_window_open: Leave a core, or at least right of way, to a window.
         live_view: How often snapshots are written, one of LIVE_VIEWS.
         n_beside: How many trainings share the cores, this one included.
         claim: Token of the process that has claimed the clip; empty where none has.
+        n_threads: Threads to compute with; None for a share of the cores.
     """
 
     key: str
@@ -56,6 +59,8 @@ class TrainJob(Struct, frozen=True):
     live_view: str = "live"
     n_beside: int = 1
     claim: str = ""
+    n_threads: int | None = None
+    cpu: Processor = NATIVE
     backend: str = field(default_factory=chosen_name)
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -11,8 +12,9 @@ from app.background.logs import tail
 from app.project.project import Project
 from app.training.messages import ENDINGS, Command, Event, TrainingFailed, TrainJob, WorkerDied
 from engine.children.kind import ChildFailed, ChildKind
-from engine.children.process import MAX_EVENTS_PER_POLL, ChildProcess
+from engine.children.process import MAX_EVENTS_PER_POLL, Child, ChildProcess
 from engine.errors import EngineError
+from engine.portable import environment_of
 
 BUILD = "app.training.worker.build:build_training"
 
@@ -45,6 +47,16 @@ TRAINING: ChildKind[TrainTask, Event, None] = ChildKind(
 )
 
 
+class StartChild(Protocol):
+    """Starts the process of a training: `ChildProcess`, or something that does so on another computer."""
+
+    def __call__(
+        self, kind: ChildKind[TrainTask, Event, None], job: TrainTask, *, environment: Mapping[str, str]
+    ) -> Child[TrainTask, Event, None]:
+        """environment: Variables in addition to those of the process."""
+        ...
+
+
 class Worker(Protocol):
     """One clip being trained, wherever that happens."""
 
@@ -73,17 +85,18 @@ class ProcessWorker:
         job: The training.
         project: Where it is read from and kept.
         make: See `TrainTask`.
+        start: Starts the process, on this computer or on another one.
 
     Attributes:
         child: The process.
     """
 
-    def __init__(self, job: TrainJob, project: Project, make: str = BUILD) -> None:
+    def __init__(self, job: TrainJob, project: Project, make: str = BUILD, *, start: StartChild = ChildProcess) -> None:
         self.job = job
         self._log_path = project.log_path(job.clip_index)
         self._has_ended = False
         task = TrainTask(job, project.folder, Path(project.settings.capture), self._log_path, make)
-        self.child = ChildProcess(TRAINING, task)
+        self.child = start(TRAINING, task, environment=environment_of(job.cpu))
 
     def send(self, command: Command) -> None:
         """See `Worker`."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import count
 
 from app.project.claims.asks import Ask
 from app.project.claims.claims import Claims, ClipClaimed, Elsewhere
@@ -21,10 +22,8 @@ from app.training.curves import CurveReader
 from app.training.due import check_needed, with_needed
 from app.training.jobs import train_job
 from app.training.messages import (
-    LIVE_VIEWS,
     ClipTrained,
     Event,
-    SetSnapshots,
     SnapshotConsumed,
     SnapshotNow,
     TrainingFailed,
@@ -32,10 +31,12 @@ from app.training.messages import (
 )
 from app.training.own_settings import with_own
 from app.training.process import ProcessWorker, Worker
+from app.training.runs.looked_at import LookedAt
 from app.training.train_queue import FINISHED, OwnSettings, TrainQueue, drop_hopeless, needed_clips
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import DiskError, ProjectError
+from engine.portable import NATIVE, Processor
 from engine.training.preparation.stages import remove_stages
 
 Launch = Callable[[TrainJob, Project], Worker]
@@ -57,13 +58,14 @@ class TrainingService:
         curves: Reads the curves of clips that are looked at; stays open when the service is closed.
         n_workers: How many clips may train side by side. They share the cores.
         claims: Of this process; made here when None.
+        cpu: Passed on to workers, see TrainJob.
 
     Attributes:
         queue: Clips that wait.
         n_workers: How many clips may train side by side.
         runs: Clips that train, in the order in which they began.
         last: The run that ended last; None before one did.
-        live_view: How often workers write snapshots, one of LIVE_VIEWS.
+        looked_at: The clips that somebody looks at, and how often their workers write snapshots.
         is_ending_after: Whether the queue is held when a clip that trains has ended.
     """
 
@@ -79,14 +81,16 @@ class TrainingService:
         curves: CurveReader | None = None,
         n_workers: int = 1,
         claims: Claims | None = None,
+        cpu: Processor = NATIVE,
     ) -> None:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open, self.n_workers = launch, is_window_open, n_workers
+        self._cpu: Processor = cpu
         self.catalog = ClipCatalog(project, len(self.clips)) if catalog is None else catalog
         self.queue = TrainQueue()
         self.runs: dict[int, ClipRun] = {}
         self.last: ClipRun | None = None
-        self.live_view = "live"
+        self.looked_at = LookedAt()
         self.is_ending_after = False
         self.curves = CurveReader() if curves is None else curves
         self._owns_curves = curves is None
@@ -110,6 +114,17 @@ class TrainingService:
             found = {index: known[key] for key, index in indices.items() if index is not None and index < n_clips}
             self._elsewhere = (known, found)
         return self._elsewhere[1]
+
+    @property
+    def in_training(self) -> set[int]:
+        """Clips that train, here or elsewhere."""
+        return {*self.runs, *self.elsewhere}
+
+    @property
+    def progress(self) -> dict[int, ClipProgress]:
+        """How far each of them is, as far as it is known."""
+        own = {index: run.progress for index, run in self.runs.items()}
+        return own | {index: other.progress or ClipProgress(index) for index, other in self.elsewhere.items()}
 
     def _described(self) -> dict[str, ClipProgress]:
         return {run.worker.job.key: run.progress for run in list(self.runs.values())}
@@ -158,6 +173,12 @@ class TrainingService:
             return run.shown
         record = self.catalog[clip_index]
         return None if record.file is None else ShownState(record.file, record.revision)
+
+    def extend(self, clips: Sequence[Clip]) -> None:
+        """The capture has grown: these are all clips now, the present ones first. Whatever trains or waits does not
+        notice."""
+        self.clips = list(clips)
+        self.catalog.extend(len(self.clips))
 
     # ---------------------------------------------------------------- choosing clips
 
@@ -221,7 +242,7 @@ class TrainingService:
             ProjectError: The project is read-only.
         """
         self.project.check_trainable()
-        coming = {*self.queue, *self.runs, *self.elsewhere}
+        coming = self.in_training.union(self.queue)
         order, left_out = with_needed(self.project, self.catalog, clip_indices, coming)
         for clip_index in order:
             self._add(clip_index)
@@ -240,16 +261,18 @@ class TrainingService:
         self.is_ending_after = is_wanted and self.is_busy
 
     def set_live_view(self, mode: str) -> None:
-        """How often snapshots are written, from now on; reaches running workers, which do not wait for it."""
-        if mode not in LIVE_VIEWS:
-            raise ValueError(f"the live view is one of {', '.join(LIVE_VIEWS)}, not {mode!r}")
-        self.live_view = mode
-        for run in self.runs.values():
-            run.worker.send(SetSnapshots(mode))
+        """How often snapshots of clips that are looked at are written, from now on. See `LookedAt.set_mode`."""
+        self.looked_at.set_mode(mode, self.runs.values())
+
+    def set_workers(self, n: int) -> None:
+        """Let this many clips train side by side. More begin at once; those that train continue."""
+        self.n_workers = n
+        if self.runs:  # clips that wait for the user still do
+            self._start_waiting()
 
     def drop_hopeless(self) -> list[int]:
         """Take clips that can no longer be trained out of the queue. Returns them."""
-        return drop_hopeless(self.queue, {*self.runs, *self.elsewhere}, self.project, self.catalog)
+        return drop_hopeless(self.queue, self.in_training, self.project, self.catalog)
 
     def take_dropped(self) -> list[int]:
         """Clips that left the queue because clips they need cannot come; each is given once."""
@@ -313,7 +336,7 @@ class TrainingService:
         """Waiting clips that need none that trains or waits before them, as many as there is room for; but for those
         that another process trains."""
         room, ready = self.n_workers - len(self.runs), list[int]()
-        coming, config = {*self.runs, *self.elsewhere}, self.project.settings.config()
+        coming, config = self.in_training, self.project.settings.config()
         for clip_index in self.queue:
             is_free = clip_index not in self.elsewhere
             if is_free and coming.isdisjoint(needed_clips(self.project, clip_index, config)):
@@ -345,9 +368,10 @@ class TrainingService:
             holdout=self.holdout,
             overrides=with_own(self.project, self._begun[clip_index]) if self._begun.get(clip_index) else None,
             is_window_open=self._is_window_open,
-            live_view=self.live_view,
+            live_view=self.looked_at.mode_of(clip_index),
             n_beside=n_beside,
             claim=self.claims.token,
+            cpu=self._cpu,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)
         if refused is not None:
@@ -358,7 +382,9 @@ class TrainingService:
             worker = self._launch(job, self.project)
         self._n_runs += 1
         check = partial(self.claims.check, job.key)
-        run = self.runs[clip_index] = ClipRun(worker, self.project, self._n_runs, check)
+        run = self.runs[clip_index] = ClipRun(worker, self.project, self._n_runs, check, live_view=job.live_view)
+        taken = {other.worker_number for other in self.runs.values() if other is not run}
+        run.worker_number = next(number for number in count(1) if number not in taken)
         run.take_up(self.catalog[clip_index])
 
     def _begin_afresh(self, clip_index: int, own: OwnSettings) -> None:

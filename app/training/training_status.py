@@ -21,12 +21,13 @@ _WORDS = {"starting": "preparing", "preparing": "preparing", "paused": "paused"}
 
 
 def training_status(service: TrainingService, viewed_clip: int | None = None) -> TrainingStatus:
-    """The leading training as one value, or the last one.
+    """All trainings as one value, led by that of the viewed clip, else by the one that began first or ended last.
 
     Args:
-        viewed_clip: Whose curves to show while nothing trains.
+        viewed_clip: The clip at the playhead. Its curves are shown while nothing trains, too.
     """
-    run, settings = service.shown_run, service.project.settings
+    run = service.shown_run if viewed_clip is None else service.runs.get(viewed_clip, service.shown_run)
+    settings = service.project.settings
     state, step = ("idle", None) if run is None else (run.state, run.last_step)
     stage = "" if run is None else run.stage.stage
     clip_index = None if run is None else run.clip_index
@@ -41,6 +42,7 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
         state=state,
         clip_index=clip_index,
         n_running=len(service.runs),
+        n_workers=service.n_workers,
         trainings=trainings,
         machines=tuple(machines(service, trainings)),
         step=0 if run is None else run.step,
@@ -65,7 +67,8 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
 
 def running_clips(service: TrainingService) -> tuple[RunningClip, ...]:
     """All clips in training, here and elsewhere, in the order of their indices."""
-    found = [_running(run.progress) for run in service.runs.values() if run.ending is None]
+    runs = [run for run in service.runs.values() if run.ending is None]
+    found = [replace(_running(run.progress), worker=run.worker_number) for run in runs]
     found += [_elsewhere(clip_index, other) for clip_index, other in service.elsewhere.items()]
     return tuple(sorted(found, key=lambda clip: clip.clip_index))
 

@@ -6,7 +6,7 @@ PYTHON=@python@
 CAPTURE=@capture@
 PROJECT=@project@
 JOBS=${JOBS:-1}
-[ "$JOBS" = 1 ] || export NUMBA_NUM_THREADS=$((($(getconf _NPROCESSORS_ONLN) + JOBS - 1) / JOBS))
+[ "$JOBS" = 1 ] || export CLIPGSTREAM_CORES=$((($(getconf _NPROCESSORS_ONLN) + JOBS - 1) / JOBS))
 
 if [ $# = 1 ]; then # one clip; prints its number if it has to be tried again later
     for try in 1 2 3; do # one that failed resumes from its checkpoint
@@ -16,7 +16,7 @@ if [ $# = 1 ]; then # one clip; prints its number if it has to be tried again la
     done
     case $code in
     75) echo "$1" ;; # being trained by another computer
-    0 | 1) exit $code ;;
+    0 | 1 | 3) exit $code ;; # 3: stopped by a person
     *) exit 255 ;; # bad input, or interrupted: xargs stops
     esac
     exit

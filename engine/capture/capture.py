@@ -19,6 +19,8 @@ from engine.capture.cameras.rig_checks import check_rig, rig_extent, rig_warning
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.capture.formats.table import read_layout
 from engine.capture.frames import FrameStore, IndexedFrames
+from engine.capture.growing.mode import reading
+from engine.capture.growing.reading import stretched
 from engine.capture.layout.format_checks import raise_problems
 from engine.capture.layout.format_result import Layout
 from engine.capture.pixels.excluded_pixels import ExcludedPixels
@@ -91,7 +93,33 @@ class Capture:
     def frames(self) -> tuple[int, int] | None:
         """First frame of the whole capture that is worked on, and the one after the last; None where that is all."""
         chosen = self.first_frame, self.first_frame + self.n_frames
-        return None if chosen == (0, self.layout.n_frames) else chosen
+        return None if chosen == (0, self.layout.n_frames) and not self.is_growing else chosen
+
+    @property
+    def is_growing(self) -> bool:
+        """Whether it may still be recorded; see `open_capture`."""
+        return self.layout.is_growing
+
+    def grown(self, n_frames: int) -> Capture:
+        """The same capture with more frames, which have come since it was read. Files are not read again.
+
+        Raises:
+            CaptureError: It is not one that grows.
+        """
+        if not self.is_growing:
+            raise CaptureError("The capture was opened as complete, so that it cannot grow.", path=self.path)
+        stop = max(self.first_frame + n_frames, self.layout.n_frames)
+        cameras = tuple(replace(camera, source=stretched(camera.source, stop)) for camera in self.layout.cameras)
+        layout = replace(self.layout, cameras=cameras, n_frames=stop)
+        frames = (self.first_frame, self.first_frame + n_frames)
+        cache_bytes = self.store.cache.max_bytes
+        return _make_capture(layout, self.path, self.scale, frames, cache_bytes, follow_links=self.follow_links)
+
+    @property
+    def start_key(self) -> str:
+        """The fingerprint, and which frame is the first where that is not the capture's: a key of whatever depends on
+        frames that are counted, however many there are."""
+        return self.fingerprint if self.first_frame == 0 else f"{self.fingerprint}:{self.first_frame}:"
 
     @property
     def part_key(self) -> str:
@@ -120,16 +148,21 @@ class Capture:
             IndexError: No such camera or frame.
         """
         self._check(camera_index, (frame_index,))
-        return self._filled(camera_index, frame_index, self._stored(camera_index, frame_index))
+        return self._picture(camera_index, frame_index)
 
     def _stored(self, camera_index: int, frame_index: int) -> np.ndarray:
         return next(iter(self.store.frames(camera_index, (self.first_frame + frame_index,))))
 
-    def _filled(self, camera_index: int, frame_index: int, picture: np.ndarray) -> np.ndarray:
-        """The picture without what is excluded of it. [H, W, 3] uint8, read-only where it is another one"""
-        if self._excluded is None or self._excluded.of(camera_index, frame_index) is None:
-            return picture
-        filled = picture.copy()
+    def _picture(self, camera_index: int, frame_index: int) -> np.ndarray:
+        """A picture without what is excluded of it. One that is excluded altogether is not read: it may be missing.
+        [H, W, 3] uint8, read-only"""
+        is_excluded = None if self._excluded is None else self._excluded.of(camera_index, frame_index)
+        if self._excluded is None or is_excluded is None:
+            return self._stored(camera_index, frame_index)
+        if is_excluded.all():
+            filled = np.zeros((*is_excluded.shape, 3), np.uint8)
+        else:
+            filled = self._stored(camera_index, frame_index).copy()
         sources, left = self._excluded.fills(camera_index, frame_index)
         for frame, pixels in sources:
             filled[pixels] = self._stored(camera_index, frame)[pixels]
@@ -150,9 +183,8 @@ class Capture:
         self._check(camera_index, frame_indices)
         width, height = (int(value) for value in self.rig.image_sizes[camera_index])
         frames = np.empty((len(frame_indices), height, width, 3), dtype=np.uint8)
-        wanted = [self.first_frame + frame_index for frame_index in frame_indices]
-        for row, frame in enumerate(self.store.frames(camera_index, wanted)):
-            frames[row] = self._filled(camera_index, frame_indices[row], frame)
+        for row, frame_index in enumerate(frame_indices):
+            frames[row] = self._picture(camera_index, frame_index)
         return frames
 
     def is_usable(self, camera_index: int, frame_index: int) -> bool:
@@ -271,6 +303,7 @@ def open_capture(
     cache_bytes: int = DEFAULT_CACHE_BYTES,
     follow_links: bool = False,
     is_shape_asked: bool = False,
+    is_growing: bool = False,
 ) -> Capture:
     """Open a capture folder of any known layout.
 
@@ -284,13 +317,22 @@ def open_capture(
         follow_links: Whether files that the capture names may lie outside of its folder. Only where the user said so.
         is_shape_asked: Whether frames of quite another shape than their calibration are taken as scaled instead of
             refused: for those who ask the user what became of them.
+        is_growing: Whether it may still be recorded: it then has the frames of its farthest camera, of which others may
+            lack some, images count by the numbers in their names, and its length does not count in its fingerprint.
     Raises:
         CaptureError: The folder does not hold a capture, or one that cannot be used; lists every problem found.
     """
     folder = Path(path)
     _check_scale(scale, folder)
     try:
-        layout = read_layout(folder, follow_links=follow_links)
+        with reading(is_growing=is_growing):
+            layout = read_layout(folder, follow_links=follow_links)
+        if is_growing and not layout.is_growing:
+            raise CaptureError(
+                f"Captures of this layout ({layout.format}) are only read once they are complete.",
+                hint="Wait for the end of the recording, then use clipgstream train.",
+                path=folder,
+            )
         if not is_shape_asked:
             raise_problems(check_shapes(layout), folder)
     except OSError as error:  # rights, a drive that went away, a path too long
@@ -389,10 +431,12 @@ def working_sizes(native_sizes: np.ndarray, scales: np.ndarray, path: Path | Non
 
 
 def fingerprint(layout: Layout) -> str:
-    """16 hex digits that change with format, cameras, calibration, sizes, rate or length."""
+    """16 hex digits that change with format, cameras, calibration, sizes, rate or length. While a capture may still be
+    recorded, rate and length do not count: a video grows into its rate."""
     rig = layout.rig()
     digest = hashlib.sha256()
-    header = (layout.format, layout.n_frames, round(layout.fps, 6), rig.names)
+    length = ("growing",) if layout.is_growing else (layout.n_frames, round(layout.fps, 6))
+    header = (layout.format, *length, rig.names)
     digest.update(repr(header).encode())
     for array in (rig.world_to_camera, rig.Ks, rig.image_sizes):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -402,7 +446,8 @@ def fingerprint(layout: Layout) -> str:
         if camera.color_matrix is not None:
             digest.update(repr((camera.name, camera.color_matrix.tolist())).encode())
         if isinstance(camera.source, IndexedFrames):
-            digest.update(camera.source.frame_indices.tobytes())
+            n_known = 1 if layout.is_growing else None
+            digest.update(camera.source.frame_indices[:n_known].tobytes())
     return digest.hexdigest()[:16]
 
 

@@ -96,6 +96,12 @@ class Exclusions(Struct, frozen=True, forbid_unknown_fields=True):
             tuple(one for one in self.masks if touches(one)),
         )
 
+    def leaves_out(self, camera: str, frame_index: int) -> bool:
+        """Whether a picture is excluded as a whole."""
+        return camera in self.cameras or any(
+            one.camera in (None, camera) and one.first <= frame_index < one.stop for one in self.frames
+        )
+
     def usable(self, camera_names: Sequence[str], n_frames: int) -> np.ndarray:
         """Which pictures are not excluded as a whole, cameras and frames alike. [n_frames, cameras] bool"""
         is_usable = np.ones((n_frames, len(camera_names)), bool)

@@ -10,6 +10,7 @@ import threading
 from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -30,6 +31,7 @@ from engine.capture.files.media import (
     set_pixel_limit,
     shown_pts,
 )
+from engine.capture.growing.numbered_files import NumberedFiles
 from engine.capture.layout.limits import MAX_PIXELS
 from engine.capture.pixels.video_colors import rgb_picture
 from engine.errors import CaptureError
@@ -70,7 +72,7 @@ class ImageFrames:
 
     def __init__(self, folder: Path, files: Sequence[Path]) -> None:
         self.path = folder
-        self.files = tuple(files)
+        self.files = files if isinstance(files, NumberedFiles) else tuple(files)
 
     @property
     def n_frames(self) -> int:
@@ -117,10 +119,11 @@ class VideoFrames:
         path: The file.
         n_frames: Number of frames, as its header says.
         is_turned: Whether pictures are turned as the file says; otherwise they come as they are stored.
+        is_growing: The file may still be written, so that it need not have so many frames, or may have more.
     """
 
-    def __init__(self, path: Path, n_frames: int, *, is_turned: bool = True) -> None:
-        self.path = path
+    def __init__(self, path: Path, n_frames: int, *, is_turned: bool = True, is_growing: bool = False) -> None:
+        self.path, self.is_turned, self.is_growing = path, is_turned, is_growing
         self._n_frames = n_frames
         self._turn: Turn | None = None if is_turned else UPRIGHT  # as its first frame says; None before that
         self._reformatter = VideoReformatter()
@@ -162,6 +165,8 @@ class VideoFrames:
         try:
             if self._container is None:
                 self._open()
+            if frame_index >= len(self._pts):
+                raise self._damaged(frame_index, f"it has only {len(self._pts)} so far")
             if self._must_seek(frame_index):
                 self._seek(self._key_before(frame_index))
             frame = self._decoded(frame_index)
@@ -213,14 +218,13 @@ class VideoFrames:
 
     def _read_index(self) -> None:
         """Collect frame times; packets are read, not decoded. Needed because frame times need not be even."""
-        with opened_video(self.path) as container:
-            packets = [
-                (pts, packet.is_keyframe)
-                for packet in container.demux(container.streams.video[0])
-                if (pts := shown_pts(packet)) is not None
-            ]
+        packets: list[tuple[int, bool]] = []
+        with opened_video(self.path) as container, suppress(*(VIDEO_FAULTS if self.is_growing else ())):
+            for packet in container.demux(container.streams.video[0]):
+                if (pts := shown_pts(packet)) is not None:
+                    packets.append((pts, packet.is_keyframe))
         times = sorted(pts for pts, _ in packets)
-        if len(times) != self._n_frames:
+        if len(times) != self._n_frames and not self.is_growing:
             raise CaptureError(
                 f"The container announces {self._n_frames} frames but holds {len(times)}.",
                 hint="Copy or export this video again, for example as H.264 in mp4.",

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO, Generic, cast
@@ -40,53 +40,19 @@ _CREATION_FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 """On Windows, where Ctrl+C reaches a whole group and cannot be blocked."""
 
 
-class ChildProcess(Generic[Job, Event, Result]):
-    """One child. It is started at once; that it could not be is its ending, like every other failure.
+class Child(Generic[Job, Event, Result]):
+    """A child as its parent sees it, wherever it runs: what it has said, and what it is to be told.
 
     Args:
         kind: The kind of its work.
-        job: Its job.
-        folder: The folder the child removes where this process has died before it.
-        sweep: Called with the child's number once it has died without an answer; removes what it would have removed
-            itself.
     """
 
-    def __init__(
-        self,
-        kind: ChildKind[Job, Event, Result],
-        job: Job,
-        *,
-        folder: Path | None = None,
-        sweep: Callable[[int], None] = lambda pid: None,
-    ) -> None:
+    def __init__(self, kind: ChildKind[Job, Event, Result]) -> None:
         self.kind = kind
-        self._sweep = sweep
-        self.still_s = 0.0
-        """For how long it has done no work."""
         self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
         self._outbox: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._ending: Result | Exception | None = None
         self._has_news, self._is_over = threading.Event(), threading.Event()
-        self._threads: list[threading.Thread] = []
-        self._process: subprocess.Popen[bytes] | None = None
-        try:
-            with ExitStack() as kept:
-                self._said = kept.enter_context(tempfile.TemporaryFile())
-                self._process = _start(kind, folder, self._said)
-                kept.pop_all()
-        except OSError as error:
-            reason = f"{kind.what} could not be started ({error.strerror or error})"
-            self._end_with(ChildFailed(reason, is_final=True))
-            return
-        self._outbox.put(framed(Message.JOB, job))
-        for work in (self._write, self._listen):
-            self._threads.append(threading.Thread(target=work, args=(self._process,), daemon=True))
-            self._threads[-1].start()
-
-    @property
-    def pid(self) -> int | None:
-        """The child's number; None where it could not be started."""
-        return None if self._process is None else self._process.pid
 
     @property
     def is_over(self) -> bool:
@@ -95,7 +61,11 @@ class ChildProcess(Generic[Job, Event, Result]):
 
     def send(self, command: object) -> None:
         """Tell the child something. Never waits and never fails."""
-        self._outbox.put(framed(Message.COMMAND, command))
+        self.pass_on(framed(Message.COMMAND, command))
+
+    def pass_on(self, message: bytes) -> None:
+        """The same with a message as `send` makes it."""
+        self._outbox.put(message)
 
     def poll(self, n_most: int = MAX_EVENTS_PER_POLL) -> list[Event]:
         """The events reported since the last call, oldest first. Never waits."""
@@ -121,6 +91,70 @@ class ChildProcess(Generic[Job, Event, Result]):
             raise self._ending
         return cast("Result", self._ending)
 
+    def end(self, grace_s: float = 0.0) -> None:
+        """Have it ended: asked, waited for, killed.
+
+        Args:
+            grace_s: How long to wait for it to end by itself.
+        """
+        raise NotImplementedError
+
+    def _say(self, event: Event) -> None:
+        self._events.put(event)
+        self._has_news.set()
+
+    def _end_with(self, ending: Result | Exception) -> None:
+        self._ending = ending
+        self._is_over.set()
+        self._has_news.set()
+
+
+class ChildProcess(Child[Job, Event, Result]):
+    """A child on this computer. It is started at once; that it could not be is its ending, like every other failure.
+
+    Args:
+        kind: The kind of its work.
+        job: Its job.
+        folder: The folder the child removes where this process has died before it.
+        environment: Variables in addition to those of this process.
+        sweep: Called with the child's number once it has died without an answer; removes what it would have removed
+            itself.
+    """
+
+    def __init__(
+        self,
+        kind: ChildKind[Job, Event, Result],
+        job: Job,
+        *,
+        folder: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+        sweep: Callable[[int], None] = lambda pid: None,
+    ) -> None:
+        super().__init__(kind)
+        self._sweep = sweep
+        self.still_s = 0.0
+        """For how long it has done no work."""
+        self._threads: list[threading.Thread] = []
+        self._process: subprocess.Popen[bytes] | None = None
+        try:
+            with ExitStack() as kept:
+                self._said = kept.enter_context(tempfile.TemporaryFile())
+                self._process = _start(kind, folder, environment or {}, self._said)
+                kept.pop_all()
+        except OSError as error:
+            reason = f"{kind.what} could not be started ({error.strerror or error})"
+            self._end_with(ChildFailed(reason, is_final=True))
+            return
+        self._outbox.put(framed(Message.JOB, job))
+        for work in (self._write, self._listen):
+            self._threads.append(threading.Thread(target=work, args=(self._process,), daemon=True))
+            self._threads[-1].start()
+
+    @property
+    def pid(self) -> int | None:
+        """The child's number; None where it could not be started."""
+        return None if self._process is None else self._process.pid
+
     def ask_to_end(self) -> None:
         """The child is no longer wanted. It ends at once, or tidies up first, as its kind says."""
         self._outbox.put(None)
@@ -131,11 +165,7 @@ class ChildProcess(Generic[Job, Event, Result]):
             self._process.kill()
 
     def end(self, grace_s: float = 0.0) -> None:
-        """Have it ended: asked, waited for, killed.
-
-        Args:
-            grace_s: How long to wait for it to end by itself.
-        """
+        """See `Child`."""
         self.ask_to_end()
         if self._process is None:
             return
@@ -161,8 +191,7 @@ class ChildProcess(Generic[Job, Event, Result]):
             self.still_s = 0.0
             try:
                 if kind is Message.EVENT:
-                    self._events.put(decoded(data, self.kind.event))
-                    self._has_news.set()
+                    self._say(decoded(data, self.kind.event))
                 elif kind is Message.RESULT:
                     self._end_with(decoded(data, self.kind.result))
                 elif kind is Message.ERROR:
@@ -177,11 +206,6 @@ class ChildProcess(Generic[Job, Event, Result]):
         process.stdout.close()
         self._said.close()
         self._outbox.put(None)
-
-    def _end_with(self, ending: Result | Exception) -> None:
-        self._ending = ending
-        self._is_over.set()
-        self._has_news.set()
 
     def _death(self, code: int) -> ChildFailed:
         with suppress(OSError):
@@ -198,10 +222,12 @@ class ChildProcess(Generic[Job, Event, Result]):
         return ChildFailed(f"{self.kind.what} ended with code {code}", is_final=code >= 0)
 
 
-def _start(kind: ChildKind[Job, Event, Result], folder: Path | None, said: IO[bytes]) -> subprocess.Popen[bytes]:
+def _start(
+    kind: ChildKind[Job, Event, Result], folder: Path | None, added: Mapping[str, str], said: IO[bytes]
+) -> subprocess.Popen[bytes]:
     root = str(Path(engine.__file__).resolve().parents[1])
     paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    environment = {**os.environ, **added, "PYTHONPATH": os.pathsep.join(paths)}
     if kind.is_spreading:
         environment["OPENBLAS_NUM_THREADS"] = "1"
     command = [sys.executable, "-P", "-m", "engine.children", kind.place, *([str(folder)] if folder else [])]

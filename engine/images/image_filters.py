@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from scipy import ndimage
 
+from engine.kernels.fast_math import ALL, fast_math
+
 
 def block_mean(image: np.ndarray, factor: int) -> np.ndarray:
     """Shrink by an integer factor with box averages; a remainder at the right and lower border is cut off.
@@ -76,7 +78,7 @@ def remove_small_blobs(mask: np.ndarray, min_px: int) -> np.ndarray:
     return is_kept[labels]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _blurred_difference(frame, background, taps, rows, line, total):
     """Writes total [H, W]. rows [H, 3 W] is scratch, so is line, of one row with what the taps reach on both sides."""
     height, width, n_channels = frame.shape

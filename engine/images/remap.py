@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from engine.kernels.fast_math import ALL, fast_math
+
 N_STEPS = 256
 """Parts of a pixel to which a place is rounded for the weights of the cubics: an error below half a grey level."""
 _SHARES = np.arange(N_STEPS + 1) / N_STEPS
@@ -76,7 +78,7 @@ def _at(line, k, u, last):
     return min(max(place, np.float32(0.0)), last)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _interpolate(image, lattice, step_px, is_valid, weights, line, out):
     height, width = image.shape[0], image.shape[1]
     values, stride = image.reshape(-1), 3 * width
@@ -118,7 +120,7 @@ def _interpolate(image, lattice, step_px, is_valid, weights, line, out):
             out[i, j, 2] = np.uint8(min(max(blue, np.float32(0.0)), np.float32(255.0)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _average(image, lattice, step_px, n_sub, is_valid, line, sums, out):
     height, width = image.shape[0], image.shape[1]
     last_x, last_y = np.float32(width - 1), np.float32(height - 1)

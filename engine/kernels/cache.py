@@ -26,6 +26,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+from engine.kernels.fast_math import CPU_VARIABLE
+from engine.machine import processor_text
 from engine.user_folders import NAME, cache_dir
 
 VARIABLE = "NUMBA_CACHE_DIR"
@@ -49,6 +51,7 @@ _WARM_UP = "warm.py"
 _FROM = re.compile(rb"from (engine[\w.]*) import (\([^)]*\)|[^\n#]*)")
 _RENAMED = re.compile(rb"\s+as\s+\w+")
 _CODE_VARIABLES = (
+    CPU_VARIABLE,
     "NUMBA_BOUNDSCHECK",
     "NUMBA_CPU_FEATURES",
     "NUMBA_CPU_NAME",
@@ -144,7 +147,7 @@ def current_key() -> CacheKey:
     return CacheKey(
         sources=sources_hash(_PACKAGE),
         libraries=_hash(_library_texts()),
-        processor=_hash([_processor_text().encode()]),
+        processor=_hash([processor_text().encode()]),
     )
 
 
@@ -313,37 +316,6 @@ def _library_texts() -> list[bytes]:
                 texts.append((Path(spec.origin).parent / "_version.py").read_bytes())
     texts += [f"{name}={os.environ[name]}".encode() for name in _CODE_VARIABLES if name in os.environ]
     return texts
-
-
-def _processor_text() -> str:
-    """Model and instruction sets of the first core, as the system reports them; a few lines at most."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            wanted = ("model name", "flags", "Features", "CPU part", "CPU implementer", "isa")
-            lines = []
-            for line in file:
-                if not line.strip() and lines:  # end of the first core: the rest repeats it
-                    break
-                if line.startswith(wanted):
-                    lines.append(line)
-            return "".join(lines)
-    except OSError:
-        import platform
-
-        return " ".join((platform.machine(), os.environ.get("PROCESSOR_IDENTIFIER", ""), _mac_brand()))
-
-
-def _mac_brand() -> str:
-    if sys.platform != "darwin":
-        return ""
-    import ctypes
-
-    with suppress(OSError, AttributeError):
-        value, size = ctypes.create_string_buffer(256), ctypes.c_size_t(256)
-        library = ctypes.CDLL(None)
-        if library.sysctlbyname(b"machdep.cpu.brand_string", value, ctypes.byref(size), None, 0) == 0:
-            return value.value.decode("utf-8", "replace")
-    return ""
 
 
 def _chosen_root() -> tuple[Path, bool]:

@@ -17,6 +17,7 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from engine.kernels.fast_math import fast_math
 from engine.kernels.numba_internals import no_value
 
 N_LANES = 16
@@ -31,7 +32,7 @@ _BOOL = ir.IntType(1)
 _BOOLS = ir.VectorType(_BOOL, N_LANES)
 
 # Rounding may be tightened (one rounding instead of two), infinities and NaN keep their meaning.
-_FLAGS = ("contract", "nsz", "arcp")
+_FLAGS = tuple(sorted(fast_math("contract", "nsz", "arcp")))
 
 
 def kernel_intrinsic(function: Callable[..., Any]) -> Any:

@@ -82,6 +82,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     QueueStatus,
+    RecordingStatus,
     RegionsStatus,
     ResidualStatus,
     SeamStatus,
@@ -224,6 +225,14 @@ class FakeExporting:
         return None if self.is_looking else f"/out/{choices.kind}"
 
 
+@dataclass
+class FakeJoining:
+    """A cluster that is joined, or can be."""
+
+    can_join: bool = False
+    address: str = ""
+
+
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
@@ -245,6 +254,7 @@ class FakeSession:
         self.calibrating = FakeCalibrating()
         self.synchronising = FakeSynchronising()
         self.exporting = FakeExporting()
+        self.joining = FakeJoining()
         self.mending = FakeMending()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
@@ -253,6 +263,7 @@ class FakeSession:
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
         self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
         self.lines: tuple[LogLine, ...] = ()
+        self.log_clip: int | None = None
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.plan: PlanStatus | None = PlanStatus(
             clip_index=0,
@@ -296,6 +307,7 @@ class FakeSession:
         self.cached: list[tuple[int, int]] = []  # what cached_frames answers
         self.project = None
         self.doctor_status = DoctorStatus()
+        self.recording_status = RecordingStatus()
         self.timeline, self.views = Timeline(), Views()
         self.bookmarks = Bookmarks()
         if has_capture:
@@ -523,8 +535,9 @@ class FakeSession:
         """What a test put there."""
         return self.disk
 
-    def log_lines(self) -> tuple[LogLine, ...]:
+    def log_lines(self, clip_index: int | None = None) -> tuple[LogLine, ...]:
         """What a test put there."""
+        self.log_clip = clip_index
         return self.lines
 
     # ---- pictures --------------------------------------------------------------------------------------------

@@ -80,6 +80,9 @@ class CapturePanel:
         held_out = frozenset(session.holdout)
         measured = f" - {len(held_out)} held out for measuring" if held_out else ""
         text_wrapped_dim(f"{format_count(len(session.clips))} clips{measured}")
+        recording = session.recording_status
+        if recording.is_followed:
+            text_wrapped_dim(f"Recording: {recording.words or 'looking for frames'}")
         imgui.spacing()
 
     def _draw_cameras(self, rig: CameraRig, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:

@@ -61,9 +61,9 @@ class LogPanel:
 
     def draw(self, session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         """Filter, buttons, lines."""
-        shown = self._filtered(session.log_lines())
+        shown = self._filtered(session.log_lines(ui.log_clip))
         self._draw_tools(shown, ui)
-        if session.training.state not in ("idle", "failed"):
+        if session.training.is_anywhere:
             ui.redraw_within(REFRESH_S)
         flags = imgui.WindowFlags_.horizontal_scrollbar
         imgui.push_style_color(imgui.Col_.child_bg, ImVec4(*theme.BACKDROP))
@@ -101,6 +101,12 @@ class LogPanel:
         ui.mark("log.follow")
         imgui.set_item_tooltip("Stay at the newest line; scroll up to pause")
         imgui.same_line()
+        if ui.log_clip is not None:
+            if imgui.button(f"Clip {ui.log_clip}  {Icon.CLOSE}##log clip"):
+                ui.log_clip = None
+            ui.mark("log.clip")
+            imgui.set_item_tooltip("Only this clip's log is shown; click for that of the clip at the playhead")
+            imgui.same_line()
         imgui.text_disabled("1 line" if len(shown) == 1 else f"{len(shown):,} lines")
 
     def _draw_lines(self, shown: Sequence[LogLine]) -> None:

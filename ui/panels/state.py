@@ -102,6 +102,8 @@ class UiState:
         paths: Editing of the camera path's keys.
         navigation: Functions of mouse and keys over a picture.
         curves: Contents of the training panel's plots.
+        cluster_address: As typed to join a cluster.
+        log_clip: The clip whose log is shown; None for the one at the playhead, or the one that trains.
         queue_chosen: The waiting clip that keys move; None without one.
         timeline: The part of time that is shown.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
@@ -133,6 +135,8 @@ class UiState:
     pointed_anchor: np.ndarray | None = None
     is_view_popup_wanted: bool = False
     curves: CurveView = field(default_factory=CurveView)
+    cluster_address: str = ""
+    log_clip: int | None = None
     queue_chosen: int | None = None
     timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""

@@ -19,6 +19,7 @@ from app.session.projects.project_commands import OpenCapture, SetProjectsFolder
 from app.session.projects.window_memory import WindowMemory
 from app.session.session_view import WindowSession
 from app.session.showing.look_commands import SetFrameMemory
+from app.session.training.train_commands import SetWorkers
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
@@ -133,7 +134,7 @@ class Frame:
         keys.drop_unknown(ACTIONS)
         self.ui = UiState(fonts=load_fonts(), scale=self.scale, preferences=values, keys=keys)
         self._cache_mb: int | None = None
-        self._projects_dir = ""
+        self._projects_dir, self._n_workers = "", 1
         self._follow_preferences()  # before a capture is opened
         self._theme = ThemeInUse()
         self._theme.follow(values.theme)
@@ -209,6 +210,9 @@ class Frame:
         if self._cache_mb != preferences.cache_mb:
             self._cache_mb = preferences.cache_mb
             self.session.dispatch(SetFrameMemory(self._cache_mb))
+        if self._n_workers != preferences.n_workers:
+            self._n_workers = preferences.n_workers
+            self.session.dispatch(SetWorkers(self._n_workers))
         if self._projects_dir != preferences.projects_dir:
             self._projects_dir = preferences.projects_dir
             self.session.dispatch(SetProjectsFolder(self._projects_dir))

@@ -92,9 +92,9 @@ def _draw_action(action: Action, session: SessionView, dispatch: Dispatch, ui: U
 
 def _train_label(session: SessionView) -> str:
     """Label of the key for training at the moment."""
-    if session.training.state in ("starting", "preparing", "running"):
-        return f"{Icon.PAUSE}  Pause"
-    return f"{Icon.PLAY}  Resume" if session.training.state == "paused" else next_label(session)
+    if not session.training.is_going:
+        return next_label(session)
+    return f"{Icon.PLAY}  Resume" if session.training.is_paused else f"{Icon.PAUSE}  Pause"
 
 
 def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) -> bool:

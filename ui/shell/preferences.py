@@ -9,7 +9,7 @@ from typing import Protocol
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.project.projects_folder import VARIABLE, projects_dir
-from app.session.projects.preferences import CACHE_MB
+from app.session.projects.preferences import CACHE_MB, MAX_WORKERS
 from engine.backends.table import AUTO, BACKENDS
 from ui.panels.actions.window import choose_scale
 from ui.panels.picture.gestures import PRESETS, mouse_help
@@ -163,6 +163,14 @@ def draw_general(ui: UiState) -> None:
     ui.mark("preferences.backend")
     imgui.set_cursor_pos_x(LABEL_WIDTH)
     text_wrapped_dim("Takes effect at the next start.")
+    imgui.spacing()
+    label("Clips trained at once")
+    is_changed, n = imgui.input_int("##workers", preferences.n_workers, 1, 4)
+    ui.mark("preferences.workers")
+    if is_changed:
+        preferences.n_workers = min(max(n, 1), MAX_WORKERS)
+    imgui.set_cursor_pos_x(LABEL_WIDTH)
+    text_wrapped_dim("On this computer, as far as its cores and memory allow.")
 
 
 def projects_words(chosen: str) -> str:

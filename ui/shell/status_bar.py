@@ -12,9 +12,10 @@ from engine.text import duration_text
 from ui.panels.pieces.widgets import draw_job_bar, elided
 from ui.panels.state import Dispatch, UiState
 from ui.panels.training.queue import clips_text, usage_text
+from ui.panels.training.running import is_listed
 from ui.style import theme
 from ui.style.numbers import format_count
-from ui.style.progress_words import job_words, stage_words
+from ui.style.progress_words import job_words, stage_words, whole_words
 from ui.style.theme import Icon
 
 HEIGHT = 28.0
@@ -59,6 +60,8 @@ def status_text(session: SessionView) -> str:
         job = session.jobs[0]
         return f"{job.name}: {job_words(job, time.monotonic())}"
     status = session.training
+    if is_listed(session):
+        return f"Training: {whole_words(len(session.clips), status, session.queue)}"
     if status.state == "running":
         steps = f"step {format_count(status.step)} of {format_count(status.n_steps)}"
         queued = session.queue.queued

@@ -23,10 +23,10 @@ CLEAR_BELOW = "\x1b[J"
 
 
 class ProgressRow(NamedTuple):
-    """One of several jobs: its name, its share 0..1, and other known figures."""
+    """One of several jobs: its name, its share 0..1 or None where that is not known, and other known figures."""
 
     name: str
-    done: float
+    done: float | None
     detail: str = ""
 
 
@@ -49,8 +49,9 @@ class ProgressLine:
         self._stage = ""
         self._n_open = 0  # lines that are going to be drawn anew
 
-    def update(self, stage: str, done: float, detail: str = "") -> None:
-        """Show a stage, its share 0..1, and other known figures (rate, time left, figures)."""
+    def update(self, stage: str, done: float | None, detail: str = "") -> None:
+        """Show a stage, its share 0..1, and other known figures (rate, time left, figures). done: None where it is
+        not known, as of something that is waited for."""
         if self._is_due(stage):
             self._draw([ProgressRow(stage, done, detail)])
 
@@ -117,7 +118,10 @@ class ProgressLine:
 
 
 def _row_text(row: ProgressRow, *, has_bar: bool) -> str:
-    name, detail, done = printable(row.name), printable(row.detail), min(max(row.done, 0.0), 1.0)
+    name, detail = printable(row.name), printable(row.detail)
+    if row.done is None:
+        return f"{name}: {detail}"
+    done = min(max(row.done, 0.0), 1.0)
     if not has_bar:
         return f"{name} {done * 100:3.0f} %  {detail}".rstrip()
     filled = round(done * BAR_WIDTH)

@@ -114,7 +114,7 @@ class PlanLines:
         step_time: StepTime,
         is_quiet: bool,
     ) -> None:
-        self._line, self._project, self._capture, self._is_quiet = line, project, capture, is_quiet
+        self._line, self._project, self.capture, self._is_quiet = line, project, capture, is_quiet
         self._catalog, self._step_time = catalog, step_time
         self._plans: dict[int, TrainingPlan] = {}
 
@@ -125,7 +125,7 @@ class PlanLines:
         try:
             plan = self._plans[clip.clip_index] = plan_clip(
                 self._project,
-                self._capture,
+                self.capture,
                 clip,
                 step_time=self._step_time,
                 catalog=self._catalog,
@@ -180,7 +180,7 @@ class SequenceTable:
             for row in running.values()
         ]
         n_done, eta_s = self._n_clips - len(self._left), self._eta_s(running)
-        share = (n_done + sum(row.done for row in rows)) / max(self._n_clips, 1)
+        share = (n_done + sum(row.done or 0.0 for row in rows)) / max(self._n_clips, 1)
         left = "" if eta_s is None else f", {duration_text(eta_s)} left"
         self._line.show([*rows, ProgressRow("All", share, f"{n_done}/{self._n_clips} clips{left}")])
 

@@ -4,7 +4,7 @@
     {"kept": 127             , "checksum": ...}                                                     its last step
     {"step": 124, "do": "change", "name": ..., "merge": ..., "patch": {...}, "after": ..., "checksum": ...}
     {"step": 125, "do": "undo", "name": ..., "patch": {...}, "after": ..., "checksum": ...}     or "redo"
-    {"step": 126, "do": "place", "capture": ..., "follow_links": ..., "after": ..., "checksum": ...}
+    {"step": 126, "do": "place", "capture": ..., "follow_links": ..., "frames": ..., "after": ..., "checksum": ...}
     {"step": 127, "do": "find", "object": 3, "patch": {...}, "after": ..., "checksum": ...}
     {"end": 127, "after": ..., "checksum": ...}
 

@@ -241,7 +241,9 @@ def row_of(event: Event, before: DocumentHistory, step: int) -> Row:
         case Redone():
             row = {"step": step, "do": "redo", "name": before.redo_name}
         case Placed(settings=settings):
-            place = {"capture": settings.capture, "follow_links": settings.follow_links}
+            place: Row = {"capture": settings.capture, "follow_links": settings.follow_links}
+            if settings.is_growing and settings.frames is not None:
+                place["frames"] = list(settings.frames)
             return {"step": step, "do": "place", **place}
         case ObjectFound(object_id=object_id):
             row = {"step": step, "do": "find", "object": object_id}
@@ -260,6 +262,12 @@ def history_after(history: DocumentHistory, row: Row) -> DocumentHistory:
     match row.get("do"), known:
         case "place", {"capture": str(capture), "follow_links": bool(follow_links), **rest} if not rest:
             return history.after(Placed(replace(before.settings, capture=capture, follow_links=follow_links)))
+        case (
+            "place",
+            {"capture": str(capture), "follow_links": bool(follow_links), "frames": [int(first), int(stop)], **rest},
+        ) if not rest and 0 <= first < stop:
+            place = {"capture": capture, "follow_links": follow_links, "frames": (first, stop)}
+            return history.after(Placed(replace(before.settings, **place)))
         case "change", {"name": str(name), "patch": patch, **rest} if rest.keys() <= {"merge"}:
             merge = rest.get("merge")
             if merge is not None and not isinstance(merge, str):

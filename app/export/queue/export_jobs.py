@@ -50,7 +50,13 @@ def run_task(task: ExportTask, report: Report) -> ExportResult:
     from engine.capture.capture import open_capture
 
     project = open_project(Path(task.project), is_writable=False)
-    capture = open_capture(task.capture, scale=task.scale, frames=task.frames, follow_links=task.follow_links)
+    capture = open_capture(
+        task.capture,
+        scale=task.scale,
+        frames=task.frames,
+        follow_links=task.follow_links,
+        is_growing=project.settings.is_growing,
+    )
     try:
         return task.job.load().run(open_trained(project, capture), task.job, report)
     finally:

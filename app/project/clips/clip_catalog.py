@@ -124,12 +124,26 @@ class ClipCatalog:
         self._evaluated: dict[int, tuple[str, float]] = {}
         config = project.settings.config()
         self._inherits, self._goes_on = not config.independent, config.follows_previous
-        if project.has_progress:
-            for index in range(n_clips) if only is None else only:
+        self._read_all(range(n_clips) if only is None else only, report)
+        self._judge_all()
+
+    def extend(self, n_clips: int) -> None:
+        """The capture has grown: there are so many clips now, the present ones first."""
+        later = range(len(self._clips), n_clips)
+        self.order = self._project.training_order(n_clips)
+        self._after = dict(itertools.pairwise(self.order))
+        self._before = {after: before for before, after in self._after.items()}
+        self._clips += [None] * len(later)
+        self._checkpoints += [None] * len(later)
+        self._read_all(later)
+        self.judge_anew()
+
+    def _read_all(self, indices: Collection[int], report: Callable[[int], None] = lambda n_read: None) -> None:
+        if self._project.has_progress:
+            for index in indices:
                 if index % REPORT_EVERY == 0:
                     report(index)
                 self._read(index)
-        self._judge_all()
 
     def __len__(self) -> int:
         return len(self._records)

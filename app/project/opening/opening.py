@@ -289,7 +289,8 @@ def projects_of(
             settings = read_settings(folder)
         except ProjectError:
             continue
-        if settings.fingerprint == capture.fingerprint:
+        is_grown = settings.is_growing and Path(settings.capture) == place
+        if settings.fingerprint == capture.fingerprint or is_grown:
             n_trained = len(finished_files(folder, settings.clip_bounds, settings.clip_length))
             first, stop = settings.frames or (0, capture.layout.n_frames)
             n_clips = len(settings.clips(stop - first))
@@ -334,7 +335,12 @@ def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
         )
         lost.project = folder
         raise lost
-    capture = open_capture(settings.capture, scale=settings.scale, follow_links=settings.follow_links)
+    capture = open_capture(
+        settings.capture,
+        scale=settings.scale,
+        follow_links=settings.follow_links,
+        is_growing=settings.is_growing,
+    )
     try:
         check_capture(capture, settings, folder)
     except ProjectError:

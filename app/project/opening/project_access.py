@@ -65,6 +65,7 @@ def default_settings(
         reference_clip=reference_clip,
         follow_links=capture.follow_links,
         frames=capture.frames,
+        is_growing=capture.is_growing,
     )
     check_settings(settings, capture)
     return settings

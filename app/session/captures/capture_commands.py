@@ -67,6 +67,13 @@ CalibrationCommand = LookAtVideos | CalibrateVideos | KeepCalibration | StopCali
 
 
 @dataclass(frozen=True, slots=True)
+class FollowRecording:
+    """Take in frames of the open capture as they are recorded, and train each clip once complete; or stop that."""
+
+    is_wanted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class SynchroniseCameras:
     """Measure how far the cameras of the open capture are ahead of each other."""
 

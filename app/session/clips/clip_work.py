@@ -163,8 +163,9 @@ class ClipWork(SessionPart):
         assert service is not None
         project, n_clips = opened.project, len(opened.clips)
         project.check_writable()
-        if what == "checkpoints" and service.is_busy and (clip_index is None or clip_index in service.runs):
-            running = service.running_clip if clip_index is None else clip_index
+        training = service.in_training
+        if what == "checkpoints" and training and (clip_index is None or clip_index in training):
+            running = min(training) if clip_index is None else clip_index
             raise ProjectError(
                 f"Clip {running} is training and keeps its progress there.",
                 hint="Wait until it is finished.",
@@ -200,7 +201,7 @@ class ClipWork(SessionPart):
         self._looked_for_damage = seen
         damaged = [index for index in range(len(service.catalog)) if service.catalog[index].state == "damaged"]
         first = next((index for index in damaged if index not in self._asked_damage), None)
-        if first is not None and first not in service.runs:
+        if first is not None and first not in service.in_training:
             self._asked_damage.add(first)
             self._ask_about_damage(first)
 

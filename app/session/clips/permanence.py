@@ -133,8 +133,8 @@ class Permanence:
 
 
 def _check_idle(service: TrainingService) -> None:
-    if service.running_clip is not None:
+    if service.in_training:
         raise ProjectError(
-            f"Clip {service.running_clip} is training and would not match the rewritten clips.",
+            f"Clip {min(service.in_training)} is training and would not match the rewritten clips.",
             hint="Let training end, or stop it; progress is kept.",
         )

@@ -11,8 +11,9 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 
 from app.background.latest import LatestWorker
-from app.document.history import Changed, DocumentHistory, Event, ObjectFound, Redone, Undone, coalesced
+from app.document.history import Changed, DocumentHistory, Event, ObjectFound, Placed, Redone, Undone, coalesced
 from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.edit_status import HistoryStatus
@@ -119,6 +120,10 @@ class KeptDocument(SessionPart):
     def found(self, found: ObjectFound) -> None:
         """Take up where an object is, in all documents of the history. Raises ProjectError like `change`."""
         self._happen(found)
+
+    def grown(self, settings: ProjectSettings) -> None:
+        """The capture has grown: hold settings with its frames. Not a step. Raises ProjectError like `change`."""
+        self._happen(Placed(settings))
 
     def undo(self) -> None:
         """Take back the last step; nothing happens without one.

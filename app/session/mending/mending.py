@@ -136,7 +136,7 @@ class ProjectMending(SessionPart):
         config = project.settings.config()
         if config.independent or config.field != "per_clip":
             return "The clips of this project share nothing, or one field, so they cannot be mended."
-        if self._live.is_busy:
+        if self._live.is_busy_anywhere:
             return "A clip is being trained. Mend when it has ended."
         return ""
 

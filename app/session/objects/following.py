@@ -50,6 +50,10 @@ class Following(SessionPart):
         """The same project is open, with other settings."""
         self.open(opened)
 
+    def grow(self, opened: OpenedProject) -> None:
+        """Its capture has grown: running work goes on."""
+        self._opened = opened
+
     def apply(self, command: FollowObject) -> None:
         """Begin to look; one that is under way ends.
 

@@ -98,6 +98,10 @@ class Objects(SessionPart):
         self._stop()
         self._opened = opened
 
+    def grow(self, opened: OpenedProject) -> None:
+        """Its capture has grown: running work goes on."""
+        self._opened = opened
+
     # ---------------------------------------------------------------- commands
 
     def apply(self, command: ObjectCommand) -> None:

@@ -26,6 +26,7 @@ WRITING_TIMEOUT_S = 5.0
 MAX_BYTES = 4 << 20
 CACHE_MB = (128, 65_536)
 """Least and most memory for decoded frames."""
+MAX_WORKERS = 256
 MAX_LAYOUTS = 40
 MAX_USED = 30
 """Actions that the palette remembers."""
@@ -39,6 +40,7 @@ class Preferences(msgspec.Struct):
         theme: Colours of the window; "system" follows the desktop.
         backend: For computing from the next start on, see engine.backends.table.
         cache_mb: Memory for decoded frames; None for as much as is usual.
+        n_workers: How many clips train side by side, as far as the computer allows it.
         projects_dir: Default folder of projects; empty for the usual one.
         keys: By the name of an action, the user's keys instead of the usual ones; an empty list for none.
         layouts: By name, where the panels are, as text of the window's.
@@ -48,6 +50,7 @@ class Preferences(msgspec.Struct):
     theme: Literal["dark", "light", "system"] = "dark"
     backend: Word = AUTO
     cache_mb: Annotated[int, Meta(ge=CACHE_MB[0], le=CACHE_MB[1])] | None = None
+    n_workers: Annotated[int, Meta(ge=1, le=MAX_WORKERS)] = 1
     projects_dir: Annotated[str, Meta(max_length=4096)] = ""
     keys: dict[Word, Annotated[list[Word], Meta(max_length=8)]] = msgspec.field(default_factory=dict)
     layouts: Annotated[dict[Word, Annotated[str, Meta(max_length=100_000)]], Meta(max_length=MAX_LAYOUTS)] = (

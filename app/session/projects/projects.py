@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.background.jobs import Jobs
 from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
 from app.project.allowed_changes import discard_unfitting
 from app.project.opening.opened_project import OpenedProject, opened_project
 from app.project.opening.opening import Opened
@@ -46,6 +47,7 @@ from app.session.showing.showing import Showing
 from app.session.training.live_training import LiveTraining
 from app.status import ProjectStatus
 from engine.capture.capture import Capture
+from engine.errors import EngineError
 
 
 class Projects(SessionPart):
@@ -149,7 +151,7 @@ class Projects(SessionPart):
         self._asked.put(None)
         if isinstance(command, SaveProjectAs):  # the copy would hold half-written files
             self._parts.check_idle()
-        self._files.apply(command, self.project, is_training=self._live.is_busy)
+        self._files.apply(command, self.project, is_training=self._live.is_busy_anywhere)
 
     def change_settings(self, command: SettingCommand) -> None:
         """Replace settings that every clip shares.
@@ -169,11 +171,43 @@ class Projects(SessionPart):
         """With other settings, progress may not fit; all parts take up the project anew."""
         if before.settings == after.settings or self.opened is None:
             return
+        if before.settings.is_placed_as(after.settings):
+            self._grow(after.settings)
+            return
         found = discard_unfitting(self.opened.project, before.settings, after.settings)
         if found.progress:
             words = found.progress_words
             self._notices.add("info", "Settings changed", f"{words[0].upper()}{words[1:]} was discarded.")
         self._reopen()
+
+    def take_capture(self, capture: Capture, settings: ProjectSettings, name: str) -> None:
+        """The capture of the open project was read in another way, to which settings belong.
+
+        Args:
+            name: Of the step.
+        Raises:
+            ProjectError: Settings cannot change now; everything is as it was.
+        """
+        assert self.opened is not None
+        before, self.opened = self.opened, replace(self.opened, capture=capture)
+        try:
+            self._document.change(replace(before.project.document, settings=settings), name)
+        except EngineError:
+            self.opened = before
+            capture.close()
+            raise
+        before.capture.close()
+
+    def _grow(self, settings: ProjectSettings) -> None:
+        """All parts take up the frames that were recorded since."""
+        opened = self.opened
+        assert opened is not None
+        if settings.frames is None or settings.frames == opened.capture.frames:
+            return
+        capture = opened.capture.grown(settings.frames[1] - settings.frames[0])
+        self.opened = opened_project(capture, opened.project, opened.generation)
+        self._parts.grow(self.opened)
+        opened.capture.close()
 
     def _reopen(self) -> None:
         assert self.opened is not None
@@ -213,7 +247,11 @@ class Projects(SessionPart):
             status = self._live.status(None)
             name = project_name(found.project.folder.absolute(), found.project.settings.capture)
             n_waiting = len(status.queue)
-            self._asked.put(LeaveQuestion(name, status.clip_index or 0, status.step, status.n_steps, n_waiting))
+            self._asked.put(
+                LeaveQuestion(
+                    name, status.clip_index or 0, status.step, status.n_steps, n_waiting, status.n_running - 1
+                )
+            )
         else:
             self._enter(found)
 

@@ -114,6 +114,9 @@ class Showing(SessionPart):
     def poll(self) -> bool:
         """Take in prepared pictures, and prepare the next ones."""
         self._release_snapshot()
+        if not self.timeline.is_playing:  # clips that fly by need no live states
+            clip = self.timeline.clip
+            self._live.look_at(None if clip is None else clip.clip_index, is_following=self.timeline.is_following)
         is_training = self._is_training()
         is_attended = self._attention.follow((self.view.look_key, self.timeline.frame_index))
         if self._is_preloading:

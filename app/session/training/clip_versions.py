@@ -124,10 +124,10 @@ class Versions(SessionPart):
         service, opened = self._service(), self._opened
         if service is None or opened is None:
             return
-        runs, project = service.runs, opened.project
+        training, project = service.in_training, opened.project
         project.check_writable()
-        if clip_index in runs or (runs and clip_index == project.settings.reference_clip):
-            running = clip_index if clip_index in runs else service.running_clip
+        if clip_index in training or (training and clip_index == project.settings.reference_clip):
+            running = clip_index if clip_index in training else min(training)
             raise ProjectError(
                 f"Clip {running} is training and would not match the restored version.",
                 hint="Let training end, or stop it; progress is kept.",

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
 from app.background.jobs import JobContext, Jobs
 from app.background.latest import nothing
@@ -20,6 +21,8 @@ from app.project.project import Project
 from app.session.notices import Notices
 from app.session.part import SessionPart
 from app.session.questions import RetrainQuestion, retrain_question
+from app.session.training.others import Others
+from app.session.training.places import TrainingPlaces
 from app.session.training.training_notices import tell, tell_dropped
 from app.status import ClipStatus, PlanStatus, QueueStatus, TrainingStatus
 from app.training.clip_run import ShownState
@@ -59,9 +62,10 @@ class LiveTraining(SessionPart):
     ) -> None:
         self.service: TrainingService | None = None
         self._opened: OpenedProject | None = None
-        self._jobs, self._notices, self._launch, self._can_measure = jobs, notices, launch, can_measure
+        self._jobs, self._notices, self._can_measure = jobs, notices, can_measure
         self._forecasts, self._curves = Forecasts(), CurveReader()
         self._live_view, self._settle = live_view, settle
+        self._places, self._others = TrainingPlaces(launch), Others(jobs, notices)
         self._statuses: ClipStatuses | None = None
         self._unread: dict[int, SnapshotWritten] = {}
         self._live_counts: tuple[int, int, int] | None = None
@@ -95,13 +99,13 @@ class LiveTraining(SessionPart):
             curves=self._curves,
         )
         self.service.claims.watch()
-        self.service.live_view = self._live_view
+        self.service.looked_at.mode, self.service.n_workers = self._live_view, self._places.n_workers
         self._statuses = ClipStatuses(self.service)
         self._catalog = None
 
     def _launch_settled(self, job: TrainJob, project: Project) -> Worker:
         self._settle()  # a region marked a moment ago is meant to count
-        return self._launch(job, project)
+        return self._places.launch(job, project)
 
     def take_catalog(self, catalog: ClipCatalog | None) -> None:
         """The clips on disk of the project that is opened next; read then when None."""
@@ -110,6 +114,13 @@ class LiveTraining(SessionPart):
     def reopen(self, opened: OpenedProject) -> None:
         """The same project is open, with other settings."""
         self.open(opened)
+
+    def grow(self, opened: OpenedProject) -> None:
+        """Its capture has grown: what trains and waits goes on."""
+        assert self.service is not None
+        self._opened = opened
+        self.service.extend(opened.clips)
+        self._statuses = ClipStatuses(self.service)
 
     def _retire(self, service: TrainingService, opened: OpenedProject) -> None:
         self._forecasts.forget()
@@ -142,6 +153,16 @@ class LiveTraining(SessionPart):
     def is_busy(self) -> bool:
         """Whether a clip of the open project trains."""
         return self.service is not None and self.service.is_busy
+
+    @property
+    def is_busy_anywhere(self) -> bool:
+        """Whether a clip of the open project trains, here or elsewhere."""
+        return self.is_busy or (self.service is not None and bool(self.service.elsewhere))
+
+    @property
+    def is_computing(self) -> bool:
+        """Whether a clip of the open project trains here and is not paused."""
+        return self.service is not None and any(not run.is_paused for run in self.service.runs.values())
 
     def check_not_training(self) -> None:
         """Check that nothing trains or waits to be trained, so that clips may be cut otherwise.
@@ -229,21 +250,48 @@ class LiveTraining(SessionPart):
         """Tell the user that no capture is open."""
         self._notices.add("warn", "Nothing to train yet", "No capture is open.", "Open a capture folder.")
 
-    def pause(self) -> None:
-        """Hold the running training where it is."""
-        if self.service is not None:
-            self.service.pause()
+    def pause(self, clip_index: int | None = None) -> None:
+        """Hold a clip where it is; all that train here when None."""
+        if self.service is not None and not self._others.ask(self.service, clip_index, "pause"):
+            self.service.pause(clip_index)
 
-    def resume(self) -> None:
-        """Resume after a pause, or continue with a queue that was held."""
-        if self.service is not None:
-            self.service.resume()
-            self.service.go_on()
+    def resume(self, clip_index: int | None = None) -> None:
+        """Resume a clip after a pause; when None all of them, or continue with a queue that was held."""
+        if self.service is not None and not self._others.ask(self.service, clip_index, "resume"):
+            self.service.resume(clip_index)
+            if clip_index is None:
+                self.service.go_on()
 
-    def stop(self) -> None:
-        """End the running training, keep progress and empty the queue."""
+    def stop(self, clip_index: int | None = None) -> None:
+        """End the training of a clip, keeping progress; when None of all, which also empties the queue."""
+        if self.service is not None and not self._others.ask(self.service, clip_index, "stop"):
+            self.service.stop(clip_index)
+
+    def set_workers(self, n: int) -> None:
+        """Let so many clips train side by side on this computer, if it can."""
+        self._places.want(n)
+        self._follow_places()
+
+    def use(self, launch: Launch | None, n_workers: int = 1) -> None:
+        """Start workers elsewhere from now on, at most so many at a time; here again when None."""
+        self._places.use(launch, n_workers)
+        self._follow_places()
+
+    def _follow_places(self) -> None:
+        if self.service is None:
+            return
+        newest = self._forecasts.newest
+        is_known = newest is not None and newest[0].project is self.service.project
+        self._places.decide(self.service, newest[1].kinds if newest is not None and is_known else {})
+        if self.service.n_workers != self._places.n_workers:
+            self.service.set_workers(self._places.n_workers)
+
+    def look_at(self, clip_index: int | None, *, is_following: bool) -> None:
+        """The clip at the playhead is looked at, and where the playhead follows the training, the one that leads it."""
         if self.service is not None:
-            self.service.stop()
+            leading = self.service.running_clip if is_following else None
+            looked_at = {index for index in (clip_index, leading) if index is not None}
+            self.service.looked_at.look_at(looked_at, self.service.runs.values())
 
     # ---------------------------------------------------------------- events of the workers
 
@@ -261,6 +309,9 @@ class LiveTraining(SessionPart):
                     self._live_counts = None
                 if self.state_of(clip_index) is not None:
                     self._ended_clip = clip_index
+        if self.service is not None:
+            self._others.hear(self.service)
+            self._follow_places()
         if events and self.service is not None:
             tell_dropped(self.service.take_dropped(), self._notices)
         return bool(events)
@@ -320,9 +371,11 @@ class LiveTraining(SessionPart):
         """The training as a whole.
 
         Args:
-            viewed_clip: Whose curves to show while nothing trains.
+            viewed_clip: The clip at the playhead.
         """
-        return TrainingStatus() if self.service is None else training_status(self.service, viewed_clip)
+        if self.service is None:
+            return TrainingStatus()
+        return replace(training_status(self.service, viewed_clip), why_fewer=self._places.why_fewer)
 
     def clip_states(self) -> list[ClipStatus]:
         """One status per clip."""
@@ -348,9 +401,11 @@ class LiveTraining(SessionPart):
 
     @property
     def finished(self) -> tuple[object, ...]:
-        """Identities of the newest plans and curves. Another value means that there is something new to see."""
+        """Identities of the newest plans and curves, and what is known of trainings elsewhere. Another value means that
+        there is something new to see."""
         newest = (self._forecasts.newest, self._curves.worker.newest)
-        return tuple(None if found is None else found[0] for found in newest)
+        revision = None if self.service is None else self.service.catalog.revision
+        return (*(None if found is None else found[0] for found in newest), self._others.heard, revision)
 
     def close(self) -> None:
         """End the worker, keeping progress, and the threads. Blocks for a few seconds at most."""

@@ -68,17 +68,30 @@ class StopAfterClip:
 
 @dataclass(frozen=True, slots=True)
 class PauseTraining:
-    """Hold the running training where it is."""
+    """Hold what trains where it is: one clip, or all of them when None."""
+
+    clip_index: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ResumeTraining:
-    """Resume after a pause, or continue with a queue that waits."""
+    """Resume a clip after a pause; when None all of them, or continue with a queue that waits."""
+
+    clip_index: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class StopTraining:
-    """End the running training, keep progress and empty the queue."""
+    """End the training of a clip, keeping progress; when None of all that train here, which also empties the queue."""
+
+    clip_index: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SetWorkers:
+    """Train this many clips side by side, as far as the computer allows it; those that train continue."""
+
+    n: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,11 +117,26 @@ class RemoveVersion:
     version: int
 
 
+@dataclass(frozen=True, slots=True)
+class JoinCluster:
+    """Train clips of the open project on a cluster from now on. address: As of `train --cluster`."""
+
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveCluster:
+    """Train clips on this computer again."""
+
+
 VersionCommand = RestoreVersion | RemoveVersion
 """Commands on versions of a clip."""
 
-HoldCommand = PauseTraining | ResumeTraining | StopTraining
-"""Commands on the clip that trains."""
+HoldCommand = PauseTraining | ResumeTraining | StopTraining | SetWorkers
+"""Commands on the clips that train."""
+
+ClusterCommand = JoinCluster | LeaveCluster
+"""Commands on the cluster that clips train on."""
 
 TrainCommand = (
     TrainNextClip

@@ -14,23 +14,24 @@ MAX_LISTED = 12
 
 def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
     """Add a notice if the user should know of this; most events show in the status alone."""
+    of_clip = "" if clip_index is None else f"Clip {clip_index}: "
     match event:
         case ClipTrained(held_out_psnr=psnr):
             figure = "" if psnr is None else f"{psnr_words(psnr, is_whole=False).capitalize()}."
             notices.add("info", "A clip is trained" if clip_index is None else f"Clip {clip_index} is trained", figure)
         case TrainingStopped(is_kept=is_kept, step=step):
             detail = f"Progress of {step} steps is kept." if is_kept else "No progress yet."
-            notices.add("info", "Training stopped", detail)
+            notices.add("info", "Training stopped", of_clip + detail)
         case WarningRaised(title=title, detail=detail, hint=hint):
             notices.add("warn", title, detail, hint)
         case TrainingFailed(message=message, hint=hint):
-            notices.add("error", "Training failed", message, hint)
+            notices.add("error", "Training failed", of_clip + message, hint)
         case WorkerDied(reason=reason, log_tail=log_tail):
             last = log_tail.splitlines()[-1] if log_tail else "Its log is empty."
             notices.add(
                 "error",
                 "The training process ended unexpectedly",
-                f"{reason}. {last}",
+                f"{of_clip}{reason}. {last}",
                 "Train the clip again; it resumes from its saved progress.",
             )
         case _:

@@ -20,6 +20,7 @@ from app.session.training.train_commands import (
     RestoreVersion,
     ResumeTraining,
     SetLiveView,
+    SetWorkers,
     StopAfterClip,
     StopTraining,
     TrainAll,
@@ -54,12 +55,14 @@ class TrainingVerbs:
         match command:
             case TrainNextClip():
                 live.train_next()
-            case PauseTraining():
-                live.pause()
-            case ResumeTraining():
-                live.resume()
-            case StopTraining():
-                live.stop()
+            case PauseTraining(clip_index=clip_index):
+                live.pause(clip_index)
+            case ResumeTraining(clip_index=clip_index):
+                live.resume(clip_index)
+            case StopTraining(clip_index=clip_index):
+                live.stop(clip_index)
+            case SetWorkers(n=n):
+                live.set_workers(n)
             case TrainClip(clip_index=clip_index, is_confirmed=is_confirmed, settings=settings):
                 question = live.train(clip_index, is_confirmed=is_confirmed, own=dict(settings))
                 return None if question is None else replace(question, settings=settings)

@@ -53,8 +53,13 @@ class FolderStore:
     def capture(self, *, scale: float, frames: tuple[int, int] | None) -> Capture:
         """See `ClipStore`."""
         settings = self._project.settings
-        place = Path(settings.capture) if self._capture is None else self._capture
-        return open_capture(place, scale=scale, frames=frames, follow_links=settings.follow_links)
+        return open_capture(
+            Path(settings.capture) if self._capture is None else self._capture,
+            scale=scale,
+            frames=frames,
+            follow_links=settings.follow_links,
+            is_growing=settings.is_growing,
+        )
 
     def clip(self, key: str) -> ClipState:
         """See `ClipStore`."""

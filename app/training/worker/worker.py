@@ -24,6 +24,7 @@ from engine.children.priority import lower_process
 from engine.errors import DiskError
 from engine.kernels.cache import use_kernel_cache
 from engine.parallel import n_cores, share_cores
+from engine.portable import cpu_kind
 from engine.storage.files import disk_error, open_to_append
 
 logger = logging.getLogger(__name__)
@@ -44,7 +45,9 @@ def main(task: TrainTask, parent: Parent[Event]) -> None:
     use_kernel_cache()  # before the training imports kernels
     n_threads = _set_threads(job)
     choose_backend(job.backend)
-    logger.info("worker %d trains clip %d with %d threads", os.getpid(), job.clip_index, n_threads)
+    logger.info(
+        "worker %d trains clip %d with %d threads; %s", os.getpid(), job.clip_index, n_threads, cpu_kind(job.cpu)
+    )
 
     def send(event: Event) -> None:
         with suppress(Unwanted):  # the window is gone; `receive` notices that too and ends the run
@@ -105,6 +108,7 @@ def _flush_output() -> None:
 def _set_threads(job: TrainJob) -> int:
     if job.is_window_open:  # before any thread is started, since threads take over the priority
         lower_process()
-    n_threads = n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside)
+    share = n_training_threads(n_cores(), is_window_open=job.is_window_open, n_beside=job.n_beside)
+    n_threads = job.n_threads or share
     share_cores(n_threads)  # preparation, too, and its own children
     return use_threads(n_threads)

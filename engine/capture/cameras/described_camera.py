@@ -11,6 +11,7 @@ import numpy as np
 from engine.camera.lens import PINHOLE, Lens
 from engine.capture.files.media import read_image_header, read_video_header
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames, is_turned_as_calibrated
+from engine.capture.growing.numbered_files import NumberedFiles
 from engine.errors import CaptureError
 
 
@@ -70,13 +71,15 @@ class SeenFiles:
     is_lying: bool = False
 
 
-def seen_files(camera: DescribedCamera) -> SeenFiles:
+def seen_files(camera: DescribedCamera, *, is_growing: bool = False) -> SeenFiles:
     """The frames that the capture shows, which then count as evenly recorded. Reads headers.
 
+    Args:
+        is_growing: The capture is still being recorded; see engine.capture.growing.
     Raises:
         CaptureError: Files cannot be read, there are none, they differ in size, or chosen frames do not exist.
     """
-    files = _look_at(camera)
+    files = _look_at(camera, is_growing=is_growing)
     if camera.frame_indices is None:
         return files
     n_frames = files.source.n_frames
@@ -86,14 +89,18 @@ def seen_files(camera: DescribedCamera) -> SeenFiles:
     return replace(files, source=IndexedFrames(files.source, camera.frame_indices), rate=0.0, is_even=True)
 
 
-def _look_at(camera: DescribedCamera) -> SeenFiles:
+def _look_at(camera: DescribedCamera, *, is_growing: bool) -> SeenFiles:
     """Headers of a video, or of the first, middle and last image: others are looked at when they are decoded."""
     if isinstance(camera.files, Path):
-        header = read_video_header(camera.files)
+        header = read_video_header(camera.files, is_growing=is_growing)
         is_turned = camera.calibrated_size is None or is_turned_as_calibrated(header, camera.calibrated_size)
         size = header.size if is_turned else header.stored_size
-        source = VideoFrames(camera.files, header.n_frames, is_turned=is_turned)
+        source = VideoFrames(camera.files, header.n_frames, is_turned=is_turned, is_growing=is_growing)
         return SeenFiles(source, size, header.rate, [camera.files], [header.n_bytes], header.is_even, not is_turned)
+    if isinstance(camera.files, NumberedFiles):
+        header = read_image_header(camera.files.seen)  # others may be missing or half-written
+        source = ImageFrames(camera.files.seen.parent, camera.files)
+        return SeenFiles(source, header.size, 0.0, [camera.files.seen], [header.n_bytes])
     paths = list(camera.files)
     if not paths:
         raise CaptureError("There are no frames.", hint="Add its frames or take the camera out.", path=camera.said_in)

@@ -11,7 +11,7 @@ import struct
 import warnings
 import zlib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -167,9 +167,11 @@ class VideoHeader:
         return self.turn.size(self.stored_size)
 
 
-def read_video_header(path: Path) -> VideoHeader:
+def read_video_header(path: Path, *, is_growing: bool = False) -> VideoHeader:
     """Number of frames, size and rate of a video from its container.
 
+    Args:
+        is_growing: It may still be written: as many frames as there are count, and its end may be cut off.
     Raises:
         CaptureError: The file is missing, not a video, or ends before the frames that its index lists.
     """
@@ -189,6 +191,9 @@ def read_video_header(path: Path) -> VideoHeader:
             size = (stream.codec_context.width, stream.codec_context.height)
             rate = float(stream.average_rate or 0)
             turn = _read_turn(path, container.format.name)
+            if is_growing:
+                pts, _ = times_so_far(container, stream)
+                return VideoHeader(len(pts), size, rate, n_bytes, turn)
             entries = [entry for entry in stream.index_entries if not entry.is_discard]
             if len(entries) != stream.frames or not entries:  # the index lists key frames only, or frames not shown
                 pts = [pts for packet in container.demux(stream) if (pts := shown_pts(packet)) is not None]
@@ -216,6 +221,24 @@ def read_video_header(path: Path) -> VideoHeader:
             path=path,
         )
     return VideoHeader(len(entries), size, rate, n_bytes, turn, is_even)
+
+
+def times_so_far(container: Any, stream: Any) -> tuple[list[int], int]:
+    """What has been written of a video that grows.
+
+    Returns:
+        When its frames are shown, in any order; and how many of them are complete for sure: those shown before the last
+        key frame, behind which nothing refers to them.
+    """
+    times: list[int] = []
+    last_key: int | None = None
+    with suppress(*VIDEO_FAULTS):  # its end is being written
+        for packet in container.demux(stream):
+            pts = shown_pts(packet)
+            if pts is not None:
+                times.append(pts)
+                last_key = pts if packet.is_keyframe else last_key
+    return times, 0 if last_key is None else sum(pts < last_key for pts in times)
 
 
 def _is_even(times: Sequence[int]) -> bool:

@@ -14,10 +14,15 @@ from typing import Any
 
 import numpy as np
 
+from engine.capture.cameras.described_camera import DescribedCamera
 from engine.capture.files.duplicates import CameraFiles, check_duplicates
+from engine.capture.files.frame_files import natural_key
 from engine.capture.files.media import ImageHeader, read_image_header
 from engine.capture.files.places import place_in
 from engine.capture.frames import ImageFrames
+from engine.capture.growing.mode import is_growing
+from engine.capture.growing.numbered_files import NumberedFiles
+from engine.capture.growing.reading import as_long_as_the_longest, numbered
 from engine.capture.layout.format_checks import (
     check_equal_counts,
     check_image_header,
@@ -92,6 +97,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     entries, warnings = _read_frames(folder, cameras, problems, follow_links=follow_links)
     raise_problems(problems, folder)
     return Layout(
+        is_growing=is_growing(),
         format=FORMAT,
         cameras=tuple(entries),
         n_frames=entries[0].source.n_frames,
@@ -191,8 +197,10 @@ def _read_frames(
     folder: Path, cameras: list[_MetaCamera], problems: list[CaptureError], *, follow_links: bool
 ) -> tuple[list[CameraEntry], list[str]]:
     """Match the meta files against what lies in ims/. Adds problems; returns entries and warnings."""
-    n_listed = max((len(camera.files) for camera in cameras), default=0)
     present = _present_files(folder, cameras, problems, follow_links=follow_links)
+    if is_growing():
+        return _growing_frames(folder, cameras, present, problems), []
+    n_listed = max((len(camera.files) for camera in cameras), default=0)
     found = [[name in present for name in camera.files] for camera in cameras]
     n_common = min((_leading(row) for row in found), default=0)
     is_cut_alike = n_common > 0 and all(sum(row) == n_common for row in found)
@@ -230,6 +238,29 @@ def _read_frames(
             "rotated, without that entry."
         )
     return entries, warnings
+
+
+def _growing_frames(
+    folder: Path, cameras: list[_MetaCamera], present: set[str], problems: list[CaptureError]
+) -> list[CameraEntry]:
+    """Entries of a capture that is still being recorded: the meta files need not list its frames yet."""
+    described = []
+    for camera in cameras:
+        directory, suffix = camera.files[0].rpartition("/")[0], Path(camera.files[0]).suffix
+        own = [name for name in present if name.rpartition("/")[0] == directory and name.endswith(suffix)]
+        files = [folder / "ims" / name for name in sorted(own, key=natural_key)]
+        described.append(
+            DescribedCamera(str(camera.camera_id), camera.K, camera.world_to_camera, files, camera.meta_path)
+        )
+    described, found = numbered(described, folder)
+    problems += found
+    entries = []
+    for camera, one in zip(cameras, described, strict=True):
+        if isinstance(one.files, NumberedFiles):
+            _read_headers(camera, [one.files.seen], problems)
+            source = ImageFrames(one.files.seen.parent, one.files)
+            entries.append(CameraEntry(one.name, one.K, one.world_to_camera, camera.image_size, source))
+    return as_long_as_the_longest(entries)
 
 
 def _present_files(

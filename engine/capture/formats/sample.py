@@ -15,6 +15,8 @@ from engine.capture.files.duplicates import CameraFiles, check_duplicates
 from engine.capture.files.media import VideoHeader, read_video_header
 from engine.capture.files.places import place_in
 from engine.capture.frames import VideoFrames, is_turned_as_calibrated
+from engine.capture.growing.mode import is_growing
+from engine.capture.growing.reading import as_long_as_the_longest
 from engine.capture.layout.format_checks import (
     check_equal_counts,
     check_fps,
@@ -54,11 +56,13 @@ class _Reading:
 
     Attributes:
         headers: Of the videos that could be opened, by camera.
+        is_growing: Whether the capture is still being recorded.
         looks: Places and headers of all videos, by the name of their file, as they are looked at by a few threads.
     """
 
     folder: Path
     follow_links: bool
+    is_growing: bool
     problems: list[CaptureError] = field(default_factory=list)
     headers: dict[str, VideoHeader] = field(default_factory=dict)
     looks: dict[str, Future[tuple[Path, VideoHeader]]] = field(default_factory=dict)
@@ -93,7 +97,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     if not isinstance(rows, list):
         raise CaptureError('The file has no list "cameras".', hint="Export the capture again.", path=path)
 
-    reading = _Reading(folder, follow_links)
+    reading = _Reading(folder, follow_links, is_growing())
     problems = reading.problems
     with ThreadPoolExecutor(THREADS) as pool:
         for row in rows:
@@ -115,6 +119,8 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         )
     holdout = _read_holdout(document, {camera.name for camera in cameras}, path, problems)
     raise_problems(problems, folder)
+    if reading.is_growing:
+        cameras = as_long_as_the_longest(cameras)
     return Layout(
         format=FORMAT,
         cameras=tuple(cameras),
@@ -122,6 +128,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         fps=float(document["fps"]),
         default_holdout=holdout,
         warnings=tuple(_warnings(document, reading.headers, {camera.name: camera.image_size for camera in cameras})),
+        is_growing=reading.is_growing,
     )
 
 
@@ -130,7 +137,7 @@ def _warnings(
 ) -> list[str]:
     """Odd but usable: a length that is not stated, turned videos, rates of videos that are missing or others."""
     fps, warnings = document["fps"], []
-    if document.get("n_frames") is None:
+    if document.get("n_frames") is None and not is_growing():
         n_frames = next(iter(headers.values())).n_frames
         warnings.append(
             f"{CAMERAS_FILE} does not state n_frames; the {n_frames} frames of the videos are taken. Add it, so that "
@@ -161,7 +168,7 @@ def _warnings(
 def _look_at_video(reading: _Reading, name: str) -> tuple[Path, VideoHeader]:
     named_in = reading.folder / CAMERAS_FILE
     place = place_in(reading.folder, name, follow_links=reading.follow_links, named_in=named_in)
-    return place, read_video_header(place)
+    return place, read_video_header(place, is_growing=reading.is_growing)
 
 
 def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
@@ -200,14 +207,16 @@ def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
     if K is None or world_to_camera is None or header is None:
         return None
     reading.headers[name] = header
-    return CameraEntry(name, K, world_to_camera, size, VideoFrames(place, header.n_frames, is_turned=is_turned))
+    source = VideoFrames(place, header.n_frames, is_turned=is_turned, is_growing=reading.is_growing)
+    return CameraEntry(name, K, world_to_camera, size, source)
 
 
 def _check_counts(cameras: list[CameraEntry], n_listed: Any, path: Path) -> list[CaptureError]:
     counts = {camera.name: camera.source.n_frames for camera in cameras}
     problems = check_equal_counts(counts, {camera.name: camera.source.path for camera in cameras})
     n_frames = next(iter(counts.values()), None)
-    if not problems and counts and n_listed is not None and (not is_whole(n_listed) or n_listed != n_frames):
+    is_stated = n_listed is not None and not is_growing()
+    if not problems and counts and is_stated and (not is_whole(n_listed) or n_listed != n_frames):
         text = f"n_frames is {shown(n_listed)}, every video has {n_frames} frames."
         problems.append(CaptureError(text, hint="Correct the number or export the videos again.", path=path))
     return problems

@@ -66,6 +66,8 @@ def read_layout(folder: Path, *, follow_links: bool) -> Layout:
     for reader, probe in probes:
         if probe.is_match:
             layout = reader.read(folder, follow_links=follow_links)
+            if layout.is_growing:
+                return layout  # masks are made of what is complete
             return with_masks(layout, folder, follow_links=follow_links)
     raise _not_a_capture(folder, [probe for _, probe in probes])
 

@@ -16,6 +16,8 @@ import numpy as np
 from engine.capture.cameras.described_camera import DescribedCamera, SeenFiles, mask_source, seen_files
 from engine.capture.files.duplicates import CameraFiles, check_duplicates
 from engine.capture.frames import IndexedFrames
+from engine.capture.growing.mode import is_growing
+from engine.capture.growing.reading import as_long_as_the_longest, check_can_grow, numbered
 from engine.capture.layout.format_checks import (
     check_K,
     check_names,
@@ -79,16 +81,20 @@ def assemble(
     said_in = said_in or (cameras[0].said_in if cameras else folder)
     if cameras or not found:
         found += check_names([camera.name for camera in cameras], said_in)
+    may_grow = is_growing()
+    if may_grow:
+        cameras, problems = numbered(cameras, folder)
+        found += [*problems, *check_can_grow(cameras, folder)]
     looks: list[Future[SeenFiles]] = []
     looked: dict[tuple[Path, tuple[int, int] | None], Future[SeenFiles]] = {}  # a file of many cameras only once
     with ThreadPoolExecutor(THREADS) as pool:
         for camera in cameras:
             key = (camera.files, camera.calibrated_size) if isinstance(camera.files, Path) else None
             if key is None or camera.frame_indices is not None:
-                looks.append(pool.submit(seen_files, camera))
+                looks.append(pool.submit(seen_files, camera, is_growing=may_grow))
                 continue
             if key not in looked:
-                looked[key] = pool.submit(seen_files, camera)
+                looked[key] = pool.submit(seen_files, camera, is_growing=may_grow)
             looks.append(looked[key])
     entries: list[CameraEntry] = []
     files: dict[str, SeenFiles] = {}
@@ -132,6 +138,8 @@ def assemble(
         text = f"Held out is {shortened(unknown)}, which the capture does not have."
         found.append(CaptureError(text, hint="Use its camera names.", path=said_in))
     raise_problems(found, folder)
+    if may_grow:
+        entries = as_long_as_the_longest(entries)
     if scaled:
         said.append(f"Frames have another size than their calibration, which is scaled to them: {shortened(scaled)}.")
     if misfits and fit is None:
@@ -152,7 +160,9 @@ def assemble(
         )
     offsets = [camera.offset_frames for camera in cameras]
     frame_times_s: Sequence[np.ndarray | None] | None = [camera.frame_times_s for camera in cameras]
-    if all(times_s is None for times_s in frame_times_s):
+    if may_grow:  # one by one: how even they are can only be told at the end
+        frame_times_s = None
+    elif all(times_s is None for times_s in frame_times_s):
         frame_times_s = own_times([entry.source for entry in entries], _evenness(files), fps or DEFAULT_FPS)
     if frame_times_s is not None:
         entries, n_frames, rate, note = at_common_moments(entries, frame_times_s, fps, offsets)
@@ -171,6 +181,7 @@ def assemble(
         points_to_world=points_to_world,
         fisheye_fov_deg=fisheye_fov_deg,
         fit=fit,
+        is_growing=may_grow,
     )
 
 

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from engine.capture.files.media import ImageHeader
+from engine.capture.growing.mode import is_growing
 from engine.capture.layout.limits import (
     FOCAL_RANGE,
     FPS_RANGE,
@@ -239,7 +240,8 @@ def check_image_header(name: str, header: ImageHeader, calibrated: tuple[int, in
 
 
 def check_equal_counts(counts: Mapping[str, int], paths: Mapping[str, Path]) -> list[CaptureError]:
-    """Cameras whose number of frames differs from that of most cameras; zero frames are named as such."""
+    """Cameras whose number of frames differs from that of most cameras; zero frames are named as such. While a capture
+    grows they differ."""
     problems = [
         CaptureError(f'Camera "{name}" has no frames.', hint="Add its frames or take the camera out.", path=paths[name])
         for name, count in counts.items()
@@ -247,7 +249,7 @@ def check_equal_counts(counts: Mapping[str, int], paths: Mapping[str, Path]) -> 
     ]
     filled = {name: count for name, count in counts.items() if count > 0}
     usual = Counter(filled.values()).most_common()
-    if len(usual) < 2:
+    if len(usual) < 2 or is_growing():
         return problems
     expected = max(count for count, votes in usual if votes == usual[0][1])  # a tie goes to the longer one
     n_others = sum(count == expected for count in filled.values())
@@ -255,7 +257,7 @@ def check_equal_counts(counts: Mapping[str, int], paths: Mapping[str, Path]) -> 
         CaptureError(
             f'Camera "{name}" has {count} frames, {n_others} other {"camera has" if n_others == 1 else "cameras have"} '
             f"{expected}.",
-            hint="Export all cameras over the same frames.",
+            hint="Export all cameras over the same frames. While it is still being recorded, use clipgstream follow.",
             path=paths[name],
         )
         for name, count in filled.items()

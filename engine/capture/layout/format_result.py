@@ -81,6 +81,7 @@ class Layout:
         points_to_world: Brings its points into the world of the cameras; None where they are in it. [4, 4]
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to; None takes the usual one.
         fit: The user's fit for frames of another shape than their calibration; None where that is not known.
+        is_growing: It may still be recorded: `n_frames` are those of the farthest camera, and others may lack some.
     """
 
     format: str
@@ -93,6 +94,7 @@ class Layout:
     points_to_world: np.ndarray | None = None
     fisheye_fov_deg: float | None = None
     fit: FrameFit | None = None
+    is_growing: bool = False
 
     @property
     def misfit_px(self) -> float:

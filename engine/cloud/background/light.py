@@ -105,6 +105,11 @@ def joined(beside: np.ndarray, own: np.ndarray) -> np.ndarray:
     return np.where(_differs(beside - own), own, (beside + own) / 2)
 
 
+def taken_over(before: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """`joined` where the clip before could not look ahead, so that it ends in its own light."""
+    return np.where(_differs(before - own), own, before)
+
+
 def met_by_plain(own: np.ndarray) -> np.ndarray:
     """`joined` where the clip on the other side cannot move half way, since its light is always 0."""
     return np.where(_differs(own), own, np.float32(0.0))

@@ -283,7 +283,16 @@ class ClipPreparation:
         if not self._method.has_light:
             return parts
         plain = range(reference.header.start, reference.header.start + reference.header.n_frames)
-        measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report, plain=plain)
+        measure_light(
+            model,
+            pictures,
+            self._cameras.rig,
+            backgrounds,
+            exposures,
+            self._report,
+            plain=plain,
+            is_looking_ahead=self._config.backgrounds == "capture",
+        )
         return parts
 
     def keep_backgrounds(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> None:

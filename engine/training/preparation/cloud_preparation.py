@@ -456,9 +456,9 @@ def key_of_corrected(capture: Capture, clip: Clip, camera_indices: Sequence[int]
         clip: The clip they were estimated for.
     """
     rig = capture.rig.subset(list(camera_indices))
-    excluded = exclusion_key(capture.exclusions, (0, capture.n_frames))
+    excluded = exclusion_key(capture.exclusions, _background_range(capture, clip, config))
     return came_along(capture.layout) | {
-        "capture": capture.part_key,
+        "capture": capture.start_key if config.backgrounds == "clip" else capture.part_key,
         "cameras": list(rig.names),
         "size": [int(side) for side in rig.image_sizes[0]],
         "frames": config.background_frames,

@@ -10,7 +10,7 @@ import torch
 from engine.camera.rig import CameraRig
 from engine.clip_files.roles import STATIC
 from engine.cloud.background.exposure import Exposure
-from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined, met_by_plain, steady
+from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined, met_by_plain, steady, taken_over
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.model.host_array import host_array
@@ -32,6 +32,7 @@ def measure_light(
     report: ReportProgress,
     *,
     plain: range,
+    is_looking_ahead: bool = True,
 ) -> None:
     """Give a model that inherits static anchors the light on them at the start and the end of its clip.
 
@@ -43,6 +44,8 @@ def measure_light(
         exposures: That of each background; None where no camera's exposure is looked at.
         report: Gets one line.
         plain: Frames of the reference clip, which is drawn in no light but its own.
+        is_looking_ahead: Whether frames behind the clip may be looked at. If not, it begins in the light in which the
+            clip before ends, instead of both meeting half way.
     """
     if STATIC not in model.roles():
         return
@@ -64,7 +67,10 @@ def measure_light(
     def joined_at(border: int, beside: range, own: np.ndarray) -> np.ndarray:
         if border in (plain.start, plain.stop):
             return met_by_plain(own)
-        return joined(light_in(beside.start, beside.stop), own) if 0 < border < n_frames else own
+        if not 0 < border < n_frames or (border == clip.stop and not is_looking_ahead):
+            return own
+        other = light_in(beside.start, beside.stop)
+        return joined(other, own) if is_looking_ahead else taken_over(other, own)
 
     start = joined_at(clip.start, range(clip.start - WINDOW_FRAMES, clip.start), first)
     stop = joined_at(clip.stop, range(clip.stop, clip.stop + WINDOW_FRAMES), last)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.plan.forecasts import clip_forecast, together
+from app.plan.forecasts import at_once, clip_forecast, together
 from app.project.clips.clip_catalog import ClipRecord
 from app.project.clips.clip_versions import version_path
 from app.project.project import Project
@@ -121,6 +121,17 @@ def test_a_stopped_clip_counts_with_what_is_left_of_it() -> None:
     parts = [SequenceForecast(1, 100, 45.0, 2.0), unknown, SequenceForecast(1, 50, 5.0, 1.0)]
     assert together(parts) == SequenceForecast(3, 250, None, 5.0)
     assert together([together([]), parts[0]]) == parts[0]
+
+
+def test_clips_side_by_side_take_as_long_as_their_speeds_say() -> None:
+    rest = SequenceForecast(4, 400, 400.0, 4.0)
+    going = [SequenceForecast(1, 50, 80.0, 1.0), SequenceForecast(1, 50, 70.0, 1.0)]
+    whole = at_once(going, [50.0, 50.0], rest)
+    assert whole == SequenceForecast(6, 500, 75.0 + 400.0 * 1.5 / 2, 6.0), "each takes half as long again as alone"
+    assert at_once(going, [None, None], rest).seconds == 550.0, "not known yet: as one after the other"
+    assert at_once(going[:1], [50.0], rest).seconds == 480.0
+    assert at_once(going, [50.0, 50.0], together([])).seconds == 80.0, "the last one ends it"
+    assert at_once([], [], rest) == rest
 
 
 def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> None:

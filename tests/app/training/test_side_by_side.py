@@ -20,6 +20,7 @@ from app.training.worker.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import DiskError, NonFiniteLoss
 from engine.parallel import CORES_VARIABLE, n_cores
+from engine.portable import PROCESSORS
 from tests.app.conftest import inline
 from tests.app.fakes import make_fake, make_slow, write_trained
 from tests.app.training.test_train_queue import run_out, six
@@ -191,3 +192,25 @@ def test_a_worker_computes_everything_with_its_share(six: OpenedProject, monkeyp
     assert worker._set_threads(job) == 2
     assert (os.environ[CORES_VARIABLE], os.environ["NUMBA_NUM_THREADS"]) == ("2", "2")
     assert n_cores() <= 2
+
+
+def test_a_training_with_portable_numbers_begins_with_the_variables_that_libraries_read(
+    six: OpenedProject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[dict[str, str]] = []
+    monkeypatch.setattr("app.training.process.environment_of", lambda cpu: {"OF": cpu})
+
+    class Begun(Exception):
+        pass
+
+    def begin(kind: object, task: object, environment: dict[str, str]) -> None:
+        begun.append(environment)
+        raise Begun
+
+    monkeypatch.setattr("app.training.process.ChildProcess", begin)
+    for clip_index, cpu in enumerate(PROCESSORS):
+        write_trained(six, 0)
+        service = TrainingService(six.project, six.clips, holdout=six.holdout, cpu=cpu)
+        with pytest.raises(Begun):
+            service.enqueue_all([clip_index + 1])
+    assert begun == [{"OF": "native"}, {"OF": "portable"}]

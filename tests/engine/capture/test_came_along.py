@@ -16,6 +16,7 @@ from app.lab.synthetic.writing import write_video
 from engine.capture.came_along import came_along
 from engine.capture.capture import open_capture
 from engine.capture.clip import Clip
+from engine.capture.exclusions import ExcludedFrames, Exclusions
 from engine.capture.layout.format_result import Layout
 from engine.training.config import TrainConfig
 from engine.training.preparation.cloud_preparation import key_of_corrected
@@ -82,3 +83,12 @@ def test_kept_backgrounds_of_a_clip_belong_to_it(folder: Path) -> None:
     of_clip, of_capture = TrainConfig(backgrounds="clip"), TrainConfig()
     assert key_of_corrected(capture, CLIP, [0, 1], of_clip) != key_of_corrected(capture, other, [0, 1], of_clip)
     assert key_of_corrected(capture, CLIP, [0, 1], of_capture) == key_of_corrected(capture, other, [0, 1], of_capture)
+
+
+def test_backgrounds_of_a_clip_outlive_the_growth_of_the_capture(folder: Path) -> None:
+    of_clip, excluded = TrainConfig(backgrounds="clip"), Exclusions(frames=(ExcludedFrames("cam00", 5, 6),))
+    short, whole = (open_capture(folder, frames=frames) for frames in ((0, 3), None))
+    later = whole.without(excluded)
+    keys = [key_of_corrected(one, CLIP, [0, 1], of_clip) for one in (short, whole, later)]
+    assert keys[0] == keys[1] == keys[2]
+    assert key_of_corrected(open_capture(folder, frames=(1, 7)), CLIP, [0, 1], of_clip) != keys[0]

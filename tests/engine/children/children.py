@@ -51,6 +51,10 @@ def _echo(job: Ask, parent: Parent[str]) -> str:
     return job.payload
 
 
+def _variable(job: Ask, parent: Parent[str]) -> str:
+    return os.environ.get(job.payload, "none")
+
+
 def _flood(job: Ask, parent: Parent[str]) -> str:
     for _ in range(20):
         parent.report(WIDE)
@@ -126,6 +130,7 @@ def _lie(job: Ask, parent: Parent[str]) -> str:
 
 BEHAVIOUR = {
     "echo": _echo,
+    "variable": _variable,
     "flood": _flood,
     "listen": _listen,
     "refuse": _refuse,

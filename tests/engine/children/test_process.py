@@ -51,6 +51,15 @@ def test_what_is_asked_comes_back_also_where_it_is_large() -> None:
     assert run_child(AT_ONCE, Ask("echo", payload=WIDE)) == WIDE
 
 
+def test_variables_are_added_to_its_environment_before_it_begins(monkeypatch) -> None:
+    monkeypatch.setenv("KEPT", "of the parent")
+    for name, expected in (("ADDED", "of the child"), ("KEPT", "of the parent")):
+        child = ChildProcess(AT_ONCE, Ask("variable", payload=name), environment={"ADDED": "of the child"})
+        wait_for(lambda child=child: child.is_over, "answer")
+        assert child.result() == expected
+    assert "ADDED" not in os.environ
+
+
 def test_what_a_child_repeats_is_reported_once() -> None:
     said: list[str] = []
     assert run_child(AT_ONCE, Ask("flood"), report=said.append) == WIDE

@@ -5,7 +5,7 @@ import pytest
 
 from engine.camera.projection import pixel_rays, to_world
 from engine.camera.rig import CameraRig
-from engine.cloud.background.light import LARGEST_LOG, NO_CHANGE, AnchorLight, joined, met_by_plain
+from engine.cloud.background.light import LARGEST_LOG, NO_CHANGE, AnchorLight, joined, met_by_plain, taken_over
 
 N_CAMERAS, WIDTH, HEIGHT = 10, 160, 120
 SHADOW, DARKER = 0.4, 0.85
@@ -132,6 +132,7 @@ def test_both_sides_of_a_border_are_joined_unless_the_light_was_switched():
     before, after = np.array([0.1, 0.1, 0.0], np.float32), np.array([0.11, 0.4, 0.0], np.float32)
     np.testing.assert_allclose(joined(after, before), [0.105, 0.1, 0.0], rtol=1e-6)
     np.testing.assert_allclose(joined(before, after), [0.105, 0.4, 0.0], rtol=1e-6)
+    np.testing.assert_array_equal(taken_over(before, after), [before[0], after[1], before[2]], "no step, no look ahead")
 
 
 def test_beside_the_reference_clip_light_begins_at_none_unless_it_was_switched():

@@ -24,9 +24,9 @@ from engine.model.clip_view import REACH_SPACINGS, reaches_of
 from engine.model.reading import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
-from engine.training.preparation.cloud_preparation import Backgrounds, key_of_corrected, write_backgrounds
 from engine.training.config import TrainConfig
 from engine.training.phases import phase_at
+from engine.training.preparation.cloud_preparation import Backgrounds, key_of_corrected, write_backgrounds
 from engine.training.preparation.method import Method
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states

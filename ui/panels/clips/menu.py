@@ -22,7 +22,7 @@ def draw_cutting(
         n_clips: How many there are.
     """
     project = session.project_status
-    is_free = (project is None or project.is_writable) and session.training.state in ("idle", "failed")
+    is_free = (project is None or project.is_writable) and not session.training.is_anywhere
     index = clip.clip_index
     can_split = clip.start < frame_index < clip.stop
     words = f"{Icon.COLUMNS}  Split at frame {frame_index}" if can_split else f"{Icon.COLUMNS}  Split"

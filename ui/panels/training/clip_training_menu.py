@@ -7,7 +7,10 @@ from imgui_bundle import imgui
 from app.session.session_view import SessionView
 from app.session.training.train_commands import (
     AskTrainSettings,
+    PauseTraining,
     RemoveFromQueue,
+    ResumeTraining,
+    StopTraining,
     TrainAll,
     TrainClip,
     TrainClips,
@@ -16,7 +19,7 @@ from app.session.training.train_commands import (
 from app.status import ClipStatus
 from engine.text import duration_text
 from ui.panels.pieces.copying import draw_copy_menu
-from ui.panels.state import Dispatch, UiState
+from ui.panels.state import LOG, Dispatch, UiState
 from ui.panels.training.clip_versions import draw_versions_menu
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
@@ -37,7 +40,8 @@ def train_label(status: ClipStatus) -> str:
 def draw_clip_training(
     session: SessionView, dispatch: Dispatch, ui: UiState, clip_index: int, *, is_by_key: bool = False
 ) -> None:
-    """Entries: train or retry, from here, all, with other settings, out of the queue, earlier versions.
+    """Entries: train or retry, or pause and stop, from here, all, with other settings, out of the queue, its log,
+    earlier versions.
 
     Args:
         is_by_key: The menu was opened by a key, which then continues at the first entry.
@@ -50,7 +54,9 @@ def draw_clip_training(
     reference_state = session.clip_states[reference].state
     has_reference = clip_index == reference or reference in coming or reference_state in ("trained", *GOING)
     can_train = is_writable and not is_going and session.training.state != "stopping"
-    if clip_index in coming:
+    if is_going:
+        _draw_holding(status, dispatch, ui, clip_index, is_by_key=is_by_key)
+    elif clip_index in coming:
         if _item(ui, "unqueue", f"{Icon.CLOSE}  Remove from the queue", is_by_key=is_by_key):
             dispatch(RemoveFromQueue(clip_index))
     else:
@@ -75,8 +81,21 @@ def draw_clip_training(
     label = f"{Icon.GEAR}  Train with other settings ..."
     if _item(ui, "settings", label, is_enabled=can_train and has_reference):
         dispatch(AskTrainSettings(clip_index))
+    if _item(ui, "log", f"{Icon.LOG}  Show its log"):
+        ui.log_clip, ui.wanted_panel = clip_index, LOG
     draw_copy_menu(ui, "clip menu.training", lambda: session.command_texts.training(clip_index))
     draw_versions_menu(session, dispatch, ui, clip_index)
+
+
+def _draw_holding(status: ClipStatus, dispatch: Dispatch, ui: UiState, clip_index: int, *, is_by_key: bool) -> None:
+    """Entries for a clip that trains, wherever it does."""
+    if status.state == "paused":
+        if _item(ui, "resume", f"{Icon.PLAY}  Resume this clip", is_by_key=is_by_key):
+            dispatch(ResumeTraining(clip_index))
+    elif _item(ui, "pause", f"{Icon.PAUSE}  Pause this clip", is_by_key=is_by_key):
+        dispatch(PauseTraining(clip_index))
+    if _item(ui, "stop", f"{Icon.STOP}  Stop this clip"):
+        dispatch(StopTraining(clip_index))
 
 
 def _unfinished(session: SessionView, coming: set[int], first: int) -> tuple[int, ...]:

@@ -20,6 +20,8 @@ from ui.panels.training.clip_training_menu import draw_clip_training
 from ui.panels.training.curves import draw_curves
 from ui.panels.training.plan import draw_plan
 from ui.panels.training.queue import draw_live_view, draw_queue, draw_train_all, draw_usage
+from ui.panels.training.running import draw_running, is_listed
+from ui.panels.training.workers import draw_workers
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.progress_words import stage_words
@@ -39,11 +41,14 @@ def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
         return
     status = session.training
     _draw_buttons(session, dispatch, ui)
-    is_going = status.state in ("starting", "preparing", "running", "paused", "stopping")
-    if is_going:
+    if is_listed(session):
+        draw_running(session, dispatch, ui)
+    elif status.is_going:
         _draw_progress(status, ui)
         draw_usage(session.usage, ui)
+    if status.is_anywhere:
         draw_live_view(session, dispatch, ui)
+    draw_workers(session, dispatch, ui)
     draw_train_all(session, dispatch, ui)
     draw_stale(session, dispatch, ui)
     draw_queue(session, dispatch, ui)
@@ -74,7 +79,7 @@ def next_label(session: SessionView) -> str:
 def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     status = session.training
     width = imgui.get_content_region_avail().x
-    if status.state in ("idle", "failed"):
+    if not status.is_going:
         index = status.next_clip_index
         is_offered = bool(status.can_train_next) and index is not None
         if index is None:
@@ -101,23 +106,24 @@ def _draw_buttons(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
             draw_plan(session.plan, dispatch, ui)
         return
     half = (width - 8) / 2
-    if status.state == "paused":
-        if primary_button(f"{Icon.PLAY}  Resume", ImVec2(half, 36), ui):
+    of_all = " all" if status.n_running > 1 else ""
+    if status.is_paused:
+        if primary_button(f"{Icon.PLAY}  Resume{of_all}", ImVec2(half, 36), ui):
             dispatch(ResumeTraining())
         ui.mark("training.resume")
     else:
-        imgui.begin_disabled(status.state not in ("running", "preparing"))
-        if imgui.button(f"{Icon.PAUSE}  Pause", ImVec2(half, 36)):
+        imgui.begin_disabled(status.is_stopping or (status.state == "starting" and not of_all))
+        if imgui.button(f"{Icon.PAUSE}  Pause{of_all}", ImVec2(half, 36)):
             dispatch(PauseTraining())
         ui.mark("training.pause")
         imgui.end_disabled()
     imgui.same_line()
-    imgui.begin_disabled(status.state == "stopping")
-    if imgui.button(f"{Icon.STOP}  Stop", ImVec2(half, 36)):
+    imgui.begin_disabled(status.is_stopping)
+    if imgui.button(f"{Icon.STOP}  Stop{of_all}", ImVec2(half, 36)):
         dispatch(StopTraining())
     ui.mark("training.stop")
     imgui.end_disabled()
-    imgui.set_item_tooltip("Stops this clip now; its progress is kept")
+    imgui.set_item_tooltip(f"Stops {'all clips that train here' if of_all else 'this clip'} now; progress is kept")
 
 
 def _draw_progress(status: TrainingStatus, ui: UiState) -> None:

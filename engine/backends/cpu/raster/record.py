@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from engine.conventions import ALPHA_MIN
+from engine.kernels.fast_math import fast_math
 from engine.raster.pinhole_view import TILE_PX
 
 CENTER_X, CENTER_Y, ROOT_MAJOR, SLOPE, ROOT_MINOR, LOG_OPACITY, RED = range(7)
@@ -46,7 +47,7 @@ EXP2_EIGHTH = (0.9999999251, 0.6931422525, 0.2401721884, 0.05527972023, 0.009188
 PAIR_FLOATS = 9
 """Floats of a row of the pair buffer, one per sum. Rows are read sixteen floats wide, so the buffer has a row more."""
 
-FASTMATH = {"nsz", "contract", "arcp", "afn", "reassoc"}
+FASTMATH = fast_math("nsz", "contract", "arcp", "afn", "reassoc")
 """NaN and infinity must keep their meaning: rows are dropped by comparisons that NaN fails."""
 KERNEL_OPTIONS = {
     "fastmath": FASTMATH,

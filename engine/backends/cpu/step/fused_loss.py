@@ -34,6 +34,7 @@ from engine.images.ssim_lanes import (
     gradient_rows,
     ssim_rows,
 )
+from engine.kernels.fast_math import fast_math
 from engine.kernels.jobs import Bytes2, Doubles3, Flags2, Floats1, Floats2, Floats3, Ints1, Ints3, read
 from engine.kernels.launch import kernel, launch
 from engine.kernels.routines import ints, load_float, routine
@@ -61,7 +62,7 @@ _N_SUMS = 4 * N_ROWS
 
 _BYTE = np.float32(1.0 / 255.0)
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_FASTMATH = {"contract", "nsz", "arcp"}
+_FASTMATH = fast_math("contract", "nsz", "arcp")
 
 
 class LossJob(NamedTuple):

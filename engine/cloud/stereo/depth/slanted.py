@@ -17,6 +17,7 @@ from numba import njit
 from engine.camera.projection import relative_homography
 from engine.camera.rig import CameraRig
 from engine.cloud.stereo.depth.sweep import GREY_TRUNCATION, GREY_WEIGHT, STD_FLOOR, UNKNOWN_COST
+from engine.kernels.fast_math import ALL, fast_math
 
 RADIUS_PX = 4
 STRIDE_PX = 2
@@ -121,7 +122,7 @@ def _unit(state):
     return np.float64(z >> np.uint64(11)) / 4503599627370496.0 - 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _source_cost(patch, source, is_usable, matrix, shift, x, y, plane):
     """1 - weighted ZNCC (+ grey difference) of a patch in one source; -1 without a vote."""
     own, weights, places, n, n_weight = patch

@@ -21,6 +21,7 @@ from engine.camera.projection import (
     to_world,
 )
 from engine.camera.rig import CameraRig
+from engine.kernels.fast_math import ALL, fast_math
 
 N_SOURCES = 5
 PATCH_RADIUS_PX = 2
@@ -200,7 +201,7 @@ def _window_costs(
     return costs
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _warped_moments(reference, source, is_usable, matrix, shift, moments):
     """Per pixel: seen, warped grey, its square, product with the reference, reference, its square (0 if unseen)."""
     height, width = reference.shape
@@ -235,7 +236,7 @@ def _warped_moments(reference, source, is_usable, matrix, shift, moments):
             moments[5, y, x] = own * own
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _patch_sums(moments, sums):
     """Sums over the square patch; patches are cut at the border."""
     _, height, width = moments.shape
@@ -256,7 +257,7 @@ def _patch_sums(moments, sums):
                     sums[m, y, x] += line[x - offset]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _zncc_cost(sums, costs):
     """Negative where fewer than 60 % of the patch is seen (no vote)."""
     _, height, width = sums.shape
@@ -278,7 +279,7 @@ def _zncc_cost(sums, costs):
             costs[y, x] = min(one - similarity, one) + np.float32(GREY_WEIGHT) * grey
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=fast_math(*ALL))
 def _mean_of_best_half(source_costs, ranked, costs, d):
     """The better half of the voting sources: the others may be occluded. A lone vote counts half.
 

@@ -74,7 +74,7 @@ def _make_reference(session: SessionView, dispatch: Dispatch, ui: UiState) -> No
 
 
 def _something_trains(session: SessionView) -> str:
-    return "" if session.training.state in ("idle", "failed") else "Stop training first; progress is kept."
+    return "Stop training first; progress is kept." if session.training.is_anywhere else ""
 
 
 def _free_versions(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:

@@ -16,7 +16,7 @@ from ui.panels.timeline.rows.rows import CLIPS
 from ui.panels.timeline.rows.stage import TimelineStage, hatch
 from ui.panels.timeline.time_range import TimeScale
 from ui.style import theme
-from ui.style.progress_words import band_words
+from ui.style.progress_words import band_words, running_words
 
 MIN_BAND_WIDTH = 14.0
 """Clips narrower than this are drawn in runs of one state."""
@@ -170,10 +170,11 @@ def _draw_lines(draw: imgui.ImDrawList, band: Rect, title: str, words: str, colo
 
 
 def _draw_note(session: SessionView, frame_index: int) -> None:
-    """The reason of a clip's state, where the pointer is over its band."""
+    """The reason of a clip's state, or where and how fast it trains, where the pointer is over its band."""
     clip = session.timeline.clip_of(frame_index)
     status = None if clip is None else session.clip_states[clip.clip_index]
-    note = "" if status is None else state_note(status)
+    running = None if clip is None else session.training.of_clip(clip.clip_index)
+    note = "" if status is None else state_note(status) if running is None else running_words(running)
     if clip is None or status is None or not (note or session.edits.label("clip", str(clip.start))):
         return
     imgui.begin_tooltip()

@@ -1,0 +1,355 @@
+"""Cluster: the computers that Ray knows, looked at before they get clips, and watched while they train them."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import secrets
+import signal
+import socket
+import threading
+import time
+from collections.abc import Collection
+from contextlib import ExitStack, suppress
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from app.cluster.nodes import Node, Seat, take_seat
+from app.cluster.ray_library import check_ray, ray_library
+from app.cluster.runner import look_around
+from app.cluster.versions import difference
+from app.project.project import Project
+from engine.capture.capture import Capture
+from engine.children.folder import child_folder
+from engine.errors import EngineError, ProjectError, TrainingError
+from engine.parallel import n_cores
+from engine.storage.files import PARTIAL_PREFIX, discard, disk_error
+
+logger = logging.getLogger(__name__)
+
+AUTO = "auto"
+_LOCAL = re.compile(r"local:(\d{1,5})")
+_ADDRESS = re.compile(r"(?P<host>[^:/\s]+|\[[0-9a-fA-F:]+\]):(?P<port>\d{1,5})")
+REACH_TIMEOUT_S = 5.0
+CONNECT_TIMEOUT_S = 15.0
+LOOK_TIMEOUT_S = 90.0
+WATCH_EVERY_S = 2.0
+STORE_BYTES = 80 << 20
+"""Of Ray's object store where we start it: messages and parts of files pass through it, nothing stays."""
+_MAX_TEMPORARY = 40
+"""Characters: names of sockets below a longer folder are too long for the system."""
+
+
+class Cluster:
+    """See the module docstring. Close it at the end.
+
+    Args:
+        address: "auto", "HOST:PORT" of a running cluster of which this computer is part, or "local:N".
+        project, capture: What is trained.
+        n_bytes: Memory of a training.
+
+    Attributes:
+        bytes_sent, bytes_received: Of clips that were trained where the project is not seen, by clip.
+
+    Raises:
+        ProjectError: Ray is not installed, the address is wrong, or no computer can train.
+        TrainingError: The cluster does not answer.
+    """
+
+    def __init__(self, address: str, project: Project, capture: Capture, *, n_bytes: int) -> None:
+        self.project, self.capture, self.n_bytes = project, capture, n_bytes
+        self.bytes_sent: dict[int, int] = {}
+        self.bytes_received: dict[int, int] = {}
+        self._nodes: dict[str, Node] = {}
+        self._looks: dict[Any, tuple[Node, float]] = {}
+        self._notes: SimpleQueue[str] = SimpleQueue()
+        self._guard, self._is_closing = threading.RLock(), threading.Event()
+        self._watcher = threading.Thread(target=self._watch, name="cluster", daemon=True)
+        self._kept = ExitStack()
+        check_ray()
+        try:
+            connect(address, self._kept)
+            self._ray = ray_library()
+            self._kept.callback(self._ray.shutdown)
+            self._nonce = secrets.token_hex(16)
+            # of a name that the next one to open the project sweeps where this process has died
+            self._probe = project.live_dir.absolute() / f"{PARTIAL_PREFIX}{os.getpid()}-probe-{self._nonce}"
+            self._write_probe()
+            self._kept.callback(discard, self._probe)
+            self._look_until_known()
+        except BaseException:
+            self.close()
+            raise
+        self._watcher.start()
+
+    def close(self) -> None:
+        """Let go of the cluster; one that was started here ends."""
+        self._is_closing.set()
+        if self._watcher.is_alive():
+            self._watcher.join(WATCH_EVERY_S)
+        self._kept.close()
+
+    def _write_probe(self) -> None:
+        try:
+            self._probe.parent.mkdir(exist_ok=True)
+            self._probe.write_text(self._nonce, "ascii")
+        except OSError as error:
+            raise disk_error(error, what="A file for the other computers to find", path=self._probe) from error
+
+    # ---------------------------------------------------------------- places
+
+    @property
+    def nodes(self) -> list[Node]:
+        """All computers that were ever part of it."""
+        with self._guard:
+            return list(self._nodes.values())
+
+    @property
+    def words(self) -> list[str]:
+        """Sentences about its computers without a full stop, for the user."""
+        usable = [node for node in self.nodes if node.is_usable]
+        copied = [node.name for node in usable if not node.sees_project]
+        found = [f"the cluster trains {self.n_slots} clips side by side, on {len(usable)} computers"]
+        if copied:
+            found.append(f"{', '.join(copied)} cannot see the project, and gets copies of what it needs")
+        return found
+
+    @property
+    def n_slots(self) -> int:
+        """How many clips may train side by side now."""
+        return max(sum(node.n_slots(self.n_bytes) for node in self.nodes if node.is_usable), 1)
+
+    def seat_for(self, *, n_beside: int, avoided: Collection[Node] = ()) -> Seat | None:
+        """See `take_seat`.
+
+        Raises:
+            TrainingError: No computer is left.
+        """
+        with self._guard:
+            if not any(node.is_usable for node in self._nodes.values()) and not self._looks:
+                raise self._nobody()
+            return take_seat(self._nodes.values(), self.n_bytes, n_beside=n_beside, avoided=avoided)
+
+    def refuse(self, node: Node, why: str) -> None:
+        """A computer gets no more clips. why: Follows its name, without a full stop."""
+        with self._guard:
+            if not node.refused:
+                node.refused = why
+                self._note(f"{node.name} gets no clips: it {why}")
+
+    def take_notes(self) -> list[str]:
+        """What happened to computers since the last call, in sentences without a full stop."""
+        found = list[str]()
+        with suppress(Empty):
+            while True:
+                found.append(self._notes.get_nowait())
+        return found
+
+    def _note(self, text: str) -> None:
+        logger.warning("%s", text)
+        self._notes.put(text)
+
+    def _nobody(self) -> EngineError:
+        said = [f"{node.name} {node.refused or 'is gone'}" for node in self._nodes.values()]
+        listed = "; ".join(dict.fromkeys(said)) or "it has none with free cores"
+        return TrainingError(f"No computer of the cluster can train clips: {listed}.", hint="Progress is kept.")
+
+    # ---------------------------------------------------------------- looking
+
+    def _look_until_known(self) -> None:
+        while True:
+            self._look()
+            if not self._looks:
+                break
+            time.sleep(0.1)
+        if not any(node.is_usable for node in self.nodes):
+            error = self._nobody()
+            raise ProjectError(error.message)
+
+    def _watch(self) -> None:
+        while not self._is_closing.wait(WATCH_EVERY_S):
+            try:
+                self._look()
+            except Exception as error:  # noqa: BLE001 - the thread has to live; what trains notices a lost cluster itself
+                logger.warning("the cluster could not be looked at: %s", error)
+
+    def _look(self) -> None:
+        """Ask new computers, take in their answers, and notice those that are gone."""
+        known = self._ray.nodes()
+        with self._guard:
+            for found in known:
+                self._meet(found)
+            for reference, (node, since_s) in list(self._looks.items()):
+                if self._ray.wait([reference], timeout=0)[0]:
+                    del self._looks[reference]
+                    self._judge(node, reference)
+                elif time.monotonic() - since_s > LOOK_TIMEOUT_S:
+                    del self._looks[reference]
+                    self.refuse(node, f"did not answer for {LOOK_TIMEOUT_S:.0f} s")
+
+    def _meet(self, found: dict[str, Any]) -> None:
+        node = self._nodes.get(found["NodeID"])
+        if node is not None:
+            if node.is_alive and not found["Alive"]:
+                self._note(f"{node.name} is gone; its clips resume elsewhere")
+            node.is_alive = found["Alive"]
+            return
+        resources = found.get("Resources", {})
+        if not found["Alive"] or resources.get("CPU", 0) < 1:
+            return
+        name = f"{found['NodeManagerHostname']} ({found['NodeManagerAddress']})"
+        node = Node(found["NodeID"], name, int(resources["CPU"]), int(resources.get("memory", 0)))
+        self._nodes[node.node_id] = node
+        self.ask(node)
+
+    def ask(self, node: Node) -> None:
+        """Ask a computer, once more, whether it sees the project; it gets no clips before it has answered."""
+        settings = self.project.settings
+        look = self._ray.remote(look_around).options(**node.pinned(num_cpus=0, max_retries=0))
+        answer = look.remote(str(self._probe), self._nonce, settings.capture, settings.follow_links)
+        with self._guard:
+            node.sees_project = None
+            self._looks[answer] = node, time.monotonic()
+
+    def _judge(self, node: Node, reference: Any) -> None:
+        try:
+            found = self._ray.get(reference)
+        except self._ray.exceptions.RayError as error:
+            logger.warning("%s: %s", node.name, error)
+            self.refuse(node, "could not run ClipGStream, which has to be installed there in the same version")
+            return
+        node.n_cores = min(node.n_cores, found["cores"])
+        node.sees_project = found["sees"] and found["fingerprint"] == self.project.settings.fingerprint
+        other = difference(found["versions"])
+        if other:
+            self.refuse(node, other)
+        elif node.n_slots(self.n_bytes) < 1:
+            has, needs = node.memory_bytes / 1e9, self.n_bytes / 1e9
+            self.refuse(node, f"has {has:.1f} GB of memory, and a clip takes about {needs:.1f} GB")
+        logger.info("%s: %d cores, %s", node.name, node.n_cores, found.get("why", "sees project and capture"))
+
+    def document(self) -> dict[str, Any]:
+        """For `train --json`."""
+        return {
+            "nodes": [
+                {"name": node.name, "n_cores": node.n_cores, "is_shared": bool(node.sees_project), "why": node.refused}
+                for node in self.nodes
+            ],
+            "bytes_sent": sum(self.bytes_sent.values()),
+            "bytes_received": sum(self.bytes_received.values()),
+        }
+
+
+# ---------------------------------------------------------------- connecting
+
+
+def connect(address: str, kept: ExitStack) -> None:
+    """Connect this process with a cluster, or start one on this computer.
+
+    Args:
+        kept: Takes over what has to go at the end.
+    Raises:
+        ProjectError: The address is wrong, or nothing runs there.
+        TrainingError: It does not answer.
+    """
+    options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
+    local = _LOCAL.fullmatch(address)
+    if local is not None:
+        options |= _local_options(int(local[1]), kept)
+    elif address == AUTO or _ADDRESS.fullmatch(address):
+        options["address"] = address
+        if address != AUTO:
+            _check_reachable(address)
+    else:
+        raise ProjectError(
+            f"--cluster is '{address}', which is not the address of a cluster.",
+            hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
+        )
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        if local is not None:
+            ray_library().init(**options)  # here: what a thread starts ends with that thread
+        else:
+            _init_in_time(address, options)
+    except EngineError:
+        raise
+    except Exception as error:
+        raise _refused(address, error) from error
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, before)
+
+
+def _init_in_time(address: str, options: dict[str, Any]) -> None:
+    """On a thread: where something else than Ray answers, it waits for minutes and hears no signal."""
+    failed: list[Exception] = []
+
+    def work() -> None:
+        try:
+            ray_library().init(**options)
+        except Exception as error:  # noqa: BLE001 - handed to the thread that waits
+            failed.append(error)
+
+    thread = threading.Thread(target=work, name="connecting", daemon=True)
+    thread.start()
+    thread.join(CONNECT_TIMEOUT_S)
+    if thread.is_alive():
+        raise TrainingError(
+            f"No Ray cluster answers at {address} within {CONNECT_TIMEOUT_S:.0f} s.",
+            hint="Check the address and, where the cluster asks for one, the token (RAY_AUTH_TOKEN_PATH).",
+        )
+    if failed:
+        raise failed[0]
+
+
+def _local_options(n: int, kept: ExitStack) -> dict[str, Any]:
+    """Options to start Ray here: nobody else reaches it, and nobody without the token is heard."""
+    if n < 1:
+        raise ProjectError("--cluster local:0 would train nothing.", hint="Write local:N with N from 1.")
+    folder = kept.enter_context(child_folder("clipgstream-ray-", what="The folder of the cluster"))
+    token = folder / "token"
+    descriptor = os.open(token, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
+    with open(descriptor, "w", encoding="ascii") as file:
+        file.write(secrets.token_hex(32))
+    os.environ |= {
+        "RAY_AUTH_MODE": "token",
+        "RAY_AUTH_TOKEN_PATH": str(token),
+        "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # so that Ray uses 127.0.0.1, on every system
+    }
+    os.environ.pop("RAY_AUTH_TOKEN", None)
+    os.environ.pop("RAY_ADDRESS", None)
+    return {
+        "address": "local",
+        "num_cpus": min(n, n_cores()),
+        "include_dashboard": False,
+        "object_store_memory": STORE_BYTES,
+        "_node_ip_address": "127.0.0.1",
+        "_temp_dir": str(folder) if len(str(folder)) <= _MAX_TEMPORARY else None,
+    }
+
+
+def _check_reachable(address: str) -> None:
+    """Raises TrainingError where nothing listens: Ray itself would try for minutes."""
+    match = _ADDRESS.fullmatch(address)
+    assert match is not None
+    try:
+        socket.create_connection((match["host"].strip("[]"), int(match["port"])), timeout=REACH_TIMEOUT_S).close()
+    except (OSError, OverflowError) as error:
+        raise TrainingError(
+            f"The cluster at {address} cannot be reached ({getattr(error, 'strerror', None) or error}).",
+            hint="Check that it runs, and that no firewall is in between.",
+        ) from error
+
+
+def _refused(address: str, error: Exception) -> EngineError:
+    text = str(error).strip().splitlines()
+    said = text[0].rstrip(".") if text else type(error).__name__
+    if isinstance(error, ConnectionError) and address == AUTO:
+        return ProjectError(
+            "No Ray cluster runs on this computer.",
+            hint="Start one with `ray start`, name one as HOST:PORT, or write local:N.",
+        )
+    if "version" in said.lower() and "mismatch" in str(error).lower():
+        return ProjectError(f"The cluster at {address} has another version of Ray or Python ({said}).")
+    return TrainingError(f"The cluster at {address} could not be joined ({said}).", hint="See docs/cluster.md.")

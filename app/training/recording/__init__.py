@@ -1,0 +1,1 @@
+"""Training while the capture is still being recorded."""

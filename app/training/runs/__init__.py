@@ -1,0 +1,1 @@
+"""Several clips in training at once: what they share."""
