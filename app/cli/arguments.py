@@ -122,16 +122,17 @@ def add_measuring_workers(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--workers",
         dest="n_workers",
-        type=_count,
+        type=count_argument,
         default=1,
         metavar="N",
         help="measure in N processes, at most one per core (default: 1); figures are the same",
     )
 
 
-def _count(text: str) -> int:
+def count_argument(text: str) -> int:
+    """How many workers, at least one."""
     if not text.strip().isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text} is not a count from 1")
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a count from 1")
     return int(text)
 
 

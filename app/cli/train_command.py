@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import math
 from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from functools import partial
 
 from app.cli.arguments import (
@@ -13,6 +13,7 @@ from app.cli.arguments import (
     EXIT_FAILED,
     EXIT_NOT_READY,
     EXIT_OK,
+    count_argument,
     fail,
     parse_range,
 )
@@ -37,14 +38,16 @@ from app.plan.sequence import plan_sequence, sequence_text
 from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
 from app.plan.speed import step_time
 from app.project.clips.clip_catalog import ClipCatalog
+from app.project.project import Project
 from app.residuals.kept_reading import note_kept
 from app.status import TrainingStatus
 from app.training.due import is_due
 from app.training.service import Launch, TrainingService
+from engine.capture.capture import Capture
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
-from engine.text import duration_text, shown
+from engine.text import duration_text
 from engine.training.config import parse_overrides
 
 
@@ -60,7 +63,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--workers",
-        type=workers_argument,
+        type=count_argument,
         metavar="N",
         help="train N clips side by side, on as many cores and in as much memory as there is (default: 1); with "
         "--plan, what N machines would cost",
@@ -107,13 +110,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
-def workers_argument(text: str) -> int:
-    """A number of workers, at least one."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is not a number of clips, 1 or more")
-    return int(text)
-
-
 def exit_code(outcomes: Sequence[ClipOutcome]) -> int:
     """Of a training that ended like this: bad input only where nothing else went wrong."""
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
@@ -136,35 +132,56 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)
     is_refused, outcomes = False, []
-    service: TrainingService | None = None
-    cluster: Cluster | None = None
     try:
-        clips = project.clips(capture.n_frames)
-        chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
-        holdout = capture.camera_indices(project.settings.holdout)
-        first = project.settings.reference_clip  # the others cannot begin before it
-        order = sorted(chosen, key=lambda clip_index: clip_index != first)
-        catalog = ClipCatalog(project, len(clips))
-        to_train = [clips[i] for i in order if options.again or is_due(catalog, i)]
+        outcomes = _train(options, launch, project, capture, line)
+        is_refused = exit_code(outcomes) == EXIT_BAD_INPUT
+    except (CaptureError, ProjectError) as error:
+        is_refused = not isinstance(error, DiskError)
+        raise
+    finally:
+        has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
+        if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
+            project.remove_files()
+        project.close()
+        if is_refused and not was_folder:
+            with suppress(OSError):  # not empty: something was learned
+                options.project.rmdir()
+    code = exit_code(outcomes)
+    return code if code == EXIT_OK else fail(code, failure_text(outcomes))
+
+
+def _train(
+    options: argparse.Namespace, launch: Launch, project: Project, capture: Capture, line: ProgressLine
+) -> list[ClipOutcome]:
+    clips = project.clips(capture.n_frames)
+    chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
+    first = project.settings.reference_clip  # the others cannot begin before it
+    order = sorted(chosen, key=lambda clip_index: clip_index != first)
+    catalog = ClipCatalog(project, len(clips))
+    to_train = [clips[i] for i in order if options.again or is_due(catalog, i)]
+    cluster: Cluster | None = None
+    with ExitStack() as kept:
+        kept.callback(line.finish)
         if options.cluster is None:
             sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
         else:
             kinds = plans_of_kinds(project, capture, to_train, catalog)
             memory_mb = max((plan.memory_mb for plan in kinds.values()), default=0.0)
             cluster = Cluster(options.cluster, project, capture, n_bytes=int(memory_mb * 1e6))
+            kept.callback(cluster.close)
             launch = partial(ClusterWorker, cluster=cluster)
             sequence = PlannedClips(SideBySide(cluster.n_slots), kinds)
-        n_workers = sequence.together.n_workers
         service = TrainingService(
             project,
             clips,
-            holdout=holdout,
+            holdout=capture.camera_indices(project.settings.holdout),
             launch=launch,
             is_window_open=False,
             catalog=catalog,
-            n_workers=n_workers,
+            n_workers=sequence.together.n_workers,
             cpu=options.cpu,
         )
+        kept.callback(service.close)
         service.set_live_view("off")
         note_kept(catalog, project, capture)
         names = ", ".join(project.settings.holdout) or "none"
@@ -172,64 +189,42 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
-        for sentence in (*capture.warnings, *(() if cluster is None else cluster.words)):
+        notes = (*capture.warnings, *(() if cluster is None else cluster.words), sequence.together.why_fewer)
+        for sentence in filter(None, notes):
             line.say(f"Note: {sentence}")
-        first = project.settings.reference_clip  # the others cannot begin before it
-        plans = PlanLines(
-            line,
-            project,
-            capture,
-            catalog=service.catalog,
-            step_time=step_time,
-            is_quiet=options.quiet,
-        )
-
-        def follow(status: TrainingStatus) -> None:
-            show_status(line, status)
-            if cluster is not None and service is not None:
-                service.n_workers = cluster.n_slots  # computers come and go
-
-        if sequence.together.why_fewer:
-            line.say(f"Note: {sequence.together.why_fewer}")
-        plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=options.quiet)
         table = SequenceTable(line, project, to_train, sequence)
+        has_others = cluster is not None or sequence.together.n_workers > 1
+        # a plan of each looks at pictures, and is of a clip that is trained alone on all cores
+        is_planned = not (options.quiet or has_others)
+        plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=not is_planned)
+
+        def show(status: TrainingStatus) -> None:
+            if cluster is not None:
+                service.n_workers = cluster.n_slots  # computers come and go
+            if has_others:
+                table.show(status)
+            else:
+                show_status(line, status)
+
         outcomes = train_clips(
             service,
             order,
             on_begin=lambda clip_index: plans.begin(clips[clip_index]),
             is_again=options.again,
             own=parse_overrides(options.own_assignments) or None,
-            on_status=follow,
-            on_event=lambda event: show_event(line, event, has_others=n_workers > 1),
+            on_status=show,
+            on_event=lambda event: show_event(line, event, has_others=has_others),
             on_outcome=lambda outcome: (
                 show_outcome(line, outcome, has_others=len(order) > 1),
                 plans.end(outcome),
                 table.end(outcome),
             ),
         )
-        is_refused = exit_code(outcomes) == EXIT_BAD_INPUT
         line.finish()
         if options.json:
             document = train_document(project, capture, outcomes)
             print(json_text(document if cluster is None else document | {"cluster": cluster.document()}, indent=2))
-    except (CaptureError, ProjectError) as error:
-        is_refused = not isinstance(error, DiskError)
-        raise
-    finally:
-        line.finish()
-        if service is not None:
-            service.close()
-        if cluster is not None:
-            cluster.close()
-        has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
-        if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
-            project.remove_files()
-        project.close()
-        if is_refused and not was_folder:
-            with contextlib.suppress(OSError):  # not empty: something was learned
-                options.project.rmdir()
-    code = exit_code(outcomes)
-    return code if code == EXIT_OK else fail(code, failure_text(outcomes))
+    return outcomes
 
 
 def _check_price(options: argparse.Namespace) -> None:

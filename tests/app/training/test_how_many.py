@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -89,7 +90,7 @@ def test_the_command_refuses_what_memory_cannot_hold_and_leaves_nothing(run, cap
 def test_a_number_of_workers_is_one_or_more(run, capture_folder, tmp_path, text):
     code, _, err = run("train", capture_folder, "--project", tmp_path / "p", f"--workers={text}")
     assert code == 2
-    assert "is not a number of clips, 1 or more" in err
+    assert "is not a count from 1" in err
 
 
 @pytest.mark.parametrize("n_workers", [1, 2])
@@ -101,6 +102,16 @@ def test_the_command_names_clips_that_were_not_begun(run, capture_folder, tmp_pa
     assert [clip["state"] for clip in json.loads(out)["clips"]] == ["failed", *["left_out"] * 5]
     assert "nan at step 5" in err
     assert err.rstrip().endswith("\nNot begun, because clip 0 is not finished: clip 1 to 5.")
+
+
+def test_the_command_shows_all_of_them_and_plans_none_by_its_pictures(run, capture_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "n_cores", lambda: 2)
+    monkeypatch.setattr("app.cli.terminal.training_lines.plan_clip", None)  # it decodes pictures of every clip
+    arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 1, "--workers", 2)
+    code, _, err = run(*arguments)
+    assert code == 0, err
+    assert re.search(r"^All +\d+ %  \d/6 clips", err, re.MULTILINE)
+    assert not re.search(r"^Clip \d: \d+ steps", err, re.MULTILINE)
 
 
 @pytest.mark.slow
