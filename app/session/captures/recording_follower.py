@@ -157,17 +157,14 @@ class RecordingFollower(SessionPart):
     def poll(self) -> bool:
         """Take in clips that have become complete. Whether there were any."""
         intake, now_s = self._intake, time.monotonic()
-        if intake is None:
+        if intake is None or now_s < self._next_s or self._worker.is_busy:  # each look is heard before the next one
             return False
-        newest = self._worker.newest
-        if newest is None or newest[0].number != self._number:
-            if self._number == 0 or now_s >= self._next_s:
-                self._look(intake, now_s)
-            return False
-        if now_s < self._next_s:
-            return False
-        taken, has_ended = newest[1], intake.has_ended
+        newest, has_ended = self._worker.newest, intake.has_ended
+        is_heard = newest is not None and newest[0].number == self._number  # else it has failed, or is the first
         self._look(intake, now_s)
+        if newest is None or not is_heard:
+            return False
+        taken = newest[1]
         if taken is not None:
             self._take(taken, intake)
         if taken is None and has_ended:
