@@ -17,6 +17,7 @@ from app.session.notices import Notices
 from app.session.part import SessionPart
 from app.session.training.live_training import LiveTraining
 from app.status import RecordingStatus
+from app.training.recording.followed_recording import check_unfinished
 from app.training.recording.intake import LOOK_EVERY_S, Intake, TakenIn, base_of, check_can_follow, n_taken_of
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, ProjectError
@@ -182,6 +183,7 @@ class RecordingFollower(SessionPart):
         assert opened is not None
         n_before = len(opened.clips)
         try:
+            check_unfinished(opened.project, taken.stop)
             if taken.lost:
                 document = taken.without_lost(opened.project.document, opened.capture)
                 self._document.change(document, "exclude frames that did not come")

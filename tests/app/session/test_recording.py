@@ -55,6 +55,14 @@ def test_a_followed_recording_grows_in_the_window(make_session, tmp_path: Path) 
     poll_until(again, lambda: again.capture is not None)
     assert (again.capture.n_frames, len(again.clips)) == (11, 4)
     assert all(status.state == "trained" for status in again.clip_states)
+    (tmp_path / "c" / END_FILE).unlink()
+    longer = Recorder(open_capture(write_capture(tmp_path / "longer", n_frames=13)), tmp_path / "c")
+    for tick in (11, 12):
+        longer.write(tick)
+    again.dispatch(FollowRecording())
+    poll_until(again, lambda: not again.recording_status.is_followed)
+    assert "seemed to have ended at frame 11, and clip 3 was trained" in str(list(again.notices)[-1])
+    assert again.project.settings.frames == (0, 11)
 
 
 def test_growing_interrupts_no_training_and_undo_takes_no_frames(make_session, tmp_path: Path) -> None:
