@@ -45,6 +45,7 @@ from app.training.due import is_due
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.parallel import n_cores
 from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
 from engine.text import duration_text
@@ -170,7 +171,8 @@ def _train(
             cluster = Cluster(options.cluster, project, capture, n_bytes=int(memory_mb * 1e6))
             kept.callback(cluster.close)
             launch = partial(ClusterWorker, cluster=cluster)
-            sequence = PlannedClips(SideBySide(cluster.n_slots), kinds)
+            n_slots = cluster.n_slots
+            sequence = PlannedClips(SideBySide(n_slots), kinds, n_slots * n_cores() / cluster.n_cores)
         service = TrainingService(
             project,
             clips,

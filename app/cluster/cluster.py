@@ -120,6 +120,11 @@ class Cluster:
         """How many clips may train side by side now."""
         return max(sum(node.n_slots(self.n_bytes) for node in self.nodes if node.is_usable), 1)
 
+    @property
+    def n_cores(self) -> int:
+        """Cores that its clips divide."""
+        return max(sum(node.n_cores for node in self.nodes if node.is_usable), 1)
+
     def seat_for(self, *, n_beside: int, avoided: Collection[Node] = ()) -> Seat | None:
         """See `take_seat`.
 
