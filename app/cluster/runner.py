@@ -16,7 +16,6 @@ from typing import Any
 
 from app.cluster.mirror import Mirror
 from app.cluster.versions import versions
-from app.project.claims.holder_record import machine_name
 from engine.capture.capture import open_capture
 from engine.children.kind import ChildFailed, ChildKind, find
 from engine.children.messages import Refusal, decoded, encoded
@@ -45,14 +44,14 @@ def _answered(method: Callable[..., Any]) -> Callable[..., Answer]:
 
 
 def look_around(probe: str, nonce: str, capture: str, follow_links: bool) -> dict[str, Any]:
-    """Describe this computer: name, cores, versions, and whether it sees the project and the capture.
+    """Describe this computer: cores, versions, and whether it sees the project and the capture.
 
     Args:
         probe: A file of the project that holds the nonce.
     Returns:
         "sees": whether both are here, "fingerprint" of the capture, and "why" not.
     """
-    found = {"name": machine_name(), "cores": n_cores(), "versions": versions(), "sees": False, "fingerprint": ""}
+    found = {"cores": n_cores(), "versions": versions(), "sees": False, "fingerprint": ""}
     try:
         if Path(probe).read_text("ascii") != nonce:
             return found | {"why": "another project lies in its place"}

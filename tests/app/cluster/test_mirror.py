@@ -7,9 +7,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from msgspec.structs import replace
 
 from app.cluster import mirror as mirror_module
-from app.cluster.cluster import Cluster, connect
+from app.cluster.cluster import Cluster
+from app.cluster.connecting import connect
 from app.cluster.contents import HEAD_BYTES, contents_of, job_key
 from app.cluster.mirror import Mirror, file_digest
 from app.cluster.nodes import Node, take_seat
@@ -108,6 +110,8 @@ def test_of_pictures_only_those_of_the_clip_are_sent_in_full(make_opened, tmp_pa
         assert ("project/clips/0000.safetensors" in found) == (job is jobs[1])
         assert {"project/project.json", "capture/train_meta.json"} < found.keys()
     assert job_key(opened.project, jobs[0]) != job_key(opened.project, jobs[1])
+    again = replace(jobs[0], claim="c" * 32, n_beside=7, n_threads=3)
+    assert job_key(opened.project, again) == job_key(opened.project, jobs[0]), "another process continues with its copy"
 
 
 # ---------------------------------------------------------------- places and addresses
