@@ -6,7 +6,6 @@ import argparse
 import math
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
-from functools import partial
 
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
@@ -29,10 +28,9 @@ from app.cli.terminal.training_lines import (
     show_status,
 )
 from app.cluster.cluster import Cluster
-from app.cluster.cluster_worker import ClusterWorker
+from app.cluster.joined import JoinedCluster
 from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
-from app.plan.forecasts import plans_of_kinds
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.sequence import plan_sequence, sequence_text
 from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
@@ -166,13 +164,11 @@ def _train(
         if options.cluster is None:
             sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
         else:
-            kinds = plans_of_kinds(project, capture, to_train, catalog)
-            memory_mb = max((plan.memory_mb for plan in kinds.values()), default=0.0)
-            cluster = Cluster(options.cluster, project, capture, n_bytes=int(memory_mb * 1e6))
-            kept.callback(cluster.close)
-            launch = partial(ClusterWorker, cluster=cluster)
-            n_slots = cluster.n_slots
-            sequence = PlannedClips(SideBySide(n_slots), kinds, n_slots * n_cores() / cluster.n_cores)
+            joined = JoinedCluster(options.cluster, project, capture, to_train, catalog)
+            kept.callback(joined.close)
+            cluster, launch = joined.cluster, joined.launch
+            n_slots = joined.n_slots
+            sequence = PlannedClips(SideBySide(n_slots), joined.kinds, n_slots * n_cores() / cluster.n_cores)
         service = TrainingService(
             project,
             clips,

@@ -110,7 +110,7 @@ def test_of_pictures_only_those_of_the_clip_are_sent_in_full(make_opened, tmp_pa
         assert ("project/clips/0000.safetensors" in found) == (job is jobs[1])
         assert {"project/project.json", "capture/train_meta.json"} < found.keys()
     assert job_key(opened.project, jobs[0]) != job_key(opened.project, jobs[1])
-    again = replace(jobs[0], claim="c" * 32, n_beside=7, n_threads=3)
+    again = replace(jobs[0], claim="c" * 32, n_beside=7, n_everywhere=9, n_threads=3)
     assert job_key(opened.project, again) == job_key(opened.project, jobs[0]), "another process continues with its copy"
 
 
