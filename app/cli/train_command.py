@@ -13,6 +13,8 @@ from app.cli.arguments import (
     EXIT_FAILED,
     EXIT_NOT_READY,
     EXIT_OK,
+    EXIT_STOPPED,
+    count_of,
     fail,
     parse_range,
 )
@@ -44,7 +46,7 @@ from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
-from engine.text import duration_text, shown
+from engine.text import duration_text
 from engine.training.config import parse_overrides
 
 
@@ -55,15 +57,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--clip",
         type=int,
         metavar="K",
-        help="train this clip only, beside other processes and computers that train others; does nothing if it is "
-        f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it",
+        help="train this clip only, while other processes and computers train others; nothing happens if it is "
+        f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it; "
+        f"{EXIT_STOPPED}: somebody stopped it",
     )
     command.add_argument(
         "--workers",
-        type=workers_argument,
+        type=count_of("clips"),
         metavar="N",
-        help="train N clips side by side, on as many cores and in as much memory as there is (default: 1); with "
-        "--plan, what N machines would cost",
+        help="train N clips side by side, at most one per core, if memory suffices (default: 1); with --plan, forecast "
+        "what N workers cost",
     )
     command.add_argument(
         "--again",
@@ -107,13 +110,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="show no progress")
 
 
-def workers_argument(text: str) -> int:
-    """A number of workers, at least one."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is not a number of clips, 1 or more")
-    return int(text)
-
-
 def exit_code(outcomes: Sequence[ClipOutcome]) -> int:
     """Of a training that ended like this: bad input only where nothing else went wrong."""
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
@@ -126,6 +122,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     _check_price(options)
     if options.plan:
+        _check_plan(options)
         return _plan(options)
     environment_of(options.cpu)  # refused before a project is made
     if options.clip is not None:
@@ -237,6 +234,16 @@ def _check_price(options: argparse.Namespace) -> None:
     if price is not None and not (options.plan and 0 <= price < math.inf):
         problem = f"is {price}" if options.plan else "is of a plan"
         raise ProjectError(f"--price-per-hour {problem}.", hint="Give a price of 0 or more together with --plan.")
+
+
+def _check_plan(options: argparse.Namespace) -> None:
+    instead = {
+        "clip": f"Write --clips {options.clip} for the plan of that clip.",
+        "cluster": "Write --workers N for what N workers cost.",
+    }
+    for name, hint in instead.items():
+        if getattr(options, name) is not None:
+            raise ProjectError(f"--plan cannot be combined with --{name}.", hint=hint)
 
 
 def _plan(options: argparse.Namespace) -> int:
