@@ -370,6 +370,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.looked_at.mode_of(clip_index),
             n_beside=n_beside,
+            claim=self.claims.token,
             cpu=self._cpu,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)
@@ -433,8 +434,6 @@ class TrainingService:
             case "stop":
                 for run in self._chosen(clip_index):
                     run.stop()
-            case "look":
-                self.snapshot_now(clip_index)
 
     def _is_finished_since(self, clip_index: int) -> bool:
         """Read a clip's files again. Whether another process has finished it since they were read; it waits no more."""
