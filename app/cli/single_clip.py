@@ -85,7 +85,7 @@ def _claim(service: TrainingService, clip_index: int, line: ProgressLine) -> Non
             if error.is_sure:
                 raise
             if not is_told:
-                line.say(f"Clip {clip_index}: {error.message} Waiting for up to a minute for a sign of life from it.")
+                line.say(f"Clip {clip_index}: {error.message} Waiting for up to a minute for a sign of life.")
                 service.claims.watch()
                 is_told = True
             time.sleep(LOOK_EVERY_S)
