@@ -7,7 +7,7 @@ import difflib
 import logging
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -122,18 +122,22 @@ def add_measuring_workers(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--workers",
         dest="n_workers",
-        type=count_argument,
+        type=count_of("processes"),
         default=1,
         metavar="N",
         help="measure in N processes, at most one per core (default: 1); figures are the same",
     )
 
 
-def count_argument(text: str) -> int:
-    """How many workers, at least one."""
-    if not text.strip().isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is not a count from 1")
-    return int(text)
+def count_of(what: str) -> Callable[[str], int]:
+    """The type of an argument that is a number of something, at least one. what: In the plural."""
+
+    def count(text: str) -> int:
+        if not text.strip().isdecimal() or int(text) < 1:
+            raise argparse.ArgumentTypeError(f"{shown(text)} is not a number of {what}, 1 or more")
+        return int(text)
+
+    return count
 
 
 def path_argument(text: str) -> Path:

@@ -195,7 +195,10 @@ def _chosen_settings(
 
 
 def _check_clips(options: argparse.Namespace, settings: ProjectSettings, capture: Capture) -> None:
-    parse_range(options.clips, len(settings.clips(capture.n_frames)), option="--clips", what="clips")
+    n_clips, single = len(settings.clips(capture.n_frames)), getattr(options, "clip", None)
+    parse_range(options.clips, n_clips, option="--clips", what="clips")
+    if single is not None and not (single >= 0 and (single < n_clips or settings.is_growing)):
+        raise ProjectError(f"There is no clip {single}; clips are 0 to {n_clips - 1}.")
 
 
 def _unlocked(folder: Path, settings: ProjectSettings, document: ProjectDocument | None = None) -> Project:

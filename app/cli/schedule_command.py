@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     jobs = clip_jobs(planned, capture, chosen, step_time)
     capture.close()
     if jobs is None:
-        line.say("Nothing to schedule: the clips are trained.")
+        line.say("Nothing to schedule: each of these clips is trained, damaged, or in need of a damaged one.")
         return EXIT_OK
     text = job_text(scheduler, jobs, capture=options.capture.absolute(), project=options.project.absolute())
     if not is_project(options.project) or read_settings(options.project) != planned.settings:
@@ -57,8 +57,9 @@ def _said(jobs: ClipJobs) -> list[str]:
     limits = f"{duration_text(jobs.reference_s)} for the reference clip, {duration_text(jobs.source_s)} for each other"
     if not jobs.is_time_known:
         limits = f"{duration_text(jobs.reference_s)} for each clip, since no forecast of the time is possible yet"
+    others = {0: "and no other", 1: "then 1 other"}.get(len(jobs.sources), f"then {len(jobs.sources)} others")
     said = [
-        f"The reference clip {jobs.reference}, then {len(jobs.sources)} others; each takes {jobs.n_cpus} cores and "
+        f"The reference clip {jobs.reference}, {others}; each takes {jobs.n_cpus} core{'s' * (jobs.n_cpus > 1)} and "
         f"{memory_text(jobs.memory_mb)}. Time limits: {limits}."
     ]
     if jobs.skipped:

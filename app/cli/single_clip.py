@@ -42,10 +42,8 @@ def train_single_clip(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_clip(options)
     clips, clip_index = project.clips(capture.n_frames), options.clip
-    if project.settings.is_growing and clip_index >= len(clips):
+    if clip_index >= len(clips):  # of a capture that grows
         return fail(EXIT_NOT_READY, f"Clip {clip_index} is still being recorded: {len(clips)} clips are complete.")
-    if not 0 <= clip_index < len(clips):
-        raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(clips) - 1}.")
     holdout = capture.camera_indices(project.settings.holdout)
     needed = needed_clips(project, clip_index)
     is_chained = project.settings.config().follows_previous  # then it stands on all that are before it
@@ -87,7 +85,7 @@ def _claim(service: TrainingService, clip_index: int, line: ProgressLine) -> Non
             if error.is_sure:
                 raise
             if not is_told:
-                line.say(f"Clip {clip_index}: {error.message} Watching for a minute whether it lives.")
+                line.say(f"Clip {clip_index}: {error.message} Waiting for up to a minute for a sign of life.")
                 service.claims.watch()
                 is_told = True
             time.sleep(LOOK_EVERY_S)

@@ -12,7 +12,8 @@ from app.cli.arguments import (
     EXIT_FAILED,
     EXIT_NOT_READY,
     EXIT_OK,
-    count_argument,
+    EXIT_STOPPED,
+    count_of,
     fail,
     parse_range,
 )
@@ -57,15 +58,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--clip",
         type=int,
         metavar="K",
-        help="train this clip only, beside other processes and computers that train others; does nothing if it is "
-        f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it",
+        help="train this clip only, while other processes and computers train others; nothing happens if it is "
+        f"trained. Exit code {EXIT_NOT_READY}: its reference is not trained yet, or another process trains it; "
+        f"{EXIT_STOPPED}: somebody stopped it",
     )
     command.add_argument(
         "--workers",
-        type=count_argument,
+        type=count_of("clips"),
         metavar="N",
-        help="train N clips side by side, on as many cores and in as much memory as there is (default: 1); with "
-        "--plan, what N machines would cost",
+        help="train N clips side by side, at most one per core, if memory suffices (default: 1); with --plan, forecast "
+        "what N workers cost",
     )
     command.add_argument(
         "--again",
@@ -121,6 +123,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     _check_price(options)
     if options.plan:
+        _check_plan(options)
         return _plan(options)
     environment_of(options.cpu)  # refused before a project is made
     if options.clip is not None:
@@ -192,9 +195,8 @@ def _train(
             line.say(f"Note: {sentence}")
         table = SequenceTable(line, project, to_train, sequence)
         has_others = cluster is not None or sequence.together.n_workers > 1
-        # a plan of each looks at pictures, and is of a clip that is trained alone on all cores
-        is_planned = not (options.quiet or has_others)
-        plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=not is_planned)
+        is_quiet = options.quiet or has_others  # plans look at pictures, and are of clips that have all cores
+        plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=is_quiet)
 
         def show(status: TrainingStatus) -> None:
             if cluster is not None:
@@ -230,6 +232,16 @@ def _check_price(options: argparse.Namespace) -> None:
     if price is not None and not (options.plan and 0 <= price < math.inf):
         problem = f"is {price}" if options.plan else "is of a plan"
         raise ProjectError(f"--price-per-hour {problem}.", hint="Give a price of 0 or more together with --plan.")
+
+
+def _check_plan(options: argparse.Namespace) -> None:
+    instead = {
+        "clip": f"Write --clips {options.clip} for the plan of that clip.",
+        "cluster": "Write --workers N for what N workers cost.",
+    }
+    for name, hint in instead.items():
+        if getattr(options, name) is not None:
+            raise ProjectError(f"--plan cannot be combined with --{name}.", hint=hint)
 
 
 def _plan(options: argparse.Namespace) -> int:

@@ -96,9 +96,10 @@ class Cluster:
         """Sentences about its computers without a full stop, for the user."""
         usable = [node for node in self.nodes if node.is_usable]
         copied = [node.name for node in usable if not node.sees_project]
-        found = [f"the cluster trains {self.n_slots} clips side by side, on {len(usable)} computers"]
+        n, of = self.n_slots, len(usable)
+        found = [f"the cluster trains {n} clip{'s' * (n > 1)} at once, on {of} computer{'s' * (of > 1)}"]
         if copied:
-            found.append(f"{', '.join(copied)} cannot see the project, and gets copies of what it needs")
+            found.append(f"what a clip needs is copied to {', '.join(copied)}, where the project cannot be seen")
         return found
 
     @property

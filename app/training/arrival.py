@@ -1,4 +1,4 @@
-"""Arrival: a finished clip on its way from its worker to its place in the project, under the project's lock."""
+"""Arrival: a finished clip on its way from its worker to its place in the project, for whoever has claimed it."""
 
 from __future__ import annotations
 

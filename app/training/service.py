@@ -435,8 +435,6 @@ class TrainingService:
             case "stop":
                 for run in self._chosen(clip_index):
                     run.stop()
-            case "look":
-                self.snapshot_now(clip_index)
 
     def _is_finished_since(self, clip_index: int) -> bool:
         """Read a clip's files again. Whether another process has finished it since they were read; it waits no more."""

@@ -62,12 +62,12 @@ def machine_text(one: RunningClip) -> str:
 
 
 def whole_words(n_clips: int, training: TrainingStatus, queue: QueueStatus) -> str:
-    """How far all of it is: "12 of 40 clips, 3 training on 2 computers, about 1 h 20 min left"."""
+    """How far all of it is: "12 of 40 clips trained, 3 in training on 2 computers, about 1 h 20 min left"."""
     left = 0 if queue.everything is None else queue.everything.n_clips
     machines = {one.machine for one in training.trainings if one.machine}
     where = f" on {len(machines)} computers" if len(machines) > 1 else ""
-    parts = [f"{format_count(n_clips - left)} of {format_count(n_clips)} clips"]
-    parts += [f"{len(training.trainings)} training{where}"] if training.trainings else []
+    parts = [f"{format_count(n_clips - left)} of {format_count(n_clips)} clips trained"]
+    parts += [f"{len(training.trainings)} in training{where}"] if training.trainings else []
     seconds = None if queue.queued is None else queue.queued.seconds
     parts += [] if seconds is None else [f"about {duration_text(seconds)} left"]
     return ", ".join(parts)

@@ -6,7 +6,7 @@ import argparse
 import math
 import time
 
-from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, add_follow_links, fail, path_argument
+from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK, add_follow_links, count_of, fail, path_argument
 from app.cli.chosen_project import open_for_training
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
@@ -33,6 +33,7 @@ from engine.capture.capture import Capture, open_capture
 from engine.capture.growing.watch import END_FILE, PATIENCE_S
 from engine.errors import CaptureError
 from engine.storage.json_files import json_text
+from engine.text import shown
 
 OPEN_EVERY_S = 0.5
 LOOK_EVERY_S = 0.1
@@ -55,10 +56,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         type=_seconds,
         default=UNTIL_IDLE_S,
         metavar="S",
-        help=f"the recording has ended after S seconds without a new frame (default: {UNTIL_IDLE_S:g}; inf for never); "
+        help=f"the recording has ended after S seconds without a new frame (default: {UNTIL_IDLE_S:g}; inf: never); "
         f"a file called {END_FILE} in the capture folder ends it at once",
     )
-    command.add_argument("--end-at", type=int, metavar="N", help="the recording ends after N frames")
+    command.add_argument("--end-at", type=count_of("frames"), metavar="N", help="the recording ends after N frames")
     add_follow_links(command)
     add_training_settings(command)
     command.add_argument("--seed", type=int, help="seed of initial values and of the order of pictures (default: 0)")
@@ -200,7 +201,10 @@ def _first_frames(
 
 
 def _seconds(text: str) -> float:
-    seconds = float(text)
-    if math.isnan(seconds) or seconds <= 0.0:
-        raise ValueError(text)
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a number of seconds above 0")
     return seconds

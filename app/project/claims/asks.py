@@ -10,8 +10,8 @@ from app.project.claims.claim_files import CLAIMS
 from engine.storage.files import atomic_path, disk_error
 from engine.storage.json_files import JsonError, json_text, read_json_object
 
-Ask = Literal["pause", "resume", "stop", "look"]
-"""Hold the training, resume it, end it and keep progress; or show it, for somebody looks at its clip now."""
+Ask = Literal["pause", "resume", "stop"]
+"""Hold the training, resume it, or end it and keep progress."""
 _ASKS: dict[str, Ask] = {ask: ask for ask in get_args(Ask)}
 _MAX_BYTES = 1000
 

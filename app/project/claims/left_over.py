@@ -24,7 +24,7 @@ def check_unclaimed(folder: Path) -> None:
     """
     for key, holder in live_claims(folder).items():
         raise ProjectError(
-            f"{holder_words(holder)} trains clip {key.lstrip('0') or '0'} of this project.",
+            f"{holder_words(holder)} trains {_named(key)} of this project.",
             hint="Stop it there first, or wait for it. If nothing runs there, remove the folder.",
             path=folder / "claims",
         )
@@ -42,6 +42,12 @@ def sweep_claims(folder: Path) -> None:
             holder = read_holder(path)
             if holder is not None and holder.is_gone:
                 path.unlink(missing_ok=True)
+
+
+def _named(key: str) -> str:
+    """A clip as people call it: by its number, or by its frames where clips were split or merged."""
+    first, _, stop = key.partition("-")
+    return f"the clip of frames {int(first)} to {int(stop) - 1}" if stop else f"clip {int(first)}"
 
 
 def _claims(folder: Path) -> dict[str, ClaimFile]:

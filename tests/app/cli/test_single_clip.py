@@ -104,7 +104,7 @@ def test_a_clip_of_a_computer_that_died_is_taken_over_after_a_while(train: Run, 
     monkeypatch.setattr(single_clip, "LOOK_EVERY_S", 0.02)
     code, _, err = train(1)
     assert code == 0, err
-    assert "computer render-7 (process 1) trains this clip. Watching for a minute whether it lives." in err
+    assert "computer render-7 (process 1) trains this clip. Waiting for up to a minute for a sign of life." in err
     assert list_claims(tmp_path / "p") == {}
 
 

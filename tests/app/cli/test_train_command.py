@@ -63,6 +63,10 @@ def test_trained_clips_are_not_trained_again(run, capture_folder, tmp_path):
         (["--set", "ssim_weight=5"], "between 0 and 1"),
         (["--set", "joint_steps=many"], "has to be a whole number"),
         (["--set", "independent=maybe"], "has to be true or false"),
+        (["--clip", "1"], "There is no clip 1; clips are 0 to 0."),
+        (["--plan", "--clip", "0"], "--plan cannot be combined with --clip. Write --clips 0 "),
+        (["--plan", "--cluster", "auto"], "--plan cannot be combined with --cluster. Write --workers N "),
+        (["--cluster", "local:2", "--workers", "2"], "--cluster cannot be combined with --workers."),
     ],
 )
 def test_bad_arguments_end_with_2_and_leave_nothing_behind(run, capture_folder, tmp_path, arguments, expected):

@@ -163,7 +163,7 @@ def test_real_processes_and_one_that_is_killed(project: Path, tmp_path: Path, mo
 @pytest.mark.parametrize("text", ["0", "-1", "two", ""])
 def test_a_number_of_processes_that_is_none_is_bad_input(project: Path, text: str, capsys) -> None:
     assert main(["eval", str(project), "--json", "-", f"--workers={text}"]) == 2
-    assert "is not a count from 1" in capsys.readouterr().err
+    assert "is not a number of processes, 1 or more" in capsys.readouterr().err
 
 
 def _forget(project: Path) -> None:

@@ -203,6 +203,20 @@ def test_the_command_line_follows_and_says_what_is_wrong(run, source: Capture, t
     assert not (tmp_path / "r").exists()
 
 
+@pytest.mark.parametrize(
+    ("option", "expected"),
+    [
+        ("--patience=soon", "'soon' is not a number of seconds above 0"),
+        ("--until-idle=nan", "'nan' is not a number of seconds above 0"),
+        ("--end-at=0", "'0' is not a number of frames, 1 or more"),
+    ],
+)
+def test_limits_that_are_not_valid_are_refused(run, tmp_path: Path, option: str, expected: str) -> None:
+    code, _, err = run("follow", tmp_path / "c", "--project", tmp_path / "p", option)
+    assert code == 2
+    assert expected in err
+
+
 @pytest.mark.slow
 def test_memory_and_disk_stay_flat_over_hundreds_of_clips(source: Capture, tmp_path: Path) -> None:
     show = Show(source, tmp_path)

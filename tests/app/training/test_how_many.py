@@ -90,7 +90,7 @@ def test_the_command_refuses_what_memory_cannot_hold_and_leaves_nothing(run, cap
 def test_a_number_of_workers_is_one_or_more(run, capture_folder, tmp_path, text):
     code, _, err = run("train", capture_folder, "--project", tmp_path / "p", f"--workers={text}")
     assert code == 2
-    assert "is not a count from 1" in err
+    assert "is not a number of clips, 1 or more" in err
 
 
 @pytest.mark.parametrize("n_workers", [1, 2])

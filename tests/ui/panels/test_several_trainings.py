@@ -184,5 +184,5 @@ def test_words_hold_what_is_known() -> None:
     assert running_words(THIRD, is_short=True) == "desk, worker 2: Finding what moves"
     status = replace(several().training, trainings=(HERE, THERE, THIRD))
     words = whole_words(40, status, QueueStatus(queued=SequenceForecast(9, 0, 4800.0)))
-    assert words == "40 of 40 clips, 3 training on 2 computers, about 1 h 20 min left"
-    assert whole_words(40, TrainingStatus(), QueueStatus(everything=SequenceForecast(28))) == "12 of 40 clips"
+    assert words == "40 of 40 clips trained, 3 in training on 2 computers, about 1 h 20 min left"
+    assert whole_words(40, TrainingStatus(), QueueStatus(everything=SequenceForecast(28))) == "12 of 40 clips trained"

@@ -124,9 +124,10 @@ def _draw_whole(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
         n_all = queue.n_done + queued.n_clips
         text_wrapped_dim(f"{queue.n_done} of {n_all} done, {format_count(queued.n_steps)} steps left")
     if session.training.state not in ("idle", "failed") and queue.waiting:
-        is_toggled, is_wanted = imgui.checkbox("Hold after this clip", queue.is_ending_after)
+        which = "this clip" if session.training.n_running < 2 else "the next finished clip"
+        is_toggled, is_wanted = imgui.checkbox(f"Hold after {which}###hold", queue.is_ending_after)
         ui.mark("queue.stop_after")
-        imgui.set_item_tooltip("Stops after this clip, until you resume (Ctrl+Shift+T)")
+        imgui.set_item_tooltip(f"No clip begins after {which}, until you resume (Ctrl+Shift+T)")
         if is_toggled:
             dispatch(StopAfterClip(is_wanted))
 

@@ -147,7 +147,7 @@ def _draw_machines(machines: tuple[MachineStatus, ...], ui: UiState) -> None:
         name = f"{machine.name}, here" if machine.is_here else machine.name
         imgui.text(name if imgui.calc_text_size(name).x <= room else elided(machine.name, room))
         imgui.set_item_tooltip(
-            f"{name}, {clips_text(machine.n_clips)} in training.\nThe load is how many processes want to run."
+            f"{name}, {clips_text(machine.n_clips)} in training.\nLoad: processes that want to run, in the last minute."
         )
         ui.mark(f"running.computer{place}")
         text_right(words)

@@ -13,8 +13,8 @@ WORKERS_WIDTH = 104.0
 ADDRESS_WIDTH = 300.0
 POPUP = "cluster"
 ADDRESSES = (
-    '"auto" joins the cluster that this computer is part of, HOST:PORT one elsewhere, and local:N starts one here for '
-    "N clips side by side. See docs/cluster.md."
+    '"auto" joins the Ray cluster that runs on this computer, HOST:PORT the one at that address, which this computer '
+    "has to be part of; local:N starts one here for N clips side by side. See docs/cluster.md."
 )
 
 

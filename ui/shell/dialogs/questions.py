@@ -285,7 +285,8 @@ def leaving_texts(question: LeaveQuestion) -> list[str]:
     if question.n_waiting:
         waiting = " 1 clip that waits" if question.n_waiting == 1 else f" {question.n_waiting} clips that wait"
         waiting += " will have to be queued again."
-    others = f" Clips that train beside it: {question.n_beside}." if question.n_beside else ""
+    n = question.n_beside
+    others = f" {n} other {'clip trains' if n == 1 else 'clips train'}, too." if n else ""
     it = "all of them; their" if others else "it; its"
     return [
         f"Clip {question.clip_index} is being trained{step}.{others} Opening {question.name} stops {it} progress is "

@@ -176,6 +176,12 @@ def test_containers_of_one_computer_do_not_count_each_others_processes(tmp_path:
     assert pid_space() != "pid:[1]"
 
 
+def test_a_clip_that_was_cut_otherwise_is_named_by_its_frames(tmp_path: Path) -> None:
+    make(tmp_path).take("000030-000035")
+    with pytest.raises(ProjectError, match="trains the clip of frames 30 to 34 of this project"):
+        check_unclaimed(tmp_path)
+
+
 def test_what_others_train_is_seen_and_they_can_be_asked(tmp_path: Path) -> None:
     far_away(tmp_path)
     claims, other = make(tmp_path), make(tmp_path)
