@@ -199,7 +199,8 @@ class Cluster:
         """Ask a computer, once more, whether it sees the project; it gets no clips before it has answered."""
         settings = self.project.settings
         look = self._ray.remote(look_around).options(**node.pinned(num_cpus=0, max_retries=0))
-        answer = look.remote(str(self._probe), self._nonce, settings.capture, settings.follow_links)
+        seen = settings.capture, settings.follow_links, settings.is_growing
+        answer = look.remote(str(self._probe), self._nonce, *seen)
         with self._guard:
             node.sees_project = None
             self._looks[answer] = node, time.monotonic()

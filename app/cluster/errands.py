@@ -84,7 +84,7 @@ class CopiedProject:
                     remote.call("build", _names([*contents, *progress]), job.key)
             except OSError as error:
                 raise CaptureError(f"A file cannot be read ({error.strerror}).", path=error.filename) from error
-        if remote.call("fingerprint") != job.fingerprint:
+        if remote.call("fingerprint", project.settings.is_growing) != job.fingerprint:
             raise CaptureError("The copy of the capture is not understood as the capture is here.")
         log = there / "project" / "logs" / self._files.log.name
         return replace(self._task, project=there / "project", capture=there / "capture", log=log)

@@ -43,11 +43,12 @@ def _answered(method: Callable[..., Any]) -> Callable[..., Answer]:
     return answer
 
 
-def look_around(probe: str, nonce: str, capture: str, follow_links: bool) -> dict[str, Any]:
+def look_around(probe: str, nonce: str, capture: str, follow_links: bool, is_growing: bool) -> dict[str, Any]:
     """Describe this computer: cores, versions, and whether it sees the project and the capture.
 
     Args:
         probe: A file of the project that holds the nonce.
+        capture, follow_links, is_growing: See ProjectSettings.
     Returns:
         "sees": whether both are here, "fingerprint" of the capture, and "why" not.
     """
@@ -55,7 +56,7 @@ def look_around(probe: str, nonce: str, capture: str, follow_links: bool) -> dic
     try:
         if Path(probe).read_text("ascii") != nonce:
             return found | {"why": "another project lies in its place"}
-        seen = open_capture(Path(capture), follow_links=follow_links)
+        seen = open_capture(Path(capture), follow_links=follow_links, is_growing=is_growing)
         fingerprint = seen.fingerprint
         seen.close()
     except (OSError, ValueError, EngineError) as error:
@@ -155,9 +156,9 @@ class Runner:
         return self._copy.build(names, key)
 
     @_answered
-    def fingerprint(self) -> str:
+    def fingerprint(self, is_growing: bool) -> str:
         """Of the capture that was copied. Refused where it cannot be opened."""
-        capture = open_capture(self._copy.capture)
+        capture = open_capture(self._copy.capture, is_growing=is_growing)
         capture.close()
         return capture.fingerprint
 

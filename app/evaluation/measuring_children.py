@@ -106,7 +106,13 @@ def main(task: EvaluationTask, parent: Parent[FigureEvent]) -> None:
     choose_backend(task.backend)
     warm_cache()  # or several processes would compile the same
     project = open_project(Path(task.project), is_writable=False)
-    capture = open_capture(task.capture, scale=task.scale, frames=task.frames, follow_links=task.follow_links)
+    capture = open_capture(
+        task.capture,
+        scale=task.scale,
+        frames=task.frames,
+        follow_links=task.follow_links,
+        is_growing=project.settings.is_growing,
+    )
     opened, measuring = open_trained(project, capture).measured, ClipMeasuring(task.n_threads)
     while True:
         wanted = parent.receive(POLL_S)

@@ -16,9 +16,12 @@ from app.cluster.contents import HEAD_BYTES, contents_of, job_key
 from app.cluster.mirror import Mirror, file_digest
 from app.cluster.nodes import Node, take_seat
 from app.cluster.versions import difference, versions
+from app.project.opening.project_access import create_project, default_settings
 from app.training.jobs import train_job
+from engine.capture.capture import open_capture
 from engine.errors import DiskError, EngineError, ProjectError
-from tests.app.fakes import write_trained
+from tests.app.fakes import write_capture, write_trained
+from tests.faults.record import Recorder
 
 
 def put(mirror: Mirror, folder: Path, data: bytes) -> str:
@@ -112,6 +115,26 @@ def test_of_pictures_only_those_of_the_clip_are_sent_in_full(make_opened, tmp_pa
     assert job_key(opened.project, jobs[0]) != job_key(opened.project, jobs[1])
     again = replace(jobs[0], claim="c" * 32, n_beside=7, n_everywhere=9, n_threads=3)
     assert job_key(opened.project, again) == job_key(opened.project, jobs[0]), "another process continues with its copy"
+
+
+def test_a_copy_of_a_capture_that_was_followed_is_understood_like_it(tmp_path: Path) -> None:
+    source = open_capture(write_capture(tmp_path / "source"))
+    recorder = Recorder(source, tmp_path / "c", lost=[("2", 4)])
+    for tick in range(source.n_frames):
+        recorder.write(tick)
+    capture = open_capture(tmp_path / "c", is_growing=True)
+    settings = default_settings(capture, clip_length=3, overrides={"backgrounds": "clip"})
+    project = create_project(tmp_path / "p", settings)
+    job = train_job(project, project.clips(capture.n_frames)[0], holdout=(0,))
+    (tmp_path / "made").mkdir()
+    contents = contents_of(project, capture, job, tmp_path / "made", is_whole=False)
+    assert "capture/ims/2/000004.jpg" not in [content.name for content in contents]
+    mirror = Mirror("a", tmp_path / "m")
+    for content in contents:
+        mirror.put([(content.digest, 0, content.path.read_bytes()[: content.n_bytes], True)])
+    mirror.build([(content.name, content.digest) for content in contents], job.key)
+    assert open_capture(mirror.capture, is_growing=True).fingerprint == job.fingerprint
+    project.close()
 
 
 # ---------------------------------------------------------------- places and addresses
