@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import secrets
-import signal
 import socket
 import threading
 from contextlib import ExitStack
@@ -20,7 +19,7 @@ AUTO = "auto"
 _LOCAL = re.compile(r"local:(\d{1,5})")
 _ADDRESS = re.compile(r"(?P<host>[^:/\s]+|\[[0-9a-fA-F:]+\]):(?P<port>\d{1,5})")
 REACH_TIMEOUT_S = 5.0
-CONNECT_TIMEOUT_S = 15.0
+CONNECT_TIMEOUT_S, START_TIMEOUT_S = 15.0, 90.0
 STORE_BYTES = 80 << 20
 """Of Ray's object store where we start it: messages and parts of files pass through it, nothing stays."""
 _MAX_TEMPORARY = 40
@@ -49,37 +48,33 @@ def connect(address: str, kept: ExitStack) -> None:
             f"--cluster is '{address}', which is not the address of a cluster.",
             hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
         )
-    before = signal.getsignal(signal.SIGTERM)
     try:
-        if local is not None:
-            ray_library().init(**options)  # here: what a thread starts ends with that thread
-        else:
-            _init_in_time(address, options)
+        _init(address, options, START_TIMEOUT_S if local is not None else CONNECT_TIMEOUT_S, kept)
     except EngineError:
         raise
     except Exception as error:
         raise _refused(address, error) from error
-    finally:
-        if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, before)
 
 
-def _init_in_time(address: str, options: dict[str, Any]) -> None:
-    """On a thread: where something else than Ray answers, it waits for minutes and hears no signal."""
+def _init(address: str, options: dict[str, Any], timeout_s: float, kept: ExitStack) -> None:
+    """On a thread of its own, since something else than Ray may answer, for which it waits for minutes and hears no
+    signal. The thread lives as long as the cluster: processes that Ray starts end with the thread that started them."""
     failed: list[Exception] = []
+    is_ready, is_over = threading.Event(), threading.Event()
 
     def work() -> None:
         try:
             ray_library().init(**options)
         except Exception as error:  # noqa: BLE001 - handed to the thread that waits
             failed.append(error)
+        is_ready.set()
+        is_over.wait()
 
-    thread = threading.Thread(target=work, name="connecting", daemon=True)
-    thread.start()
-    thread.join(CONNECT_TIMEOUT_S)
-    if thread.is_alive():
+    kept.callback(is_over.set)
+    threading.Thread(target=work, name="connection", daemon=True).start()
+    if not is_ready.wait(timeout_s):
         raise TrainingError(
-            f"No Ray cluster answers at {address} within {CONNECT_TIMEOUT_S:.0f} s.",
+            f"No Ray cluster answers at {address} within {timeout_s:.0f} s.",
             hint="Check the address and, where the cluster asks for one, the token (RAY_AUTH_TOKEN_PATH).",
         )
     if failed:

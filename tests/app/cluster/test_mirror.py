@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -178,6 +180,22 @@ def test_an_address_that_is_none_is_bad_input(address: str) -> None:
 def test_an_address_at_which_nothing_listens_is_said_at_once(address: str) -> None:
     with pytest.raises(EngineError, match=rf"The cluster at {address} cannot be reached"):
         connect(address, SimpleNamespace())  # pyright: ignore[reportArgumentType]
+
+
+def test_a_cluster_that_a_thread_has_started_outlives_that_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes of Ray end with the thread that started them, and the window joins on one that ends then."""
+    started_by: list[threading.Thread] = []
+    ray = SimpleNamespace(init=lambda **_: started_by.append(threading.current_thread()))
+    monkeypatch.setattr("app.cluster.connecting.ray_library", lambda: ray)
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    with ExitStack() as kept:
+        thread = threading.Thread(target=connect, args=("local:1", kept))
+        thread.start()
+        thread.join(60)
+        assert started_by[0].is_alive()
+        assert not thread.is_alive()
+    started_by[0].join(60)
+    assert not started_by[0].is_alive()
 
 
 def test_without_ray_the_remedy_is_said(make_opened, monkeypatch: pytest.MonkeyPatch) -> None:
