@@ -9,11 +9,12 @@ import pytest
 
 from app.cli.cli import main
 from app.plan import side_by_side as module
-from app.plan.side_by_side import SideBySide, plan_here, side_by_side
+from app.plan.side_by_side import PlannedClips, SideBySide, plan_here, side_by_side
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
 from app.training.process import ProcessWorker
 from engine.errors import ProjectError
+from engine.training.plan.plan import TrainingPlan
 from tests.app.fakes import write_trained
 from tests.app.training.test_train_queue import six
 
@@ -74,6 +75,12 @@ def test_the_reference_clip_comes_alone_and_does_not_count(six: OpenedProject, m
     assert plan_here(six.project, six.capture, [], catalog, 8).together == SideBySide(1)
     write_trained(six, 0)
     assert plan_here(six.project, six.capture, six.clips[1:4], catalog, 2).together == SideBySide(2)
+
+
+def test_clips_take_longer_next_to_others_but_the_reference_clip_comes_alone(six: OpenedProject) -> None:
+    plan = TrainingPlan(1, 0, 1, "source", 100, (), 5.0, 40.0, 1.0, 2.0)
+    planned = PlannedClips(SideBySide(4), {(False, 1): plan, (True, 1): plan}, times_longer=2.0)
+    assert [planned.expected_s(six.project, clip) for clip in six.clips[:2]] == [45.0, 90.0]
 
 
 def test_the_command_refuses_what_memory_cannot_hold_and_leaves_nothing(run, capture_folder, tmp_path, monkeypatch):
