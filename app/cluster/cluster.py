@@ -1,4 +1,4 @@
-"""Cluster: the computers that Ray knows, looked at before they get clips, and watched while they train them."""
+"""Cluster: the computers that Ray knows, looked at before they get clips, and watched while they work on them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from contextlib import ExitStack, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from app.cluster.nodes import Node, Seat, take_seat
+from app.cluster.nodes import TRAINING, ClusterUse, Node, Seat, take_seat
 from app.cluster.ray_library import check_ray, ray_library
 from app.cluster.runner import look_around
 from app.cluster.versions import difference
@@ -46,19 +46,22 @@ class Cluster:
 
     Args:
         address: "auto", "HOST:PORT" of a running cluster of which this computer is part, or "local:N".
-        project, capture: What is trained.
+        project, capture: What is trained, or measured.
         n_bytes: Memory of a training.
+        use: What it is for.
 
     Attributes:
         bytes_sent, bytes_received: Of clips that were trained where the project is not seen, by clip.
 
     Raises:
-        ProjectError: Ray is not installed, the address is wrong, or no computer can train.
+        ProjectError: Ray is not installed, the address is wrong, or no computer can be used.
         TrainingError: The cluster does not answer.
     """
 
-    def __init__(self, address: str, project: Project, capture: Capture, *, n_bytes: int) -> None:
-        self.project, self.capture, self.n_bytes = project, capture, n_bytes
+    def __init__(
+        self, address: str, project: Project, capture: Capture, *, n_bytes: int, use: ClusterUse = TRAINING
+    ) -> None:
+        self.project, self.capture, self.n_bytes, self._use = project, capture, n_bytes, use
         self.bytes_sent: dict[int, int] = {}
         self.bytes_received: dict[int, int] = {}
         self._nodes: dict[str, Node] = {}
@@ -110,7 +113,8 @@ class Cluster:
         """Sentences about its computers without a full stop, for the user."""
         usable = [node for node in self.nodes if node.is_usable]
         copied = [node.name for node in usable if not node.sees_project]
-        found = [f"the cluster trains {self.n_slots} clips side by side, on {len(usable)} computers"]
+        verb, things = self._use.verb, self._use.things
+        found = [f"the cluster {verb}s {self.n_slots} {things} side by side, on {len(usable)} computers"]
         if copied:
             found.append(f"{', '.join(copied)} cannot see the project, and gets copies of what it needs")
         return found
@@ -132,11 +136,11 @@ class Cluster:
             return take_seat(self._nodes.values(), self.n_bytes, n_beside=n_beside, avoided=avoided)
 
     def refuse(self, node: Node, why: str) -> None:
-        """A computer gets no more clips. why: Follows its name, without a full stop."""
+        """A computer is not used any more. why: Follows its name, without a full stop."""
         with self._guard:
             if not node.refused:
                 node.refused = why
-                self._note(f"{node.name} gets no clips: it {why}")
+                self._note(f"{node.name} gets no {self._use.things}: it {why}")
 
     def take_notes(self) -> list[str]:
         """What happened to computers since the last call, in sentences without a full stop."""
@@ -153,7 +157,8 @@ class Cluster:
     def _nobody(self) -> EngineError:
         said = [f"{node.name} {node.refused or 'is gone'}" for node in self._nodes.values()]
         listed = "; ".join(dict.fromkeys(said)) or "it has none with free cores"
-        return TrainingError(f"No computer of the cluster can train clips: {listed}.", hint="Progress is kept.")
+        what = f"{self._use.verb} {self._use.things}"
+        return TrainingError(f"No computer of the cluster can {what}: {listed}.", hint="Progress is kept.")
 
     # ---------------------------------------------------------------- looking
 
@@ -192,7 +197,7 @@ class Cluster:
         node = self._nodes.get(found["NodeID"])
         if node is not None:
             if node.is_alive and not found["Alive"]:
-                self._note(f"{node.name} is gone; its clips resume elsewhere")
+                self._note(f"{node.name} is gone; its {self._use.things} resume elsewhere")
             node.is_alive = found["Alive"]
             return
         resources = found.get("Resources", {})
@@ -207,7 +212,9 @@ class Cluster:
         """Ask a computer, once more, whether it sees the project; it gets no clips before it has answered."""
         settings = self.project.settings
         look = self._ray.remote(look_around).options(**node.pinned(num_cpus=0, max_retries=0))
-        answer = look.remote(str(self._probe), self._nonce, settings.capture, settings.follow_links)
+        answer = look.remote(
+            str(self._probe), self._nonce, settings.capture, settings.follow_links, settings.is_growing
+        )
         with self._guard:
             node.sees_project = None
             self._looks[answer] = node, time.monotonic()
@@ -220,14 +227,18 @@ class Cluster:
             self.refuse(node, "could not run ClipGStream, which has to be installed there in the same version")
             return
         node.n_cores = min(node.n_cores, found["cores"])
-        node.sees_project = found["sees"] and found["fingerprint"] == self.project.settings.fingerprint
+        is_same = found["fingerprint"] == self.project.settings.fingerprint
+        node.sees_project = found["sees"] and is_same
+        why = found.get("why", "" if is_same else "the capture is another one there")
         other = difference(found["versions"])
         if other:
             self.refuse(node, other)
+        elif why and self._use.needs_project:
+            self.refuse(node, f"does not see the project and its capture ({why})")
         elif node.n_slots(self.n_bytes) < 1:
             has, needs = node.memory_bytes / 1e9, self.n_bytes / 1e9
-            self.refuse(node, f"has {has:.1f} GB of memory, and a clip takes about {needs:.1f} GB")
-        logger.info("%s: %d cores, %s", node.name, node.n_cores, found.get("why", "sees project and capture"))
+            self.refuse(node, f"has {has:.1f} GB of memory, and {self._use.each} takes about {needs:.1f} GB")
+        logger.info("%s: %d cores, %s", node.name, node.n_cores, why or "sees project and capture")
 
     def document(self) -> dict[str, Any]:
         """For `train --json`."""
@@ -253,19 +264,15 @@ def connect(address: str, kept: ExitStack) -> None:
         ProjectError: The address is wrong, or nothing runs there.
         TrainingError: It does not answer.
     """
+    check_address(address)
     options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     local = _LOCAL.fullmatch(address)
     if local is not None:
         options |= _local_options(int(local[1]), kept)
-    elif address == AUTO or _ADDRESS.fullmatch(address):
+    else:
         options["address"] = address
         if address != AUTO:
             _check_reachable(address)
-    else:
-        raise ProjectError(
-            f"--cluster is '{address}', which is not the address of a cluster.",
-            hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
-        )
     before = signal.getsignal(signal.SIGTERM)
     try:
         if local is not None:
@@ -279,6 +286,15 @@ def connect(address: str, kept: ExitStack) -> None:
     finally:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, before)
+
+
+def check_address(address: str) -> None:
+    """Check that an address is one of a cluster, wherever that is. Raises ProjectError."""
+    if address != AUTO and not _LOCAL.fullmatch(address) and not _ADDRESS.fullmatch(address):
+        raise ProjectError(
+            f"--cluster is '{address}', which is not the address of a cluster.",
+            hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
+        )
 
 
 def _init_in_time(address: str, options: dict[str, Any]) -> None:
