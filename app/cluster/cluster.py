@@ -293,7 +293,7 @@ def check_address(address: str) -> None:
     if address != AUTO and not _LOCAL.fullmatch(address) and not _ADDRESS.fullmatch(address):
         raise ProjectError(
             f"--cluster is '{address}', which is not the address of a cluster.",
-            hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
+            hint="Write auto, HOST:PORT, or local:N for N at once on this computer.",
         )
 
 
@@ -322,7 +322,7 @@ def _init_in_time(address: str, options: dict[str, Any]) -> None:
 def _local_options(n: int, kept: ExitStack) -> dict[str, Any]:
     """Options to start Ray here: nobody else reaches it, and nobody without the token is heard."""
     if n < 1:
-        raise ProjectError("--cluster local:0 would train nothing.", hint="Write local:N with N from 1.")
+        raise ProjectError("--cluster local:0 has no cores.", hint="Write local:N with N from 1.")
     folder = kept.enter_context(child_folder("clipgstream-ray-", what="The folder of the cluster"))
     token = folder / "token"
     descriptor = os.open(token, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
