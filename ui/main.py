@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.background.logs import PrintableFormatter, start_logging
 from app.cli.arguments import PlainParser, add_backend, add_follow_links, parse, path_argument, suggestion
@@ -17,6 +18,10 @@ from engine.backends.table import AUTO, choose_backend
 from engine.errors import ProjectError
 from engine.kernels.cache import use_kernel_cache
 from ui.style.ui_scale import parse_scale
+
+if TYPE_CHECKING:
+    from app.project.opening.opened_project import OpenedProject
+    from app.session.training.cluster_joining import ClusterConnection
 
 DEMO = {"demo": "train the first two clips, then write figures, a picture of the window and a video"}
 SWITCH_INTERVAL_S = 0.0005
@@ -155,6 +160,14 @@ def _run_window(options: argparse.Namespace) -> int:
         return no_window.tell(why)
 
 
+def _join_cluster(address: str, opened: OpenedProject) -> ClusterConnection:
+    from app.cluster.joined import JoinedCluster  # Ray, which most never need
+    from app.project.clips.clip_catalog import ClipCatalog
+
+    catalog = ClipCatalog(opened.project, len(opened.clips))
+    return JoinedCluster(address, opened.project, opened.capture, opened.clips, catalog)
+
+
 def _serve_window(options: argparse.Namespace) -> int:
     import pyglet
 
@@ -175,7 +188,7 @@ def _serve_window(options: argparse.Namespace) -> int:
         preferences.values.choose_backend()
     if "ui_scale" in options:
         memory.ui_scale = options.ui_scale
-    session = Session()
+    session = Session(connect=_join_cluster)
     try:
         window = StudioWindow(session, width=width, height=height, memory=memory, preferences=preferences)
     except BaseException:

@@ -89,12 +89,7 @@ def open_for_clip(options: argparse.Namespace) -> tuple[Project, Capture]:
     """
     settings, stored, capture = _chosen_settings(options)
     if stored is None:
-        try:
-            create_project(options.project, settings).close()
-        except DiskError:
-            raise
-        except ProjectError:
-            _wait_for_project(options.project)
+        _make_project(options.project, settings)
         settings, stored, capture = _chosen_settings(options)
     assert stored is not None
     changed = [name for name in _OF_TRAINING if getattr(settings, name) != getattr(stored, name)]
@@ -109,13 +104,20 @@ def open_for_clip(options: argparse.Namespace) -> tuple[Project, Capture]:
     return project.placed(settings.capture, follow_links=settings.follow_links), capture
 
 
-def _wait_for_project(folder: Path) -> None:
-    """Wait until another process has made the project; raises ProjectError if none does."""
-    for _ in range(_N_LOOKS):
-        if (folder / PROJECT_FILE).is_file():
+def _make_project(folder: Path, settings: ProjectSettings) -> None:
+    """Make a project, or wait until another process has, which may also die of it. Raises as `create_project` does."""
+    for n_left in reversed(range(_N_LOOKS)):
+        try:
+            create_project(folder, settings).close()
             return
+        except DiskError:
+            raise
+        except ProjectError:
+            if (folder / PROJECT_FILE).is_file():
+                return
+            if not n_left:
+                raise
         time.sleep(_LOOK_EVERY_S)
-    read_settings(folder)
 
 
 def project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:

@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import math
 from collections.abc import Sequence
-from functools import partial
 
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
@@ -29,10 +28,9 @@ from app.cli.terminal.training_lines import (
     show_status,
 )
 from app.cluster.cluster import Cluster
-from app.cluster.cluster_worker import ClusterWorker
+from app.cluster.joined import JoinedCluster
 from app.document.storing.document_file import PROJECT_FILE
 from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
-from app.plan.forecasts import plans_of_kinds
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.sequence import plan_sequence, sequence_text
 from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
@@ -146,11 +144,9 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         if options.cluster is None:
             sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
         else:
-            kinds = plans_of_kinds(project, capture, to_train, catalog)
-            memory_mb = max((plan.memory_mb for plan in kinds.values()), default=0.0)
-            cluster = Cluster(options.cluster, project, capture, n_bytes=int(memory_mb * 1e6))
-            launch = partial(ClusterWorker, cluster=cluster)
-            sequence = PlannedClips(SideBySide(cluster.n_slots), kinds)
+            joined = JoinedCluster(options.cluster, project, capture, to_train, catalog)
+            cluster, launch = joined.cluster, joined.launch
+            sequence = PlannedClips(SideBySide(joined.n_slots), joined.kinds)
         n_workers = sequence.together.n_workers
         service = TrainingService(
             project,

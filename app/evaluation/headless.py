@@ -39,8 +39,8 @@ TRAIN_SCHEMA = 1
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Worker failures caused by the input, not by the program."""
 POLL_EVERY_S, POLL_AT_LEAST_EVERY_S = 0.05, 1.0
-LOOKING_SHARE = 0.003
-"""Share of the time for looking at the workers: at hundreds of them less often."""
+_FEW = 16
+"""Clips in training up to which workers are looked at that often; the more there are, the less often."""
 STOP_TIMEOUT_S = 60.0
 """A step that changes the phase can take some seconds, and so can writing; neither is cut short."""
 
@@ -135,15 +135,13 @@ def train_clips(
                 begun[clip_index] = time.monotonic()
             service.go_on()
             runs = dict(service.runs)
-            looked_s = time.monotonic()
             for clip_index, event in service.poll():
                 on_event((clip_index, event))
                 if isinstance(event, ENDINGS) and clip_index in begun:
                     seconds = time.monotonic() - begun.pop(clip_index)
                     end(_outcome(service, clip_index, runs.get(clip_index), event, seconds))
             on_status(training_status(service))
-            took_s = time.monotonic() - looked_s
-            sleep(min(max(POLL_EVERY_S, took_s / LOOKING_SHARE), POLL_AT_LEAST_EVERY_S))
+            sleep(min(POLL_EVERY_S * max(len(runs) / _FEW, 1.0), POLL_AT_LEAST_EVERY_S))
     except KeyboardInterrupt:
         service.close(timeout_s=STOP_TIMEOUT_S)
         raise

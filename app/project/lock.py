@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING
 from engine.errors import ProjectError
 from engine.storage.files import atomic_path, disk_error
 from engine.storage.json_files import JsonError, read_json_object
+from engine.storage.process_space import boot_id
 from engine.text import printable
 
 if TYPE_CHECKING:
@@ -76,15 +77,6 @@ def machine_id() -> str:
                 return uuid.uuid5(uuid.NAMESPACE_OID, text).hex  # the file's own text is not for others to see
     node = uuid.getnode()
     return "" if node >> 40 & 1 else f"{node:012x}"  # that bit says that it was made up for this process
-
-
-@cache
-def boot_id() -> str:
-    """Distinguishes this run of the system's kernel, which containers share, from others. Empty where unknown."""
-    try:
-        return Path("/proc/sys/kernel/random/boot_id").read_text("ascii").strip()
-    except (OSError, ValueError):
-        return ""
 
 
 @dataclass(frozen=True, slots=True)

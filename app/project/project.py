@@ -32,6 +32,7 @@ from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import BACKUP_FILE, PROJECT_FILE
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.history_file import HISTORY_FILE
+from app.project.claims.left_over import live_claims
 from app.project.clips.clip_names import clip_name, finished_files, index_of
 from app.project.clips.clip_paths import LIVE, PREP, ClipPaths
 from app.project.clips.header_cache import HeaderCache
@@ -277,7 +278,10 @@ class Project:
             self._lock.release()
 
     def remove_files(self) -> None:
-        """Take back a project that has learned nothing: its own files and folders go, other things stay."""
+        """Take back a project that has learned nothing: its own files and folders go, other things stay. Nothing goes
+        while another process trains a clip of it."""
+        if live_claims(self.folder):
+            return
         for name in FOLDERS:
             shutil.rmtree(self.folder / name, ignore_errors=True)
         for name in (PROJECT_FILE, BACKUP_FILE, HISTORY_FILE):

@@ -370,6 +370,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.looked_at.mode_of(clip_index),
             n_beside=n_beside,
+            claim=self.claims.token,
             cpu=self._cpu,
         )
         header = read_clip_header(self.project.files(clip_index).handed_over)

@@ -2,8 +2,8 @@
 
 Threads write and read the pipes, so that neither side ever waits for a full one: what a child says is kept until
 somebody asks. A child is started as a program of its own and ends when its input does: also when this process was
-killed. It belongs to this process's group, so that Ctrl+Z in a terminal halts both; Ctrl+C does not reach it, since
-this process decides what that means.
+killed. It belongs to this process's group, so that Ctrl+Z in a terminal halts both; neither Ctrl+C nor a request to
+end, which schedulers send to whole groups, reaches it, since this process decides what that means.
 """
 
 from __future__ import annotations
@@ -245,14 +245,15 @@ def _start(
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Start processes in this block; Ctrl+C never reaches them. One that comes meanwhile reaches this process after it.
+    """Start processes in this block; Ctrl+C and requests to end never reach them. One that comes meanwhile reaches this
+    process after it.
 
     A process takes over which signals are blocked where it is started, and so do those that it starts.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:

@@ -14,12 +14,19 @@ from pathlib import Path
 from typing import BinaryIO
 
 from engine.errors import DiskError
+from engine.storage.process_space import process_space
 
 PARTIAL_PREFIX = ".partial-"
-"""Half-written files begin with this, then with the id of the process that writes them."""
-_PARTIAL_NAME = re.compile(rf"{re.escape(PARTIAL_PREFIX)}([0-9]{{1,9}})-(.+)", re.DOTALL)
+"""Half-written files begin with this, then with the id of the process that writes them, and its space of ids."""
+_PARTIAL_NAME = re.compile(rf"{re.escape(PARTIAL_PREFIX)}([0-9]{{1,9}})(?:@([0-9a-f]{{8}}))?-(.+)", re.DOTALL)
 STALE_AFTER_S = 24 * 3600.0
 """A half-written file this old belongs to nobody, whoever may have its process id by now."""
+
+
+def partial_path(path: Path) -> Path:
+    """The name under which this process writes a file until it is complete. No other one that shares the folder has
+    the same, of whatever computer."""
+    return path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}@{process_space()}-{path.name}")
 
 
 @contextmanager
@@ -34,7 +41,7 @@ def atomic_path(path: Path | str, *, makes_parents: bool = True, is_durable: boo
         OSError: The disk refused; nothing is left behind.
     """
     path = Path(path)
-    partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
+    partial = partial_path(path)
     path.parent.mkdir(parents=makes_parents, exist_ok=True)
     try:
         yield partial
@@ -42,6 +49,17 @@ def atomic_path(path: Path | str, *, makes_parents: bool = True, is_durable: boo
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def is_partial(path: Path) -> bool:
+    """Whether this is the name of something that is not complete yet, or never will be."""
+    return _PARTIAL_NAME.fullmatch(path.name) is not None
+
+
+def partials_of(folder: Path, pid: int) -> list[Path]:
+    """What a process of this computer has begun to write in a folder, and not finished. Raises OSError."""
+    found = ((path, _PARTIAL_NAME.fullmatch(path.name)) for path in folder.iterdir())
+    return [path for path, name in found if name and int(name[1]) == pid and name[2] in (None, process_space())]
 
 
 @contextmanager
@@ -57,7 +75,7 @@ def atomic_folder(path: Path | str) -> Iterator[Path]:
     path = Path(path).absolute()
     if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
         raise FileExistsError(errno.EEXIST, "this name is already taken", str(path))
-    partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
+    partial = partial_path(path)
     try:
         partial.mkdir(parents=True)
         yield partial
@@ -71,7 +89,7 @@ def atomic_folder(path: Path | str) -> Iterator[Path]:
 def is_left_over(path: Path, is_alive: Callable[[int], bool], *, of: str = "") -> bool:
     """Whether `atomic_path` or `atomic_folder` yielded this once, and nobody still writes it.
 
-    Its process is dead then, or it is a day old.
+    Its process is dead then, or it is a day old; the latter is all that is known of one of another computer.
 
     Args:
         path: Of any name; those that are not made here are nobody's left-overs.
@@ -79,9 +97,9 @@ def is_left_over(path: Path, is_alive: Callable[[int], bool], *, of: str = "") -
         of: Only what would have become this name; any where empty.
     """
     found = _PARTIAL_NAME.fullmatch(path.name)
-    if found is None or of not in ("", found[2]):
+    if found is None or of not in ("", found[3]):
         return False
-    if not is_alive(int(found[1])):
+    if found[2] in (None, process_space()) and not is_alive(int(found[1])):  # None: of a version before
         return True
     try:
         return time.time() - path.stat().st_mtime > STALE_AFTER_S

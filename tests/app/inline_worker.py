@@ -34,7 +34,7 @@ class InlineWorker:
         self._is_running = True
         self._run = TrainingRun(
             job,
-            lambda: FolderStore(folder),
+            lambda: FolderStore(folder, claim=job.claim),
             receive=self._receive,
             send=self._send,
             make_training=make_training,

@@ -130,7 +130,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Train on disks that fill up.")
     parser.add_argument("--sizes", type=int, default=20)
     parser.add_argument("--only", type=int, nargs=2, metavar=("A", "B"), help="sizes A up to B of these")
-    parser.add_argument("--clips", default="0:2")
+    parser.add_argument("--clips", default="0:2", help='as "0:2"; "0" trains clip 0 with --clip')
     parser.add_argument("--fast", action="store_true", help="so few steps that a clip takes seconds")
     parser.add_argument("--reference", type=Path, help="project trained with the same settings and room")
     options = parser.parse_args()
@@ -148,7 +148,8 @@ def main() -> int:
             scratch.mkdir()
             command = Command(reference, scratch, settings, options.clips, every_s=None)
             command.wait(LONGEST_RUN_S)
-        expected = {index: kept for index, kept in kept_clips(reference).items() if int(first) <= index < int(end)}
+        last = int(end or int(first) + 1)
+        expected = {index: kept for index, kept in kept_clips(reference).items() if int(first) <= index < last}
         tally = fill(work, sizes, settings=settings, clips=options.clips, expected=expected)
     for fault in tally.faults:
         print("FAULT", fault)

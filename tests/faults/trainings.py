@@ -98,6 +98,7 @@ class Command:
         project: Project folder.
         scratch: Temporary folder of its processes; also their mark, by which they are found.
         settings: Arguments.
+        clips: As "0:2"; "1" trains clip 1 as any number of processes may at once.
         every_s: Checkpoint cadence; None leaves the default.
     """
 
@@ -107,7 +108,8 @@ class Command:
         self.started_s = time.time()
         self._errors = scratch / f"stderr-{time.monotonic_ns()}.txt"
         self._scratch = scratch
-        arguments = ["train", str(asset_path("sample")), "--project", str(project), "--clips", clips, *settings]
+        chosen = ["--clips" if ":" in clips else "--clip", clips]
+        arguments = ["train", str(asset_path("sample")), "--project", str(project), *chosen, *settings]
         environment = {**os.environ, "TMPDIR": str(scratch), "PYTHONPATH": str(ROOT)}
         if every_s is not None:
             environment[CADENCE] = str(every_s)

@@ -16,7 +16,7 @@ from app.document.project_document import ProjectDocument
 from app.document.storing.kept_json import KeptText, kept_object, kept_text, read_kept, write_kept
 from app.document.storing.stored_document import ENTRIES, document_of, plain_document
 from engine.errors import ProjectError
-from engine.storage.files import PARTIAL_PREFIX, disk_error
+from engine.storage.files import disk_error, partial_path
 from engine.storage.json_files import HAND_EDITED, MAX_JSON_BYTES
 from engine.storage.typed_json import EntryError, to_type
 
@@ -139,7 +139,7 @@ def write_document_text(folder: Path, text: KeptText, *, is_backup_kept: bool = 
 
 def _keep_backup(path: Path) -> None:
     """Give the file a second name, under which it stays when it is replaced. Raises DiskError."""
-    partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{BACKUP_FILE}")
+    partial = partial_path(path.with_name(BACKUP_FILE))
     try:
         partial.unlink(missing_ok=True)
         try:

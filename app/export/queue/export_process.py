@@ -16,7 +16,7 @@ from app.export.queue.export_messages import Ending, Event, ExportDone, ExportFa
 from engine.children.kind import ChildFailed, ChildKind
 from engine.children.process import ChildProcess
 from engine.errors import EngineError
-from engine.storage.files import PARTIAL_PREFIX, discard
+from engine.storage.files import discard, partials_of
 
 HINT = "Nothing was left behind. Try again; the log may say more."
 EXPORTING: ChildKind[ExportTask, ExportProgress, ExportResult] = ChildKind(
@@ -101,5 +101,5 @@ def _sweep(folder: Path, pid: int) -> None:
 
 def _left_over(folder: Path, pid: int) -> list[Path]:
     with suppress(OSError):
-        return [path for path in folder.iterdir() if path.name.startswith(f"{PARTIAL_PREFIX}{pid}-")]
+        return partials_of(folder, pid)
     return []

@@ -3,7 +3,8 @@
 A claim is a file that was not there before, which every file system, also a network's, gives to one process only. Its
 content is the token of its holder. When a holder has died, the claim is not changed but surpassed: by a file of the
 next number, which again only one process can make. The highest number counts. A holder that had only been slow finds
-a higher one and gives up. Whoever releases a claim removes it together with all below it, lowest first.
+a higher one, or another token under its own number, and gives up. Whoever releases a claim removes it together with all
+below it, lowest first.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from app.project.clips.clip_names import PROGRAM_NAME
 from engine.storage.files import read_bytes
 
 CLAIMS = "claims"
-_CLAIM = re.compile(r"(?P<key>[\d-]{4,19})\.(?P<number>\d{4,9})")
+_CLAIM = re.compile(r"(?P<key>[0-9-]{4,19})\.(?P<number>[0-9]{4,9})")
 _HOLDER = re.compile(r"holder-(?P<token>[0-9a-f]{32})\.json")
 _MAX_TOKEN_BYTES = 64
 
@@ -69,10 +70,11 @@ def newest_claim(folder: Path, key: str) -> ClaimFile | None:
     return ClaimFile(folder, key, max(numbers)) if numbers else None
 
 
-def is_unsurpassed(claim: ClaimFile) -> bool:
-    """Whether a claim is as it was made, and none that counts more was made after it. Looks at two files only."""
+def is_unsurpassed(claim: ClaimFile, token: str) -> bool:
+    """Whether a claim is as its holder of that token made it, and none that counts more was made after it. Looks at two
+    files only."""
     after = ClaimFile(claim.folder, claim.key, claim.number + 1)
-    return os.path.lexists(claim.path) and not os.path.lexists(after.path)
+    return claim.token() == token and not os.path.lexists(after.path)
 
 
 def make_claim(claim: ClaimFile, token: str) -> bool:
@@ -87,12 +89,14 @@ def make_claim(claim: ClaimFile, token: str) -> bool:
     except FileExistsError:
         return False
     try:
-        os.write(descriptor, token.encode("ascii"))
+        try:
+            os.write(descriptor, token.encode("ascii"))
+        finally:
+            os.close(descriptor)  # where a disk of the network says that it is full
     except OSError:
-        claim.path.unlink(missing_ok=True)
+        with suppress(OSError):
+            claim.path.unlink(missing_ok=True)
         raise
-    finally:
-        os.close(descriptor)
     newest = newest_claim(claim.folder, claim.key)
     if newest is not None and newest.number > claim.number:
         with suppress(OSError):
@@ -103,8 +107,11 @@ def make_claim(claim: ClaimFile, token: str) -> bool:
 
 def remove_claim(claim: ClaimFile) -> None:
     """Remove a claim and all that count less, lowest first. Never fails; what the disk refuses counts as dead later."""
-    numbers = sorted(_numbers_of(claim.folder, claim.key))
-    for number in [*(number for number in numbers if number < claim.number), claim.number]:
+    below: list[int] = []
+    if claim.number > 1:  # else there is nothing to list
+        with suppress(OSError):
+            below = [number for number in sorted(_numbers_of(claim.folder, claim.key)) if number < claim.number]
+    for number in (*below, claim.number):
         with suppress(OSError):
             ClaimFile(claim.folder, claim.key, number).path.unlink(missing_ok=True)
 

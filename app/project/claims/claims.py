@@ -2,7 +2,8 @@
 
 Training a clip needs no lock of the project, only the claim of that clip. A thread says every few seconds that this
 process lives, and looks at what others say. Whether another one lives is judged by whether its record changes, on this
-process's own clock: clocks of computers may differ by any amount.
+process's own clock: clocks of computers may differ by any amount. Time counts only while this process looks: where it
+was halted, or the disk did not answer, others could not have been heard.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import uuid
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TypeVar
@@ -36,13 +38,13 @@ from app.project.claims.holder_record import (
     HolderRecord,
     MachineLoad,
     machine_load,
-    pid_space,
     read_holder,
     write_holder,
 )
 from app.project.lock import this_process
 from engine.errors import ProjectError
 from engine.storage.files import disk_error
+from engine.storage.process_space import pid_space
 
 logger = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -53,6 +55,8 @@ LOOK_SHARE = 0.05
 """Share of the time that looking may take: where there are hundreds of others, it is done less often."""
 DEAD_AFTER_S = 60.0
 """A holder that has said nothing for so long has ended; one that was only slow notices that its claim is lost."""
+LONGEST_GAP_S = 10.0
+"""Of silence, between two looks, no more counts."""
 MAX_SAID_AT_ONCE = 16
 """Clips in training up to which a further one is said at once; the record of hundreds takes a while to write."""
 _MAX_TRIES = 100
@@ -76,6 +80,21 @@ def lost_claim() -> ClipClaimed:
         f"Another program trains this clip, because this one had said nothing for {DEAD_AFTER_S:.0f} s.",
         hint="Nothing is lost: the other one continues.",
     )
+
+
+def check_claim(folder: Path, key: str, token: str) -> None:
+    """Check that no other process has claimed a clip than the one that the caller works for. folder: Of the project.
+    token: Of that one; empty where it has claimed nothing.
+
+    Raises:
+        ClipClaimed: Another one has.
+    """
+    if not token:
+        return
+    with suppress(OSError):
+        newest = newest_claim(folder, key)
+        if newest is not None and newest.token() not in (token, ""):
+            raise lost_claim()
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +122,23 @@ class Elsewhere:
         return "Another program" if self.holder is None else self.holder.owner.words()
 
 
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    """What was seen of a holder last: its state, its silence since then, when that was looked at, and how many states
+    went before."""
+
+    state: object
+    silent_s: float
+    looked_s: float
+    n_before: int
+
+
+def _seconds() -> float:
+    """Of a clock that also counts while the computer sleeps, where the system has one."""
+    boot_time = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if boot_time is None else time.clock_gettime(boot_time)
+
+
 class Claims:
     """Claims of one process in one project. Methods are for one thread, but for those said to be for another.
 
@@ -118,7 +154,7 @@ class Claims:
         folder: Path,
         *,
         describe: Callable[[], Mapping[str, ClipProgress]] = dict,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = _seconds,
         has_thread: bool = True,
     ) -> None:
         self.folder = folder
@@ -131,12 +167,13 @@ class Claims:
         self._others: tuple[HolderRecord, ...] = ()
         self._asked: SimpleQueue[tuple[str, Ask]] = SimpleQueue()
         self._changed: SimpleQueue[str] = SimpleQueue()
-        self._seen: dict[str, tuple[object, float, int]] = {}  # state of a holder, since when, and how many before it
+        self._heard: dict[str, _Heard] = {}  # of holders, by the paths of claims and of records
         self._clip_files: dict[str, int] | None = None
         self._clips_time: int | None = None
         self._is_clips_time_old = False
         self._load = MachineLoad(os.cpu_count() or 1)
         self._beat, self._beaten_s = 0, -BEAT_EVERY_S
+        self._said_s, self._was_silent = clock(), False
         self._is_watching = False
         self._guard = threading.RLock()
         self._wake = threading.Event()
@@ -170,8 +207,11 @@ class Claims:
         self._start()
 
     def _claimed(self, key: str) -> ClaimFile:
+        made: ClaimFile | None = None  # by another one, which a listing from the network may not show yet
         for _ in range(_MAX_TRIES):
             newest = newest_claim(self.folder, key)
+            if made is not None and (newest is None or newest.number < made.number) and os.path.lexists(made.path):
+                newest = made
             if newest is not None:
                 other = self._judged(newest)
                 if not other.is_dead:
@@ -184,13 +224,14 @@ class Claims:
             claim = ClaimFile(self.folder, key, 1 if newest is None else newest.number + 1)
             if make_claim(claim, self.token):
                 return claim
+            made = claim
         raise ClipClaimed("Other programs claim this clip again and again.", hint="Try again later.")
 
     def release(self, key: str) -> None:
         """Free a clip, if it is claimed. Never fails."""
         with self._guard:
             claim = self._held.pop(key, None)
-            if claim is not None and key not in self._lost:
+            if claim is not None and key not in self._lost and claim.token() == self.token:
                 remove_claim(claim)
                 drop_ask(self.folder, key)
             self._lost.discard(key)
@@ -214,7 +255,10 @@ class Claims:
             ClipClaimed: It is not.
         """
         with self._guard:
-            self._check_held(key)
+            if key in self._held:
+                with suppress(OSError):
+                    self._say()  # also makes a computer of the network list the folder as it is
+                self._check_held(key)
             if key not in self._held or key in self._lost:
                 raise lost_claim()
 
@@ -265,21 +309,40 @@ class Claims:
         self.look_after_held()
         try:
             claims = list_claims(self.folder)
-        except OSError:
-            return  # the disk does not answer; what was seen last holds
-        records = {token: read_holder(holder_path(self.folder, token)) for token in list_holders(self.folder)}
-        with self._guard:
-            elsewhere = {
-                key: self._judged(claim, records)
+            read = cache(read_holder)
+            known = {
+                key: self._judged(claim, read)
                 for key, claim in claims.items()
                 if key not in self._held and not self._was_released(claim)
             }
-            self._elsewhere = {key: other for key, other in elsewhere.items() if not other.is_dead}
-            said = {other.holder.token for other in self._elsewhere.values() if other.holder is not None}
-            self._others = tuple(record for token, record in records.items() if record is not None and token in said)
-            counting = {str(claim.path) for claim in claims.values()}
-            self._seen = {path: seen for path, seen in self._seen.items() if path in counting}
+            self._sweep(claims, known)
+        except OSError:
+            return  # the disk does not answer; what was seen last holds
+        elsewhere = {key: other for key, other in known.items() if not other.is_dead}
+        said = {other.holder.token: other.holder for other in elsewhere.values() if other.holder is not None}
+        with self._guard:
+            self._elsewhere = {key: other for key, other in elsewhere.items() if key not in self._held}
+            self._others = tuple(said.values())
             self._look_at_clips()
+
+    def _sweep(self, claims: Mapping[str, ClaimFile], known: Mapping[str, Elsewhere]) -> None:
+        """Remove claims of the dead, and records of those that claim nothing and say nothing any more. Raises OSError.
+
+        known: Of claims that are not one's own.
+        """
+        for key, other in known.items():
+            if other.is_dead:
+                remove_claim(claims[key])
+                drop_ask(self.folder, key)
+        claiming = {self.token, *(other.holder.token for other in known.values() if other.holder is not None)}
+        idle = [holder_path(self.folder, token) for token in list_holders(self.folder) if token not in claiming]
+        for path in idle:
+            with suppress(OSError):
+                if self._silent_s(path, path.stat().st_mtime_ns) >= DEAD_AFTER_S:
+                    path.unlink()
+        there = {str(path) for path in (*idle, *(claim.path for claim in claims.values()))}
+        with self._guard:
+            self._heard = {path: heard for path, heard in self._heard.items() if path in there}
 
     def look_after_held(self) -> None:
         """The part of a round for what is claimed here: say that this process lives, see whether a claim was lost and
@@ -289,7 +352,7 @@ class Claims:
             with self._guard, suppress(OSError):
                 self._say()
         for key, claim in list(self._held.items()):
-            if not is_unsurpassed(claim):
+            if not is_unsurpassed(claim, self.token):
                 with self._guard:
                     self._check_held(key)
             ask = take_ask(self.folder, key)
@@ -318,14 +381,19 @@ class Claims:
     def _say(self) -> None:
         """Write this process's record. Raises OSError."""
         self._beat += 1
-        self._beaten_s = self._clock()
+        self._beaten_s = now_s = self._clock()
+        if self._held and now_s - self._said_s >= DEAD_AFTER_S:
+            self._was_silent = True
         path = holder_path(self.folder, self.token)
         record = HolderRecord(self.token, self._owner, pid_space(), self._beat, self._load, dict(self._describe()))
         try:
             write_holder(path, record)
         except OSError:
-            os.utime(path)  # a full disk keeps nobody from saying that it lives; no file yet is an error
+            with suppress(OSError):
+                os.utime(path)  # a full disk keeps nobody from saying that it lives
+                self._said_s = now_s
             raise
+        self._said_s = now_s
 
     def _check_held(self, key: str) -> None:
         claim = self._held.get(key)
@@ -333,34 +401,45 @@ class Claims:
             return
         try:
             newest = newest_claim(self.folder, key)
-        except OSError:
-            return
-        if newest is None or newest.number < claim.number:  # somebody has removed its file
-            with suppress(OSError):
-                if make_claim(claim, self.token):
+            if (
+                newest is None or newest.number < claim.number
+            ):  # it was removed: by anybody, or by one that took it over
+                if not self._was_silent and make_claim(claim, self.token):
                     return
                 newest = newest_claim(self.folder, key)
-        if newest is not None and newest.number > claim.number:
+        except OSError:
+            return
+        if newest is None:
+            is_lost = self._was_silent
+        else:
+            is_lost = newest.number > claim.number or newest.token() not in (self.token, "")
+        if is_lost:
             self._lost.add(key)
 
-    def _judged(self, claim: ClaimFile, records: Mapping[str, HolderRecord | None] | None = None) -> Elsewhere:
-        """A claim, and whether its holder has ended."""
+    def _judged(self, claim: ClaimFile, read: Callable[[Path], HolderRecord | None] = read_holder) -> Elsewhere:
+        """A claim, and whether its holder has ended. read: Of its record."""
         token = claim.token()
         path = holder_path(self.folder, token) if token else claim.path
-        record = None
-        if token:
-            record = read_holder(path) if records is None or token not in records else records[token]
+        record = read(path) if token else None
         if record is not None and record.is_gone:
             return Elsewhere(claim.key, record, is_dead=True)
         try:
             state: object = (None if record is None else record.beat, path.stat().st_mtime_ns)
         except OSError:
             state = None
-        name = str(claim.path)
-        before = self._seen.get(name)
-        if before is None or before[0] != state:
-            self._seen[name] = (state, self._clock(), 0 if before is None else before[2] + 1)
-        return Elsewhere(claim.key, record, is_dead=self._clock() - self._seen[name][1] >= DEAD_AFTER_S)
+        return Elsewhere(claim.key, record, is_dead=self._silent_s(claim.path, state) >= DEAD_AFTER_S)
+
+    def _silent_s(self, path: Path, state: object) -> float:
+        """For how long the state of something has not changed, as far as this process looked."""
+        with self._guard:
+            now_s, before = self._clock(), self._heard.get(str(path))
+            if before is None or before.state != state:
+                heard = _Heard(state, 0.0, now_s, 0 if before is None else before.n_before + 1)
+            else:
+                silent_s = before.silent_s + min(now_s - before.looked_s, LONGEST_GAP_S)
+                heard = _Heard(state, silent_s, now_s, before.n_before)
+            self._heard[str(path)] = heard
+            return heard.silent_s
 
     def _was_released(self, claim: ClaimFile) -> bool:
         """Whether it was one's own, or is gone, since claims were listed."""
@@ -368,7 +447,7 @@ class Claims:
 
     def _has_changed(self, claim: ClaimFile) -> bool:
         """Whether its holder has been heard of while this process watched."""
-        return self._seen[str(claim.path)][2] > 0
+        return self._heard[str(claim.path)].n_before > 0
 
     def _look_at_clips(self) -> None:
         folder = self.folder / "clips"

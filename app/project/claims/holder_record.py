@@ -12,6 +12,7 @@ from msgspec import Struct, to_builtins
 from app.project.lock import LockOwner
 from engine.storage.files import atomic_path
 from engine.storage.json_files import JsonError, json_text, read_json_object
+from engine.storage.process_space import boot_id, pid_space
 from engine.storage.typed_json import EntryError, to_type
 
 SCHEMA = 1
@@ -82,21 +83,15 @@ class HolderRecord(Struct, frozen=True):
 
     @property
     def is_here(self) -> bool:
-        """Whether this computer knows if it lives."""
-        return bool(self.owner.host) and self.owner.is_here and self.space == pid_space()
+        """Whether this computer knows if it lives. Computers made from one image may have one name and one id: where
+        the system numbers its starts, only the same start is this computer."""
+        is_other_start = bool(boot_id()) and self.owner.boot != boot_id()
+        return bool(self.owner.host) and not is_other_start and self.owner.is_here and self.space == pid_space()
 
     @property
     def is_gone(self) -> bool:
         """Whether it is certain that it has ended."""
         return self.is_here and not self.owner.is_alive
-
-
-def pid_space() -> str:
-    """Within which process ids mean the same process; empty where the system has one space only."""
-    try:
-        return os.readlink("/proc/self/ns/pid")
-    except OSError:
-        return ""
 
 
 def machine_load() -> MachineLoad:

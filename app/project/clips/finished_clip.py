@@ -7,7 +7,7 @@ import logging
 import os
 from contextlib import suppress
 
-from app.project.claims.left_over import live_claims
+from app.project.claims.claims import Claims
 from app.project.clips.clip_versions import forget_oldest, set_aside
 from app.project.project import Project
 from engine.clip_files.clip_state import read_clip_header
@@ -51,12 +51,14 @@ def take_in(project: Project, clip_index: int) -> bool:
 
 
 def take_in_left_over(project: Project) -> None:
-    """Put every clip in its place that was finished when the program was killed, but for those that a living process
-    has claimed. A disk that refuses keeps it for the next time."""
-    claimed = live_claims(project.folder)
+    """Put every clip in its place that was finished when the program was killed, but for those that another process
+    has claimed, which may live. A disk that refuses keeps it for the next time."""
+    claims = Claims(project.folder, has_thread=False)
     for path in sorted(project.live_dir.glob("*-trained.safetensors")):
         key = path.name.removesuffix("-trained.safetensors")
         clip_index = project.index_of(key)
-        if clip_index is not None and key not in claimed:
+        if clip_index is not None:
             with suppress(ProjectError):
+                claims.take(key)
                 take_in(project, clip_index)
+    claims.close()

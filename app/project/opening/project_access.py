@@ -11,6 +11,7 @@ from app.document.project_settings import ProjectSettings
 from app.document.storing.document_file import PROJECT_FILE
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.recovery import plain_history, recover
+from app.document.storing.replay import JOURNAL_FOLDER
 from app.project.clips.clip_exchange import finish_exchange
 from app.project.folders import check_folders
 from app.project.lock import ProcessLock
@@ -19,6 +20,7 @@ from app.project.opening.sweeping import sweep
 from app.project.project import LOCK_FILE, LOCK_FILES, READ_ONLY, Project
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
+from engine.storage.files import is_partial
 
 MIN_TRAINING_CAMERAS = 2
 DEFAULT_CLIP_LENGTH = 10
@@ -109,7 +111,7 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     folder = Path(folder)
     if (folder / PROJECT_FILE).exists():
         raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
-    if folder.is_dir() and any(child.name not in LOCK_FILES for child in folder.iterdir()):
+    if folder.is_dir() and any(map(_is_foreign, folder.iterdir())):
         raise ProjectError(
             "The project folder holds other files.", hint="Choose an empty or a new folder.", path=folder
         )
@@ -130,6 +132,13 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
         lock.release()
         raise
     return Project(folder, DocumentHistory(document), lock, store=store)
+
+
+def _is_foreign(path: Path) -> bool:
+    """Whether something in a folder is not what is left of a project whose making was interrupted."""
+    if path.name == JOURNAL_FOLDER and path.is_dir():
+        return any(path.iterdir())
+    return path.name not in LOCK_FILES and not is_partial(path)
 
 
 def open_project(

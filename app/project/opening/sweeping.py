@@ -14,7 +14,7 @@ from engine.storage.files import PARTIAL_PREFIX, discard, is_left_over
 logger = logging.getLogger(__name__)
 
 LIVE_NAME = re.compile(
-    r"(clip-(?P<shown>[\d-]{4,19})-r\d{4,9}|(?P<kept>[\d-]{4,19})(-p\d{1,9})?-final|mended-\d{4,9})\.safetensors"
+    r"(clip-(?P<shown>[\d-]{4,19})-r\d{4,9}|(?P<kept>[\d-]{4,19})(-p\d{1,9}(-[0-9a-f]{8})?)?-final|mended-\d{4,9})\.safetensors"
 )
 """Files that the program makes in "live": snapshots, a finished clip that is read back, drafts of mended clips."""
 
@@ -29,8 +29,9 @@ def sweep(folder: Path) -> None:
         folder: Of the project, see app.project.folders.
     """
     sweep_claims(folder)
-    claimed = live_claims(folder)
-    found = [path for path in (folder / "live").glob("*") if _is_swept(path.name, claimed)]
+    live = list((folder / "live").glob("*"))
+    claimed = live_claims(folder)  # after that: whoever made one of them has claimed its clip before
+    found = [path for path in live if _is_swept(path.name, claimed)]
     found += [path for path in folder.rglob(f"{PARTIAL_PREFIX}*") if is_left_over(path, is_process_alive)]
     n_gone = sum(map(discard, found))
     if n_gone:

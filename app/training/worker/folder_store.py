@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from app.project.claims.claims import check_claim
 from app.project.clips.clip_paths import ClipPaths
 from app.project.clips.clip_versions import read_finished
 from app.project.clips.metrics_file import read_metrics
@@ -19,6 +20,7 @@ from engine.clip_files.compact import CompactClip, write_compact_clip
 from engine.errors import DiskError, ProjectError
 from engine.storage.files import discard, disk_error, open_to_append, replace_file
 from engine.storage.json_files import checked_line
+from engine.storage.process_space import process_space
 from engine.training.preparation.stages import remove_stages
 
 
@@ -28,13 +30,14 @@ class FolderStore:
     Args:
         folder: Of the project, as it is now.
         capture: Where its capture is on this machine; where the project says so when None.
+        claim: Token of the process that has claimed the clip which is trained; empty to put it without asking.
     Raises:
         ProjectError: It is not a project, or is damaged.
         ProjectGone: It is missing.
     """
 
-    def __init__(self, folder: Path, capture: Path | None = None) -> None:
-        self.folder, self._capture = folder, capture
+    def __init__(self, folder: Path, capture: Path | None = None, claim: str = "") -> None:
+        self.folder, self._capture, self._claim = folder, capture, claim
         self._watch = FolderWatch(folder)
         self._project = open_project(folder, is_writable=False)
 
@@ -73,9 +76,11 @@ class FolderStore:
     # ---------------------------------------------------------------- results
 
     def put_clip(self, key: str, clip: CompactClip) -> None:
-        """See `ClipStore`."""
+        """See `ClipStore`. Raises ClipClaimed: Another process has taken the clip over."""
         path = self._files(key).handed_over
-        draft = path.with_name(f"{key}-p{os.getpid()}-final.safetensors")  # one taken for dead may still write its own
+        # one taken for dead may still write its own
+        draft = path.with_name(f"{key}-p{os.getpid()}-{process_space()}-final.safetensors")
+        check_claim(self.folder, key, self._claim)
         try:
             write_compact_clip(draft, clip)
             if not _reads_back(draft, clip):
@@ -84,6 +89,7 @@ class FolderStore:
                     hint="Check the disk, or move the project to another one.",
                     path=path,
                 )
+            check_claim(self.folder, key, self._claim)
             replace_file(draft, path, is_durable=True)
         except OSError as error:
             raise disk_error(error, what="The clip", path=path) from error
@@ -107,7 +113,8 @@ class FolderStore:
         return path if path.is_file() else None
 
     def put_checkpoint(self, key: str, write: Callable[[Path], None]) -> None:
-        """See `ClipStore`."""
+        """See `ClipStore`. Raises as `put_clip` does."""
+        check_claim(self.folder, key, self._claim)
         write(self._files(key).checkpoint)
 
     def rows(self, key: str) -> list[dict[str, Any]]:

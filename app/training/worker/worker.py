@@ -57,7 +57,7 @@ def main(task: TrainTask, parent: Parent[Event]) -> None:
         send(WarningRaised("The log of the training could not be written", str(refused)))
     run = TrainingRun(
         job,
-        lambda: FolderStore(task.project, task.capture),
+        lambda: FolderStore(task.project, task.capture, job.claim),
         receive=parent.receive,
         send=send,
         make_training=find(task.make),

@@ -15,6 +15,7 @@ from app.project.clips.metrics_file import read_metrics
 from app.project.opening.project_access import create_project, default_settings, open_project, read_settings
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
+from engine.storage.process_space import process_space
 
 SETTINGS = ProjectSettings(capture="somewhere", fingerprint="abc", holdout=("0", "3"), overrides={"joint_steps": 5})
 
@@ -23,6 +24,21 @@ def test_settings_come_back_as_they_were(tmp_path):
     create_project(tmp_path / "p", SETTINGS).close()
     assert read_settings(tmp_path / "p") == SETTINGS
     assert sorted(child.name for child in (tmp_path / "p").iterdir()) == ["journal", "project.json"]
+
+
+def test_a_project_whose_making_was_interrupted_can_be_made(tmp_path):
+    folder = tmp_path / "p"
+    (folder / "journal").mkdir(parents=True)
+    for name in (".lock", ".partial-7-lock", f".partial-7@{process_space()}-project.json"):
+        (folder / name).touch()
+    create_project(folder, SETTINGS).close()
+    assert read_settings(folder) == SETTINGS
+    for foreign in ("notes.txt", "journal/notes.txt"):
+        other = tmp_path / foreign.replace("/", "-")
+        (other / foreign).parent.mkdir(parents=True)
+        (other / foreign).touch()
+        with pytest.raises(ProjectError, match="holds other files"):
+            create_project(other, SETTINGS)
 
 
 def test_settings_that_are_gone_are_dropped_when_an_old_project_is_read(tmp_path):

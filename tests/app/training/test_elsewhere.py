@@ -10,10 +10,12 @@ import pytest
 
 from app.evaluation.headless import train_clips
 from app.project.claims.asks import Ask, ask_holder
+from app.project.claims.claim_files import ClaimFile, make_claim
 from app.project.claims.claims import Claims
+from app.project.clips.finished_clip import take_in_left_over
 from app.project.disk.discarding import discard, training_of
 from app.project.opening.opened_project import OpenedProject
-from app.project.opening.project_access import open_for_clips
+from app.project.opening.project_access import open_for_clips, open_project
 from app.training.messages import ClipTrained, TrainingFailed
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses, training_status
@@ -171,6 +173,90 @@ def test_settings_cannot_change_while_another_process_trains(pair) -> None:
     other.poll()
     with pytest.raises(ProjectError, match="trains clip 1"):
         discard(one.project, training_of(one.project))
+
+
+def test_a_window_that_opens_and_closes_leaves_what_others_train(pair) -> None:
+    """Its sweep, and clips that it takes in."""
+    one, other = pair
+    other.enqueue(1)
+    other.poll()
+    key, folder = other.project.clip_name(1), other.project.folder
+    files = [other.project.files(1).snapshot(1), folder / "live" / f"{key}-p7-0a1b2c3d-final.safetensors"]
+    files += [other.project.files(1).handed_over, folder / "clips" / f".partial-7@00000000-{key}.safetensors"]
+    for path in files:
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(one.project.clip_path(0).read_bytes())
+    one.close()
+    one.project.close()
+    open_project(folder).close()
+    assert all(path.is_file() for path in files)
+    assert not one.project.is_trained(1)
+    files[2].unlink()
+    other.stop(1)
+    run_out(other)
+    open_project(folder).close()
+    assert [path for path in files if path.is_file()] == files[-1:], "of a computer whose processes nobody here sees"
+
+
+def test_a_project_that_others_train_into_is_not_taken_back(pair) -> None:
+    one, other = pair
+    other.enqueue(1)
+    other.poll()
+    one.project.remove_files()
+    assert one.project.is_trained(0)
+    other.stop(1)
+    run_out(other)
+    one.project.remove_files()
+    assert not one.project.is_trained(0)
+
+
+def test_a_reference_that_is_trained_again_meanwhile_makes_the_clip_out_of_date(pair) -> None:
+    one, other = pair
+    look(one)
+    other.enqueue(1)
+    other.poll()
+    one.enqueue(0, {"joint_steps": 9})
+    run_out(one)
+    other.runs[1].worker._run._training.n_steps = 3  # it comes to its end
+    run_out(other)
+    assert other.project.is_trained(1)
+    look(one)
+    one.poll()
+    assert one.catalog[1].state == "stale"
+    one.enqueue(1)
+    run_out(one)
+    assert one.catalog[1].state == "trained"
+
+
+def test_a_worker_whose_clip_was_taken_over_hands_nothing_over(pair) -> None:
+    """It goes on while its own process is halted, which cannot end it."""
+    one, other = pair
+    other.enqueue(1)
+    other.poll()
+    key = other.project.clip_name(1)
+    make_claim(ClaimFile(other.project.folder, key, 2), one.claims.token)
+    worker = other.runs[1].worker
+    worker._run._training.n_steps = 3
+    events = [event for _ in range(9) for event in worker.poll()]
+    assert isinstance(events[-1], TrainingFailed)
+    assert events[-1].kind == "ClipClaimed"
+    assert not other.project.files(1).handed_over.exists()
+    assert not other.project.checkpoint_path(1).exists()
+
+
+def test_what_was_handed_over_is_taken_in_by_one(pair) -> None:
+    one, other = pair
+    key, folder = one.project.clip_name(0), one.project.folder
+    handed_over = one.project.files(0).handed_over
+    handed_over.parent.mkdir(exist_ok=True)
+    one.project.clip_path(0).rename(handed_over)
+    other.claims.take(key)
+    take_in_left_over(one.project)
+    assert not one.project.is_trained(0), "the other one does"
+    other.claims.release(key)
+    take_in_left_over(one.project)
+    assert one.project.is_trained(0)
+    assert list((folder / "claims").iterdir()) == []
 
 
 def test_clips_that_others_train_take_no_place_of_a_worker(pair) -> None:

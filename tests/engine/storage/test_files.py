@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from safetensors import safe_open
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from engine.errors import DiskError
 from engine.storage.array_files import write_arrays
-from engine.storage.files import checked_path
+from engine.storage.files import checked_path, partial_path
 from engine.training.preparation.cloud_preparation import BACKGROUNDS_FILE, Backgrounds, write_backgrounds
 from tests.clip_headers import make_header
 
@@ -21,7 +20,7 @@ needs_full = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/
 
 def without_room(path: Path) -> Path:
     """Make the draft of a file end on a full disk."""
-    path.with_name(f".partial-{os.getpid()}-{path.name}").symlink_to("/dev/full")
+    partial_path(path).symlink_to("/dev/full")
     return path
 
 

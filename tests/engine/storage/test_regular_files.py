@@ -19,6 +19,7 @@ from engine.storage.files import (
     read_bytes,
     replace_file,
 )
+from engine.storage.process_space import process_space
 
 
 def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path):
@@ -80,6 +81,10 @@ def test_a_file_is_read_up_to_its_bound(tmp_path):
         (f"{PARTIAL_PREFIX}77-a", False, 0, True),
         (f"{PARTIAL_PREFIX}77-a", True, STALE_AFTER_S + 60, True),
         (f"{PARTIAL_PREFIX}seven-a", False, 0, False),
+        (f"{PARTIAL_PREFIX}77@{process_space()}-a", False, 0, True),
+        (f"{PARTIAL_PREFIX}77@{process_space()}-a", True, 0, False),
+        (f"{PARTIAL_PREFIX}77@{'0' * 8}-a", False, 0, False),  # of another computer, whose processes nobody here sees
+        (f"{PARTIAL_PREFIX}77@{'0' * 8}-a", False, STALE_AFTER_S + 60, True),
         (f"{PARTIAL_PREFIX}77", False, 0, False),
         (f"{PARTIAL_PREFIX}{'9' * 30}-a", False, 0, False),
     ],

@@ -13,11 +13,12 @@ import pytest
 
 from app.project.claims.asks import ask_holder
 from app.project.claims.claim_files import CLAIMS, ClaimFile, holder_path, list_claims, make_claim
-from app.project.claims.claims import DEAD_AFTER_S, Claims, ClipClaimed
-from app.project.claims.holder_record import ClipProgress, HolderRecord, pid_space, read_holder, write_holder
+from app.project.claims.claims import DEAD_AFTER_S, LOOK_EVERY_S, Claims, ClipClaimed, check_claim
+from app.project.claims.holder_record import ClipProgress, HolderRecord, read_holder, write_holder
 from app.project.claims.left_over import check_unclaimed, live_claims, sweep_claims
 from app.project.lock import this_process
 from engine.errors import DiskError, ProjectError
+from engine.storage.process_space import boot_id, pid_space
 
 KEY = "0003"
 
@@ -32,8 +33,33 @@ class Clock:
         return self.now_s
 
 
+def watch(claims: Claims, clock: Clock, seconds: float) -> None:
+    """Let time pass while a process looks."""
+    until_s = clock.now_s + seconds
+    while clock.now_s < until_s:
+        clock.now_s = min(clock.now_s + LOOK_EVERY_S, until_s)
+        claims.look()
+
+
 def make(folder: Path, clock: Clock | None = None) -> Claims:
     return Claims(folder, clock=clock or Clock(), has_thread=False)
+
+
+def take_over(claims: Claims, clock: Clock) -> None:
+    """Watch the holder of a clip until it counts as dead, and claim the clip."""
+    for _ in range(int(DEAD_AFTER_S / LOOK_EVERY_S)):
+        with pytest.raises(ClipClaimed):
+            claims.take(KEY)
+        clock.now_s += LOOK_EVERY_S
+    claims.take(KEY)
+
+
+def look_dead(folder: Path, claims: Claims) -> None:
+    """Let the holder look like one of another computer, of which only its silence tells."""
+    path = holder_path(folder, claims.token)
+    record = read_holder(path)
+    assert record is not None
+    write_holder(path, msgspec.structs.replace(record, owner=replace(record.owner, host="far", boot="x", machine="x")))
 
 
 def far_away(folder: Path, *, beat: int = 1, key: str = KEY, number: int = 1) -> HolderRecord:
@@ -67,15 +93,16 @@ def test_one_that_falls_silent_is_dead_after_a_minute_of_the_watchers_own_clock(
     with pytest.raises(ClipClaimed, match="computer render-7") as refused:
         claims.take(KEY)
     assert not refused.value.is_sure
-    clock.now_s = DEAD_AFTER_S - 1
+    watch(claims, clock, DEAD_AFTER_S - 1)
     far_away(tmp_path, beat=2)  # it lives
     with pytest.raises(ClipClaimed) as refused:
         claims.take(KEY)
     assert refused.value.is_sure
-    clock.now_s = 2 * DEAD_AFTER_S - 2
-    with pytest.raises(ClipClaimed):
-        claims.take(KEY)
-    clock.now_s = 2 * DEAD_AFTER_S - 1
+    for _ in range(int(DEAD_AFTER_S) - 1):
+        clock.now_s += 1
+        with pytest.raises(ClipClaimed):
+            claims.take(KEY)
+    clock.now_s += 1
     claims.take(KEY)
     assert list_claims(tmp_path)[KEY].number == 2
     claims.release(KEY)
@@ -86,14 +113,8 @@ def test_one_that_was_taken_for_dead_finds_its_claim_lost(tmp_path: Path) -> Non
     clock = Clock()
     slow, other = make(tmp_path), make(tmp_path, clock)
     slow.take(KEY)
-    path = holder_path(tmp_path, slow.token)
-    record = read_holder(path)
-    assert record is not None
-    write_holder(path, msgspec.structs.replace(record, owner=replace(record.owner, host="far", boot="x", machine="x")))
-    with pytest.raises(ClipClaimed):
-        other.take(KEY)
-    clock.now_s = DEAD_AFTER_S
-    other.take(KEY)
+    look_dead(tmp_path, slow)
+    take_over(other, clock)
     assert not slow.is_lost(KEY)
     with pytest.raises(ClipClaimed, match="had said nothing"):
         slow.check(KEY)
@@ -247,8 +268,7 @@ def test_damaged_claims_are_claims_until_a_minute_has_passed(tmp_path: Path, con
     claims = make(tmp_path, clock)
     with pytest.raises(ClipClaimed, match="Another program"):
         claims.take(KEY)
-    clock.now_s = DEAD_AFTER_S
-    claims.take(KEY)
+    take_over(claims, clock)
 
 
 def test_a_claim_whose_file_somebody_removed_is_made_again(tmp_path: Path) -> None:
@@ -273,3 +293,113 @@ def test_a_disk_that_refuses_is_an_error_that_leaves_nothing_claimed(tmp_path: P
         claims.take(KEY)
     assert holder_path(tmp_path, claims.token).stat().st_mtime_ns >= before, "a full disk makes nobody look dead"
     assert list(list_claims(tmp_path)) == ["0001"]
+
+
+def test_one_that_was_halted_gives_up_a_clip_that_was_taken_over_and_released_since(tmp_path: Path) -> None:
+    """Its own number is free again then, or has been given to a third one."""
+    for has_third in (False, True):
+        own, clock = Clock(), Clock()
+        halted, other, third = make(tmp_path, own), make(tmp_path, clock), make(tmp_path)
+        halted.take(KEY)
+        look_dead(tmp_path, halted)
+        take_over(other, clock)
+        other.release(KEY)
+        if has_third:
+            third.take(KEY)
+        own.now_s = 2 * DEAD_AFTER_S
+        halted.look()
+        assert halted.is_lost(KEY)
+        halted.close()
+        assert list(list_claims(tmp_path)) == [KEY] * has_third, "what is not its own stays"
+        third.close()
+
+
+def test_a_process_that_was_halted_itself_takes_nobody_for_dead(tmp_path: Path) -> None:
+    """Or a disk of the network that did not answer for minutes: then nobody could have said anything."""
+    clock = Clock()
+    claims = make(tmp_path, clock)
+    far_away(tmp_path)
+    claims.look()
+    clock.now_s = 100 * DEAD_AFTER_S
+    claims.look()
+    assert KEY in claims.elsewhere
+    with pytest.raises(ClipClaimed):
+        claims.take(KEY)
+
+
+def test_who_watches_removes_claims_and_records_of_the_dead(tmp_path: Path) -> None:
+    clock = Clock()
+    claims = make(tmp_path, clock)
+    far_away(tmp_path)
+    idle = holder_path(tmp_path, "d" * 32)
+    idle.write_text("{}")
+    (tmp_path / CLAIMS / "notes.txt").write_text("mine")
+    watch(claims, clock, DEAD_AFTER_S)
+    assert list_claims(tmp_path) != {}
+    watch(claims, clock, 2 * DEAD_AFTER_S)
+    assert [path.name for path in (tmp_path / CLAIMS).iterdir()] == ["notes.txt"]
+
+
+def test_two_computers_of_one_image_are_two(tmp_path: Path) -> None:
+    """The same name and the same id, which only the number of their start tells apart."""
+    if not boot_id():
+        pytest.skip("starts are not numbered here")
+    (tmp_path / CLAIMS).mkdir()
+    record = HolderRecord("e" * 32, replace(this_process(), pid=2**22 - 3, start="", boot="another"), space=pid_space())
+    write_holder(holder_path(tmp_path, record.token), record)
+    make_claim(ClaimFile(tmp_path, KEY, 1), record.token)
+    assert KEY in live_claims(tmp_path)
+
+
+def test_a_claim_that_a_listing_does_not_show_yet_is_another_ones(tmp_path: Path, monkeypatch) -> None:
+    """As computers of a network list a folder that they have listed a moment ago."""
+    far_away(tmp_path)
+    monkeypatch.setattr("app.project.claims.claims.newest_claim", lambda *_: None)
+    with pytest.raises(ClipClaimed, match="computer render-7"):
+        make(tmp_path).take(KEY)
+
+
+def test_records_of_a_newer_program_are_read(tmp_path: Path) -> None:
+    record = far_away(tmp_path)
+    path = holder_path(tmp_path, record.token)
+    written = json.loads(path.read_text())
+    written |= {"schema": 9, "colour": "blue"}
+    written["clips"][KEY]["mood"] = {"good": True}
+    path.write_text(json.dumps(written))
+    claims = make(tmp_path)
+    claims.look()
+    assert claims.elsewhere[KEY].progress == record.clips[KEY]
+
+
+def test_a_disk_that_is_full_when_the_claim_is_closed_leaves_no_claim(tmp_path: Path, monkeypatch) -> None:
+    """Disks of the network say only then that they are full."""
+    (tmp_path / CLAIMS).mkdir()
+    close = os.close
+
+    def refuse(descriptor: int) -> None:
+        close(descriptor)
+        raise OSError(122, "Disk quota exceeded")
+
+    monkeypatch.setattr("app.project.claims.claim_files.os.close", refuse)
+    with pytest.raises(OSError, match="quota"):
+        make_claim(ClaimFile(tmp_path, KEY, 1), "a" * 32)
+    assert list_claims(tmp_path) == {}
+
+
+def test_a_worker_puts_nothing_into_a_clip_that_another_process_has_taken_over(tmp_path: Path) -> None:
+    record = far_away(tmp_path)
+    check_claim(tmp_path, KEY, record.token)
+    check_claim(tmp_path, KEY, "")
+    check_claim(tmp_path, "0004", "a" * 32)
+    make_claim(ClaimFile(tmp_path, KEY, 2), "a" * 32)
+    with pytest.raises(ClipClaimed, match="Another program trains this clip"):
+        check_claim(tmp_path, KEY, record.token)
+
+
+def test_a_disk_that_cannot_be_written_is_named_as_the_cause(tmp_path: Path, monkeypatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr("app.project.claims.claims.write_holder", refuse)
+    with pytest.raises(DiskError, match="Read-only file system"):
+        make(tmp_path).take(KEY)
