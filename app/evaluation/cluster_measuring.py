@@ -13,7 +13,8 @@ from contextlib import contextmanager
 
 from msgspec.structs import replace
 
-from app.cluster.cluster import Cluster, check_address
+from app.cluster.cluster import Cluster
+from app.cluster.connecting import check_address
 from app.cluster.errands import SharedProject
 from app.cluster.far_child import FarChild
 from app.cluster.nodes import MEASURING, Node, Seat

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from app.cluster import mirror as mirror_module
-from app.cluster.cluster import Cluster, connect
+from app.cluster.cluster import Cluster
+from app.cluster.connecting import connect
 from app.cluster.contents import HEAD_BYTES, contents_of, job_key
 from app.cluster.mirror import Mirror, file_digest
 from app.cluster.nodes import Node, take_seat
