@@ -13,6 +13,7 @@ from app.cli.arguments import (
     EXIT_NOT_READY,
     EXIT_OK,
     EXIT_STOPPED,
+    add_cluster,
     count_of,
     fail,
     parse_range,
@@ -94,11 +95,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         default=NATIVE,
         help="portable: the same result on every kind of x86-64 processor, slower (default: native, all instructions)",
     )
-    command.add_argument(
-        "--cluster",
-        metavar="WHERE",
-        help="train on the computers of a Ray cluster: auto, HOST:PORT, or local:N for N clips side by side here",
-    )
+    add_cluster(command, does="train", things="clips")
     command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )

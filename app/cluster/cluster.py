@@ -1,4 +1,4 @@
-"""Cluster: the computers that Ray knows, looked at before they get clips, and watched while they train them."""
+"""Cluster: the computers that Ray knows, looked at before they get clips, and watched while they work on them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from app.cluster.connecting import connect
-from app.cluster.nodes import Node, Seat, take_seat
+from app.cluster.nodes import TRAINING, ClusterUse, Node, Seat, take_seat
 from app.cluster.ray_library import check_ray, ray_library
 from app.cluster.runner import look_around
 from app.cluster.versions import difference
@@ -32,19 +32,22 @@ class Cluster:
 
     Args:
         address: "auto", "HOST:PORT" of a running cluster of which this computer is part, or "local:N".
-        project, capture: What is trained.
+        project, capture: What is trained, or measured.
         n_bytes: Memory of a training.
+        use: What it is for.
 
     Attributes:
         bytes_sent, bytes_received: Of clips that were trained where the project is not seen, by clip.
 
     Raises:
-        ProjectError: Ray is not installed, the address is wrong, or no computer can train.
+        ProjectError: Ray is not installed, the address is wrong, or no computer can be used.
         TrainingError: The cluster does not answer.
     """
 
-    def __init__(self, address: str, project: Project, capture: Capture, *, n_bytes: int) -> None:
-        self.project, self.capture, self.n_bytes = project, capture, n_bytes
+    def __init__(
+        self, address: str, project: Project, capture: Capture, *, n_bytes: int, use: ClusterUse = TRAINING
+    ) -> None:
+        self.project, self.capture, self.n_bytes, self._use = project, capture, n_bytes, use
         self.bytes_sent: dict[int, int] = {}
         self.bytes_received: dict[int, int] = {}
         self._nodes: dict[str, Node] = {}
@@ -96,8 +99,9 @@ class Cluster:
         """Sentences about its computers without a full stop, for the user."""
         usable = [node for node in self.nodes if node.is_usable]
         copied = [node.name for node in usable if not node.sees_project]
-        n, of = self.n_slots, len(usable)
-        found = [f"the cluster trains {n} clip{'s' * (n > 1)} at once, on {of} computer{'s' * (of > 1)}"]
+        n, of, things = self.n_slots, len(usable), self._use.things
+        n_things = f"{n} {things if n > 1 else things.removesuffix('s')}"
+        found = [f"the cluster {self._use.verb}s {n_things} at once, on {of} computer{'s' * (of > 1)}"]
         if copied:
             found.append(f"what a clip needs is copied to {', '.join(copied)}, where the project cannot be seen")
         return found
@@ -124,11 +128,11 @@ class Cluster:
             return take_seat(self._nodes.values(), self.n_bytes, n_beside=n_beside, avoided=avoided)
 
     def refuse(self, node: Node, why: str) -> None:
-        """A computer gets no more clips. why: Follows its name, without a full stop."""
+        """A computer is not used any more. why: Follows its name, without a full stop."""
         with self._guard:
             if not node.refused:
                 node.refused = why
-                self._note(f"{node.name} gets no clips: it {why}")
+                self._note(f"{node.name} gets no {self._use.things}: it {why}")
 
     def take_notes(self) -> list[str]:
         """What happened to computers since the last call, in sentences without a full stop."""
@@ -145,7 +149,8 @@ class Cluster:
     def _nobody(self) -> EngineError:
         said = [f"{node.name} {node.refused or 'is gone'}" for node in self._nodes.values()]
         listed = "; ".join(dict.fromkeys(said)) or "it has none with free cores"
-        return TrainingError(f"No computer of the cluster can train clips: {listed}.", hint="Progress is kept.")
+        what = f"{self._use.verb} {self._use.things}"
+        return TrainingError(f"No computer of the cluster can {what}: {listed}.", hint="Progress is kept.")
 
     # ---------------------------------------------------------------- looking
 
@@ -184,7 +189,7 @@ class Cluster:
         node = self._nodes.get(found["NodeID"])
         if node is not None:
             if node.is_alive and not found["Alive"]:
-                self._note(f"{node.name} is gone; its clips resume elsewhere")
+                self._note(f"{node.name} is gone; its {self._use.things} resume elsewhere")
             node.is_alive = found["Alive"]
             return
         resources = found.get("Resources", {})
@@ -213,14 +218,18 @@ class Cluster:
             self.refuse(node, "could not run ClipGStream, which has to be installed there in the same version")
             return
         node.n_cores = min(node.n_cores, found["cores"])
-        node.sees_project = found["sees"] and found["fingerprint"] == self.project.settings.fingerprint
+        is_same = found["fingerprint"] == self.project.settings.fingerprint
+        node.sees_project = found["sees"] and is_same
+        why = found.get("why", "" if is_same else "the capture is another one there")
         other = difference(found["versions"])
         if other:
             self.refuse(node, other)
+        elif why and self._use.needs_project:
+            self.refuse(node, f"does not see the project and its capture ({why})")
         elif node.n_slots(self.n_bytes) < 1:
             has, needs = node.memory_bytes / 1e9, self.n_bytes / 1e9
-            self.refuse(node, f"has {has:.1f} GB of memory, and a clip takes about {needs:.1f} GB")
-        logger.info("%s: %d cores, %s", node.name, node.n_cores, found.get("why", "sees project and capture"))
+            self.refuse(node, f"has {has:.1f} GB of memory, and {self._use.each} takes about {needs:.1f} GB")
+        logger.info("%s: %d cores, %s", node.name, node.n_cores, why or "sees project and capture")
 
     def document(self) -> dict[str, Any]:
         """For `train --json`."""

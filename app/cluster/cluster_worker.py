@@ -119,7 +119,7 @@ class ClusterWorker:
 
     def _errand(self, seat: Seat, task: TrainTask) -> Errand[TrainTask]:
         if seat.node.sees_project:
-            return SharedProject(task)
+            return SharedProject(replace(task, project=task.project.absolute(), log=task.log.absolute()))
 
         def report(done: float) -> None:
             self._said = [StageReported(f"{SENDING} to {seat.node.name}", done)]

@@ -1,4 +1,4 @@
-"""Connecting with a Ray cluster, or starting one on this computer that nobody else reaches."""
+"""Connecting this process with a Ray cluster by its address, or starting one on this computer."""
 
 from __future__ import annotations
 
@@ -35,25 +35,30 @@ def connect(address: str, kept: ExitStack) -> None:
         ProjectError: The address is wrong, or nothing runs there.
         TrainingError: It does not answer.
     """
+    check_address(address)
     options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     local = _LOCAL.fullmatch(address)
     if local is not None:
         options |= _local_options(int(local[1]), kept)
-    elif address == AUTO or _ADDRESS.fullmatch(address):
+    else:
         options["address"] = address
         if address != AUTO:
             _check_reachable(address)
-    else:
-        raise ProjectError(
-            f"--cluster is '{address}', which is not the address of a cluster.",
-            hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
-        )
     try:
         _init(address, options, START_TIMEOUT_S if local is not None else CONNECT_TIMEOUT_S, kept)
     except EngineError:
         raise
     except Exception as error:
         raise _refused(address, error) from error
+
+
+def check_address(address: str) -> None:
+    """Check that an address is one of a cluster, wherever that is. Raises ProjectError."""
+    if address != AUTO and not _LOCAL.fullmatch(address) and not _ADDRESS.fullmatch(address):
+        raise ProjectError(
+            f"--cluster is '{address}', which is not the address of a cluster.",
+            hint="Write auto, HOST:PORT, or local:N for N at once on this computer.",
+        )
 
 
 def _init(address: str, options: dict[str, Any], timeout_s: float, kept: ExitStack) -> None:
@@ -84,7 +89,7 @@ def _init(address: str, options: dict[str, Any], timeout_s: float, kept: ExitSta
 def _local_options(n: int, kept: ExitStack) -> dict[str, Any]:
     """Options to start Ray here: nobody else reaches it, and nobody without the token is heard."""
     if n < 1:
-        raise ProjectError("--cluster local:0 would train nothing.", hint="Write local:N with N from 1.")
+        raise ProjectError("--cluster local:0 has no cores.", hint="Write local:N with N from 1.")
     folder = kept.enter_context(child_folder("clipgstream-ray-", what="The folder of the cluster"))
     token = folder / "token"
     descriptor = os.open(token, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)

@@ -48,7 +48,7 @@ def look_around(probe: str, nonce: str, capture: str, follow_links: bool, is_gro
 
     Args:
         probe: A file of the project that holds the nonce.
-        capture, follow_links, is_growing: See ProjectSettings.
+        capture, follow_links, is_growing: As the project says.
     Returns:
         "sees": whether both are here, "fingerprint" of the capture, and "why" not.
     """
@@ -56,11 +56,14 @@ def look_around(probe: str, nonce: str, capture: str, follow_links: bool, is_gro
     try:
         if Path(probe).read_text("ascii") != nonce:
             return found | {"why": "another project lies in its place"}
+    except (OSError, ValueError) as error:
+        return found | {"why": f"project: {getattr(error, 'strerror', None) or error}"}
+    try:
         seen = open_capture(Path(capture), follow_links=follow_links, is_growing=is_growing)
         fingerprint = seen.fingerprint
         seen.close()
     except (OSError, ValueError, EngineError) as error:
-        return found | {"why": str(error)}
+        return found | {"why": f"capture: {getattr(error, 'message', str(error)).rstrip('.')}"}
     return found | {"sees": True, "fingerprint": fingerprint}
 
 
