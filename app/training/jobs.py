@@ -21,6 +21,7 @@ def train_job(
     is_window_open: bool = True,
     live_view: str = "live",
     n_beside: int = 1,
+    n_everywhere: int = 1,
     claim: str = "",
     cpu: Processor = NATIVE,
 ) -> TrainJob:
@@ -29,7 +30,7 @@ def train_job(
     Args:
         holdout: Camera indices never trained on.
         overrides: Settings of this clip; those of the project when None.
-        n_beside, claim, cpu: See TrainJob.
+        n_beside, n_everywhere, claim, cpu: See TrainJob.
     """
     settings, document = project.settings, project.document
     overrides = dict(settings.overrides if overrides is None else overrides)
@@ -56,6 +57,7 @@ def train_job(
         is_window_open=is_window_open,
         live_view=live_view,
         n_beside=n_beside,
+        n_everywhere=n_everywhere,
         claim=claim,
         cpu=cpu,
     )

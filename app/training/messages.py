@@ -39,6 +39,7 @@ class TrainJob(Struct, frozen=True):
         is_window_open: Leave a core, or at least right of way, to a window.
         live_view: How often snapshots are written, one of LIVE_VIEWS.
         n_beside: How many trainings share the cores, this one included.
+        n_everywhere: How many processes train clips of the project, on all computers, as far as is known.
         claim: Token of the process that has claimed the clip; empty where none has.
         n_threads: Threads to compute with; None for a share of the cores.
     """
@@ -58,6 +59,7 @@ class TrainJob(Struct, frozen=True):
     is_window_open: bool = True
     live_view: str = "live"
     n_beside: int = 1
+    n_everywhere: int = 1
     claim: str = ""
     n_threads: int | None = None
     cpu: Processor = NATIVE

@@ -370,6 +370,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.looked_at.mode_of(clip_index),
             n_beside=n_beside,
+            n_everywhere=max(self.n_workers, self.claims.n_holders),
             claim=self.claims.token,
             cpu=self._cpu,
         )

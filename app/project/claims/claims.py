@@ -58,7 +58,7 @@ DEAD_AFTER_S = 60.0
 LONGEST_GAP_S = 10.0
 """Of silence, between two looks, no more counts."""
 MAX_SAID_AT_ONCE = 16
-"""Clips in training up to which a further one is said at once; the record of hundreds takes a while to write."""
+"""Clips in training up to which the record is written when one more begins; that of hundreds takes a while."""
 _MAX_TRIES = 100
 
 
@@ -268,6 +268,14 @@ class Claims:
     def elsewhere(self) -> Mapping[str, Elsewhere]:
         """Clips that other processes train, by key, as of the last look. Not to be changed."""
         return self._elsewhere
+
+    @property
+    def n_holders(self) -> int:
+        """How many processes train clips of the project, this one included, as far as their files say."""
+        try:
+            return len(list_holders(self.folder))
+        except OSError:
+            return 1
 
     @property
     def others(self) -> tuple[HolderRecord, ...]:

@@ -28,9 +28,11 @@ HELD_OUT_EVERY_S = 5.0
 HELD_OUT_SHARE = 0.03
 CHECKPOINT_EVERY_S = 25.0
 """From the start of one to the start of the next: a step and the writing included, a kill costs at most 30 s."""
-CHECKPOINT_SHARE = 0.01
-"""A disk on which one takes longer than a quarter of a second delays the next: hundreds of workers that share one, each
-with checkpoints of tens of megabytes, would keep it from all else and wait for it half of their time."""
+CHECKPOINT_SHARE = 0.5
+"""Only a disk on which writing takes longer than that delays the next one."""
+FEW_TRAININGS = 20
+"""Up to so many at once they are that frequent; hundreds that share a disk, each with tens of megabytes, would wait for
+it half of their time. Together they write no more than so many do."""
 
 
 def _snapshot_cadence(live_view: str) -> Cadence:
@@ -59,7 +61,9 @@ class Keeper:
         self._key, self._store, self._send, self._watch, self._clock = job.key, store, send, watch, clock
         self._live_view = job.live_view
         self._snapshot_cadence = _snapshot_cadence(job.live_view)
-        self._checkpoint_cadence = Cadence(CHECKPOINT_EVERY_S, CHECKPOINT_SHARE)
+        self._checkpoint_cadence = Cadence(
+            CHECKPOINT_EVERY_S * max(job.n_everywhere / FEW_TRAININGS, 1.0), CHECKPOINT_SHARE
+        )
         self._held_out_cadence = Cadence(HELD_OUT_EVERY_S, HELD_OUT_SHARE)
         self._snapshot_refusals = Refusals("The live view could not be written", send)
         self._checkpoint_refusals = Refusals("Progress could not be saved", send)

@@ -19,6 +19,7 @@ from app.project.opening.project_access import open_for_clips, open_project
 from app.training.messages import ClipTrained, TrainingFailed
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses, training_status
+from app.training.worker.keeper import CHECKPOINT_EVERY_S, Keeper
 from engine.errors import ProjectError
 from tests.app.conftest import DEADLINE_S, inline
 from tests.app.fakes import make_fake, make_slow
@@ -285,3 +286,17 @@ def test_clips_that_others_train_take_no_place_of_a_worker(pair) -> None:
     assert {outcome.state for outcome in outcomes} == {"trained"}
     assert sorted(ended) == [1, 2, 3, 4, 5]
     other.close()
+
+
+def test_hundreds_that_share_a_disk_write_checkpoints_less_often(pair) -> None:
+    one, other = pair
+    other.enqueue(1)
+    other.poll()
+    assert other.runs[1].worker.job.n_everywhere == 1
+    for number in range(99):
+        (one.project.folder / "claims" / f"holder-{number:032x}.json").write_text("{}")
+    one.enqueue(2)
+    job = one.runs[2].worker.job
+    assert job.n_everywhere == 100, "the other one is among them, this one not yet"
+    keeper = Keeper(job, None, send=print, watch=None, clock=lambda: 0.0)  # pyright: ignore[reportArgumentType]
+    assert keeper._checkpoint_cadence._every_s == 5 * CHECKPOINT_EVERY_S

@@ -12,6 +12,7 @@ from app.project.claims.claims import Claims
 from app.project.opening.opened_project import OpenedProject
 from app.training.jobs import train_job
 from app.training.messages import ClipTrained
+from app.training.process import ProcessWorker
 from app.training.service import TrainingService
 from app.training.training_status import ClipStatuses, training_status
 from app.training.worker import worker
@@ -207,10 +208,10 @@ def test_a_training_with_portable_numbers_begins_with_the_variables_that_librari
         begun.append(environment)
         raise Begun
 
-    monkeypatch.setattr("app.training.process.ChildProcess", begin)
+    launch = partial(ProcessWorker, start=begin)  # pyright: ignore[reportArgumentType]
     for clip_index, cpu in enumerate(PROCESSORS):
         write_trained(six, 0)
-        service = TrainingService(six.project, six.clips, holdout=six.holdout, cpu=cpu)
+        service = TrainingService(six.project, six.clips, holdout=six.holdout, cpu=cpu, launch=launch)
         with pytest.raises(Begun):
             service.enqueue_all([clip_index + 1])
     assert begun == [{"OF": "native"}, {"OF": "portable"}]

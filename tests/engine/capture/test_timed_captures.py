@@ -76,7 +76,9 @@ def test_a_camera_of_another_rate_is_not_short_of_frames(tmp_path, n_frames, is_
 def test_a_video_of_many_cameras_is_looked_at_once(tmp_path, monkeypatch):
     looked: list[Path] = []
     look = described_camera.read_video_header
-    monkeypatch.setattr(described_camera, "read_video_header", lambda path: looked.append(path) or look(path))
+    monkeypatch.setattr(
+        described_camera, "read_video_header", lambda path, **options: looked.append(path) or look(path, **options)
+    )
     write_video_of_kind(tmp_path / "a.mp4", n_frames=3)
     same: dict[str, dict[str, object]] = {f"x{row}": {"video": "a.mp4"} for row in range(50)}
     described(tmp_path, **same)

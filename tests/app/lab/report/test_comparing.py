@@ -87,14 +87,19 @@ def test_an_interrupted_report_says_what_is_kept_and_goes_on_from_there(project,
                 raise KeyboardInterrupt
             yield item
 
-    quick = partial(write_report, make_pictures=FakePictures)
-    monkeypatch.setattr(write, "write_report", partial(quick, measuring=interrupted))
+    def measured_by(work):
+        def quick(*args, **options):
+            return write_report(*args, **{**options, "measuring": work}, make_pictures=FakePictures)
+
+        monkeypatch.setattr(write, "write_report", quick)
+
+    measured_by(interrupted)
     assert main(["report", str(project), "--quiet"]) == 130
     said = capsys.readouterr().err
     assert "Interrupted. 16 of 24 pictures were measured and are kept; the same command resumes from there." in said
     assert "The page was not written." in said
     assert not (project / "reports").exists()
-    monkeypatch.setattr(write, "write_report", partial(quick, measuring=measure))
+    measured_by(measure)
     n_before = measure.n_rows
     assert main(["report", str(project)]) == 0
     assert measure.n_rows - n_before == 24 - 16
