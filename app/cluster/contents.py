@@ -80,7 +80,9 @@ def progress_contents(project: Project, job: TrainJob) -> tuple[int, list[SentFi
 
 def job_key(project: Project, job: TrainJob) -> str:
     """Names a training: the same inputs have the same name, whatever machine and threads it runs with."""
-    plain = structs.replace(job, is_window_open=False, live_view="off", n_beside=1, n_threads=None)
+    plain = structs.replace(
+        job, is_window_open=False, live_view="off", n_beside=1, n_everywhere=1, claim="", n_threads=None
+    )
     digest = blake2b(encoded(plain), digest_size=DIGEST_BYTES)
     for key in filter(None, (job.reference, job.previous)):
         header = read_clip_header(project.folder / "clips" / f"{key}.safetensors")

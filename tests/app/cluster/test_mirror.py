@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from msgspec.structs import replace
 
 from app.cluster import mirror as mirror_module
 from app.cluster.cluster import Cluster, connect
@@ -108,6 +109,8 @@ def test_of_pictures_only_those_of_the_clip_are_sent_in_full(make_opened, tmp_pa
         assert ("project/clips/0000.safetensors" in found) == (job is jobs[1])
         assert {"project/project.json", "capture/train_meta.json"} < found.keys()
     assert job_key(opened.project, jobs[0]) != job_key(opened.project, jobs[1])
+    again = replace(jobs[0], claim="of the next driver", n_beside=2, n_everywhere=30, n_threads=2, is_window_open=False)
+    assert job_key(opened.project, jobs[0]) == job_key(opened.project, again), "its copy continues"
 
 
 # ---------------------------------------------------------------- places and addresses
