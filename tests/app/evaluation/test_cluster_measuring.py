@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -128,8 +129,9 @@ def test_bad_options_are_refused_at_once(project: Path, given: list[str], said: 
 def test_two_nodes_of_which_one_is_lost(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     alone, said = measured(project), []
     forget(project)
-    with ray_nodes(1, tmp_path) as nodes:
-        running = [add_node(nodes, tmp_path / "doomed")]
+    compiled = os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache"))  # or each would compile kernels anew
+    with ray_nodes(1, tmp_path, XDG_CACHE_HOME=compiled) as nodes:
+        running = [add_node(nodes, Path(compiled))]
         with ClusterMeasuring(nodes.address, said.append) as measuring:
 
             def watched(*arguments: Any) -> Iterator[Any]:
