@@ -117,9 +117,20 @@ def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None,
     )
 
 
-def add_measuring_workers(command: argparse.ArgumentParser) -> None:
-    """The argument of every subcommand that can measure in several processes."""
+def add_cluster(command: argparse._ActionsContainer, *, does: str, things: str) -> None:
+    """The argument of every subcommand that can use a Ray cluster. does, things: For the help, as "train" and
+    "clips"."""
     command.add_argument(
+        "--cluster",
+        metavar="WHERE",
+        help=f"{does} on the computers of a Ray cluster: auto, HOST:PORT, or local:N for N {things} side by side here",
+    )
+
+
+def add_measuring_places(command: argparse.ArgumentParser) -> None:
+    """Arguments of every subcommand that can measure in several processes."""
+    places = command.add_mutually_exclusive_group()
+    places.add_argument(
         "--workers",
         dest="n_workers",
         type=count_of("processes"),
@@ -127,6 +138,7 @@ def add_measuring_workers(command: argparse.ArgumentParser) -> None:
         metavar="N",
         help="measure in N processes, at most one per core (default: 1); figures are the same",
     )
+    add_cluster(places, does="measure", things="processes")
 
 
 def count_of(what: str) -> Callable[[str], int]:

@@ -8,13 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from app.cli.arguments import EXIT_OK, add_figure_choices, add_measuring_workers, parse_range, path_argument
+from app.cli.arguments import EXIT_OK, add_figure_choices, add_measuring_places, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.cli.terminal.results import write_text
 from app.document.changes.object_changes import object_named
+from app.evaluation.cluster_measuring import measuring_at
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
-from app.evaluation.measuring_children import measuring_here
 from app.evaluation.speed.frame_rates import DEFINITION, frame_rates
 from app.export.staging import check_target
 from app.objects.object_figures import object_figures
@@ -29,7 +29,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     command.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
     add_figure_choices(command, default="all", said="all")
-    add_measuring_workers(command)
+    add_measuring_places(command)
     command.add_argument(
         "--fps",
         action="store_true",
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         chosen = opened.trained
     line = ProgressLine(is_quiet=options.quiet)
     progress = row_progress(line, "Measuring")
-    with measuring_here(options.n_workers) as measuring:
+    with measuring_at(options.n_workers, options.cluster, line.say) as measuring:
         document = evaluate_project(
             opened,
             clip_indices=chosen,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import math
 from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
@@ -13,6 +13,7 @@ from app.cli.arguments import (
     EXIT_NOT_READY,
     EXIT_OK,
     EXIT_STOPPED,
+    add_cluster,
     count_of,
     fail,
     parse_range,
@@ -37,11 +38,14 @@ from app.plan.sequence import plan_sequence, sequence_text
 from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
 from app.plan.speed import step_time
 from app.project.clips.clip_catalog import ClipCatalog
+from app.project.project import Project
 from app.residuals.kept_reading import note_kept
 from app.status import TrainingStatus
 from app.training.due import is_due
 from app.training.service import Launch, TrainingService
+from engine.capture.capture import Capture
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.parallel import n_cores
 from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
 from engine.text import duration_text
@@ -91,11 +95,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         default=NATIVE,
         help="portable: the same result on every kind of x86-64 processor, slower (default: native, all instructions)",
     )
-    command.add_argument(
-        "--cluster",
-        metavar="WHERE",
-        help="train on the computers of a Ray cluster: auto, HOST:PORT, or local:N for N clips side by side here",
-    )
+    add_cluster(command, does="train", things="clips")
     command.add_argument(
         "--plan", action="store_true", help="show what would be trained and what it costs; train nothing"
     )
@@ -131,33 +131,55 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
     project, capture = open_for_training(options, line.say)
     is_refused, outcomes = False, []
-    service: TrainingService | None = None
-    cluster: Cluster | None = None
     try:
-        clips = project.clips(capture.n_frames)
-        chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
-        holdout = capture.camera_indices(project.settings.holdout)
-        first = project.settings.reference_clip  # the others cannot begin before it
-        order = sorted(chosen, key=lambda clip_index: clip_index != first)
-        catalog = ClipCatalog(project, len(clips))
-        to_train = [clips[i] for i in order if options.again or is_due(catalog, i)]
+        outcomes = _train(options, launch, project, capture, line)
+        is_refused = exit_code(outcomes) == EXIT_BAD_INPUT
+    except (CaptureError, ProjectError) as error:
+        is_refused = not isinstance(error, DiskError)
+        raise
+    finally:
+        has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
+        if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
+            project.remove_files()
+        project.close()
+        if is_refused and not was_folder:
+            with suppress(OSError):  # not empty: something was learned
+                options.project.rmdir()
+    code = exit_code(outcomes)
+    return code if code == EXIT_OK else fail(code, failure_text(outcomes))
+
+
+def _train(
+    options: argparse.Namespace, launch: Launch, project: Project, capture: Capture, line: ProgressLine
+) -> list[ClipOutcome]:
+    clips = project.clips(capture.n_frames)
+    chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
+    first = project.settings.reference_clip  # the others cannot begin before it
+    order = sorted(chosen, key=lambda clip_index: clip_index != first)
+    catalog = ClipCatalog(project, len(clips))
+    to_train = [clips[i] for i in order if options.again or is_due(catalog, i)]
+    cluster: Cluster | None = None
+    with ExitStack() as kept:
+        kept.callback(line.finish)
         if options.cluster is None:
             sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
         else:
             joined = JoinedCluster(options.cluster, project, capture, to_train, catalog)
+            kept.callback(joined.close)
             cluster, launch = joined.cluster, joined.launch
-            sequence = PlannedClips(SideBySide(joined.n_slots), joined.kinds)
-        n_workers = sequence.together.n_workers
+            n_slots = joined.n_slots
+            sequence = PlannedClips(SideBySide(n_slots), joined.kinds, n_slots * n_cores() / cluster.n_cores)
         service = TrainingService(
             project,
             clips,
-            holdout=holdout,
+            holdout=capture.camera_indices(project.settings.holdout),
             launch=launch,
             is_window_open=False,
             catalog=catalog,
-            n_workers=n_workers,
+            n_workers=sequence.together.n_workers,
             cpu=options.cpu,
         )
+        kept.callback(service.close)
         service.set_live_view("off")
         note_kept(catalog, project, capture)
         names = ", ".join(project.settings.holdout) or "none"
@@ -165,64 +187,41 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
-        for sentence in (*capture.warnings, *(() if cluster is None else cluster.words)):
+        notes = (*capture.warnings, *(() if cluster is None else cluster.words), sequence.together.why_fewer)
+        for sentence in filter(None, notes):
             line.say(f"Note: {sentence}")
-        first = project.settings.reference_clip  # the others cannot begin before it
-        plans = PlanLines(
-            line,
-            project,
-            capture,
-            catalog=service.catalog,
-            step_time=step_time,
-            is_quiet=options.quiet,
-        )
-
-        def follow(status: TrainingStatus) -> None:
-            show_status(line, status)
-            if cluster is not None and service is not None:
-                service.n_workers = cluster.n_slots  # computers come and go
-
-        if sequence.together.why_fewer:
-            line.say(f"Note: {sequence.together.why_fewer}")
-        plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=options.quiet)
         table = SequenceTable(line, project, to_train, sequence)
+        has_others = cluster is not None or sequence.together.n_workers > 1
+        is_quiet = options.quiet or has_others  # plans look at pictures, and are of clips that have all cores
+        plans = PlanLines(line, project, capture, catalog=catalog, step_time=step_time, is_quiet=is_quiet)
+
+        def show(status: TrainingStatus) -> None:
+            if cluster is not None:
+                service.n_workers = cluster.n_slots  # computers come and go
+            if has_others:
+                table.show(status)
+            else:
+                show_status(line, status)
+
         outcomes = train_clips(
             service,
             order,
             on_begin=lambda clip_index: plans.begin(clips[clip_index]),
             is_again=options.again,
             own=parse_overrides(options.own_assignments) or None,
-            on_status=follow,
-            on_event=lambda event: show_event(line, event, has_others=n_workers > 1),
+            on_status=show,
+            on_event=lambda event: show_event(line, event, has_others=has_others),
             on_outcome=lambda outcome: (
                 show_outcome(line, outcome, has_others=len(order) > 1),
                 plans.end(outcome),
                 table.end(outcome),
             ),
         )
-        is_refused = exit_code(outcomes) == EXIT_BAD_INPUT
         line.finish()
         if options.json:
             document = train_document(project, capture, outcomes)
             print(json_text(document if cluster is None else document | {"cluster": cluster.document()}, indent=2))
-    except (CaptureError, ProjectError) as error:
-        is_refused = not isinstance(error, DiskError)
-        raise
-    finally:
-        line.finish()
-        if service is not None:
-            service.close()
-        if cluster is not None:
-            cluster.close()
-        has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
-        if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
-            project.remove_files()
-        project.close()
-        if is_refused and not was_folder:
-            with contextlib.suppress(OSError):  # not empty: something was learned
-                options.project.rmdir()
-    code = exit_code(outcomes)
-    return code if code == EXIT_OK else fail(code, failure_text(outcomes))
+    return outcomes
 
 
 def _check_price(options: argparse.Namespace) -> None:

@@ -1,13 +1,9 @@
-"""Cluster: the computers that Ray knows, looked at before they get clips, and watched while they train them."""
+"""Cluster: the computers that Ray knows, looked at before they get clips, and watched while they work on them."""
 
 from __future__ import annotations
 
 import logging
-import os
-import re
 import secrets
-import signal
-import socket
 import threading
 import time
 from collections.abc import Collection
@@ -15,30 +11,20 @@ from contextlib import ExitStack, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from app.cluster.nodes import Node, Seat, take_seat
+from app.cluster.connecting import connect
+from app.cluster.nodes import TRAINING, ClusterUse, Node, Seat, take_seat
 from app.cluster.ray_library import check_ray, ray_library
 from app.cluster.runner import look_around
 from app.cluster.versions import difference
 from app.project.project import Project
 from engine.capture.capture import Capture
-from engine.children.folder import child_folder
 from engine.errors import EngineError, ProjectError, TrainingError
-from engine.parallel import n_cores
-from engine.storage.files import PARTIAL_PREFIX, discard, disk_error
+from engine.storage.files import discard, disk_error, partial_path
 
 logger = logging.getLogger(__name__)
 
-AUTO = "auto"
-_LOCAL = re.compile(r"local:(\d{1,5})")
-_ADDRESS = re.compile(r"(?P<host>[^:/\s]+|\[[0-9a-fA-F:]+\]):(?P<port>\d{1,5})")
-REACH_TIMEOUT_S = 5.0
-CONNECT_TIMEOUT_S = 15.0
 LOOK_TIMEOUT_S = 90.0
 WATCH_EVERY_S = 2.0
-STORE_BYTES = 80 << 20
-"""Of Ray's object store where we start it: messages and parts of files pass through it, nothing stays."""
-_MAX_TEMPORARY = 40
-"""Characters: names of sockets below a longer folder are too long for the system."""
 
 
 class Cluster:
@@ -46,19 +32,22 @@ class Cluster:
 
     Args:
         address: "auto", "HOST:PORT" of a running cluster of which this computer is part, or "local:N".
-        project, capture: What is trained.
+        project, capture: What is trained, or measured.
         n_bytes: Memory of a training.
+        use: What it is for.
 
     Attributes:
         bytes_sent, bytes_received: Of clips that were trained where the project is not seen, by clip.
 
     Raises:
-        ProjectError: Ray is not installed, the address is wrong, or no computer can train.
+        ProjectError: Ray is not installed, the address is wrong, or no computer can be used.
         TrainingError: The cluster does not answer.
     """
 
-    def __init__(self, address: str, project: Project, capture: Capture, *, n_bytes: int) -> None:
-        self.project, self.capture, self.n_bytes = project, capture, n_bytes
+    def __init__(
+        self, address: str, project: Project, capture: Capture, *, n_bytes: int, use: ClusterUse = TRAINING
+    ) -> None:
+        self.project, self.capture, self.n_bytes, self._use = project, capture, n_bytes, use
         self.bytes_sent: dict[int, int] = {}
         self.bytes_received: dict[int, int] = {}
         self._nodes: dict[str, Node] = {}
@@ -74,7 +63,7 @@ class Cluster:
             self._kept.callback(self._ray.shutdown)
             self._nonce = secrets.token_hex(16)
             # of a name that the next one to open the project sweeps where this process has died
-            self._probe = project.live_dir.absolute() / f"{PARTIAL_PREFIX}{os.getpid()}-probe-{self._nonce}"
+            self._probe = partial_path(project.live_dir.absolute() / f"probe-{self._nonce}")
             self._write_probe()
             self._kept.callback(discard, self._probe)
             self._look_until_known()
@@ -110,8 +99,9 @@ class Cluster:
         """Sentences about its computers without a full stop, for the user."""
         usable = [node for node in self.nodes if node.is_usable]
         copied = [node.name for node in usable if not node.sees_project]
-        n, of = self.n_slots, len(usable)
-        found = [f"the cluster trains {n} clip{'s' * (n > 1)} at once, on {of} computer{'s' * (of > 1)}"]
+        n, of, things = self.n_slots, len(usable), self._use.things
+        n_things = f"{n} {things if n > 1 else things.removesuffix('s')}"
+        found = [f"the cluster {self._use.verb}s {n_things} at once, on {of} computer{'s' * (of > 1)}"]
         if copied:
             found.append(f"what a clip needs is copied to {', '.join(copied)}, where the project cannot be seen")
         return found
@@ -120,6 +110,11 @@ class Cluster:
     def n_slots(self) -> int:
         """How many clips may train side by side now."""
         return max(sum(node.n_slots(self.n_bytes) for node in self.nodes if node.is_usable), 1)
+
+    @property
+    def n_cores(self) -> int:
+        """Cores that its clips divide."""
+        return max(sum(node.n_cores for node in self.nodes if node.is_usable), 1)
 
     def seat_for(self, *, n_beside: int, avoided: Collection[Node] = ()) -> Seat | None:
         """See `take_seat`.
@@ -133,11 +128,11 @@ class Cluster:
             return take_seat(self._nodes.values(), self.n_bytes, n_beside=n_beside, avoided=avoided)
 
     def refuse(self, node: Node, why: str) -> None:
-        """A computer gets no more clips. why: Follows its name, without a full stop."""
+        """A computer is not used any more. why: Follows its name, without a full stop."""
         with self._guard:
             if not node.refused:
                 node.refused = why
-                self._note(f"{node.name} gets no clips: it {why}")
+                self._note(f"{node.name} gets no {self._use.things}: it {why}")
 
     def take_notes(self) -> list[str]:
         """What happened to computers since the last call, in sentences without a full stop."""
@@ -154,7 +149,8 @@ class Cluster:
     def _nobody(self) -> EngineError:
         said = [f"{node.name} {node.refused or 'is gone'}" for node in self._nodes.values()]
         listed = "; ".join(dict.fromkeys(said)) or "it has none with free cores"
-        return TrainingError(f"No computer of the cluster can train clips: {listed}.", hint="Progress is kept.")
+        what = f"{self._use.verb} {self._use.things}"
+        return TrainingError(f"No computer of the cluster can {what}: {listed}.", hint="Progress is kept.")
 
     # ---------------------------------------------------------------- looking
 
@@ -193,7 +189,7 @@ class Cluster:
         node = self._nodes.get(found["NodeID"])
         if node is not None:
             if node.is_alive and not found["Alive"]:
-                self._note(f"{node.name} is gone; its clips resume elsewhere")
+                self._note(f"{node.name} is gone; its {self._use.things} resume elsewhere")
             node.is_alive = found["Alive"]
             return
         resources = found.get("Resources", {})
@@ -208,7 +204,8 @@ class Cluster:
         """Ask a computer, once more, whether it sees the project; it gets no clips before it has answered."""
         settings = self.project.settings
         look = self._ray.remote(look_around).options(**node.pinned(num_cpus=0, max_retries=0))
-        answer = look.remote(str(self._probe), self._nonce, settings.capture, settings.follow_links)
+        seen = settings.capture, settings.follow_links, settings.is_growing
+        answer = look.remote(str(self._probe), self._nonce, *seen)
         with self._guard:
             node.sees_project = None
             self._looks[answer] = node, time.monotonic()
@@ -221,14 +218,18 @@ class Cluster:
             self.refuse(node, "could not run ClipGStream, which has to be installed there in the same version")
             return
         node.n_cores = min(node.n_cores, found["cores"])
-        node.sees_project = found["sees"] and found["fingerprint"] == self.project.settings.fingerprint
+        is_same = found["fingerprint"] == self.project.settings.fingerprint
+        node.sees_project = found["sees"] and is_same
+        why = found.get("why", "" if is_same else "the capture is another one there")
         other = difference(found["versions"])
         if other:
             self.refuse(node, other)
+        elif why and self._use.needs_project:
+            self.refuse(node, f"does not see the project and its capture ({why})")
         elif node.n_slots(self.n_bytes) < 1:
             has, needs = node.memory_bytes / 1e9, self.n_bytes / 1e9
-            self.refuse(node, f"has {has:.1f} GB of memory, and a clip takes about {needs:.1f} GB")
-        logger.info("%s: %d cores, %s", node.name, node.n_cores, found.get("why", "sees project and capture"))
+            self.refuse(node, f"has {has:.1f} GB of memory, and {self._use.each} takes about {needs:.1f} GB")
+        logger.info("%s: %d cores, %s", node.name, node.n_cores, why or "sees project and capture")
 
     def document(self) -> dict[str, Any]:
         """For `train --json`."""
@@ -240,117 +241,3 @@ class Cluster:
             "bytes_sent": sum(self.bytes_sent.values()),
             "bytes_received": sum(self.bytes_received.values()),
         }
-
-
-# ---------------------------------------------------------------- connecting
-
-
-def connect(address: str, kept: ExitStack) -> None:
-    """Connect this process with a cluster, or start one on this computer.
-
-    Args:
-        kept: Takes over what has to go at the end.
-    Raises:
-        ProjectError: The address is wrong, or nothing runs there.
-        TrainingError: It does not answer.
-    """
-    options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
-    local = _LOCAL.fullmatch(address)
-    if local is not None:
-        options |= _local_options(int(local[1]), kept)
-    elif address == AUTO or _ADDRESS.fullmatch(address):
-        options["address"] = address
-        if address != AUTO:
-            _check_reachable(address)
-    else:
-        raise ProjectError(
-            f"--cluster is '{address}', which is not the address of a cluster.",
-            hint="Write auto, HOST:PORT, or local:N for N clips side by side on this computer.",
-        )
-    before = signal.getsignal(signal.SIGTERM)
-    try:
-        if local is not None:
-            ray_library().init(**options)  # here: what a thread starts ends with that thread
-        else:
-            _init_in_time(address, options)
-    except EngineError:
-        raise
-    except Exception as error:
-        raise _refused(address, error) from error
-    finally:
-        if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, before)
-
-
-def _init_in_time(address: str, options: dict[str, Any]) -> None:
-    """On a thread: where something else than Ray answers, it waits for minutes and hears no signal."""
-    failed: list[Exception] = []
-
-    def work() -> None:
-        try:
-            ray_library().init(**options)
-        except Exception as error:  # noqa: BLE001 - handed to the thread that waits
-            failed.append(error)
-
-    thread = threading.Thread(target=work, name="connecting", daemon=True)
-    thread.start()
-    thread.join(CONNECT_TIMEOUT_S)
-    if thread.is_alive():
-        raise TrainingError(
-            f"No Ray cluster answers at {address} within {CONNECT_TIMEOUT_S:.0f} s.",
-            hint="Check the address and, where the cluster asks for one, the token (RAY_AUTH_TOKEN_PATH).",
-        )
-    if failed:
-        raise failed[0]
-
-
-def _local_options(n: int, kept: ExitStack) -> dict[str, Any]:
-    """Options to start Ray here: nobody else reaches it, and nobody without the token is heard."""
-    if n < 1:
-        raise ProjectError("--cluster local:0 would train nothing.", hint="Write local:N with N from 1.")
-    folder = kept.enter_context(child_folder("clipgstream-ray-", what="The folder of the cluster"))
-    token = folder / "token"
-    descriptor = os.open(token, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
-    with open(descriptor, "w", encoding="ascii") as file:
-        file.write(secrets.token_hex(32))
-    os.environ |= {
-        "RAY_AUTH_MODE": "token",
-        "RAY_AUTH_TOKEN_PATH": str(token),
-        "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",  # so that Ray uses 127.0.0.1, on every system
-    }
-    os.environ.pop("RAY_AUTH_TOKEN", None)
-    os.environ.pop("RAY_ADDRESS", None)
-    return {
-        "address": "local",
-        "num_cpus": min(n, n_cores()),
-        "include_dashboard": False,
-        "object_store_memory": STORE_BYTES,
-        "_node_ip_address": "127.0.0.1",
-        "_temp_dir": str(folder) if len(str(folder)) <= _MAX_TEMPORARY else None,
-    }
-
-
-def _check_reachable(address: str) -> None:
-    """Raises TrainingError where nothing listens: Ray itself would try for minutes."""
-    match = _ADDRESS.fullmatch(address)
-    assert match is not None
-    try:
-        socket.create_connection((match["host"].strip("[]"), int(match["port"])), timeout=REACH_TIMEOUT_S).close()
-    except (OSError, OverflowError) as error:
-        raise TrainingError(
-            f"The cluster at {address} cannot be reached ({getattr(error, 'strerror', None) or error}).",
-            hint="Check that it runs, and that no firewall is in between.",
-        ) from error
-
-
-def _refused(address: str, error: Exception) -> EngineError:
-    text = str(error).strip().splitlines()
-    said = text[0].rstrip(".") if text else type(error).__name__
-    if isinstance(error, ConnectionError) and address == AUTO:
-        return ProjectError(
-            "No Ray cluster runs on this computer.",
-            hint="Start one with `ray start`, name one as HOST:PORT, or write local:N.",
-        )
-    if "version" in said.lower() and "mismatch" in str(error).lower():
-        return ProjectError(f"The cluster at {address} has another version of Ray or Python ({said}).")
-    return TrainingError(f"The cluster at {address} could not be joined ({said}).", hint="See docs/cluster.md.")

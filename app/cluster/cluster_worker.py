@@ -61,7 +61,7 @@ class ClusterWorker:
         self._commands: list[Command] = []
         self._avoided: list[Node] = []
         self._said: list[Event] = []
-        self._is_whole = False
+        self._is_whole = self._is_waiting = False
         self._n_retries = 0
         self._has_ended = False
 
@@ -100,7 +100,9 @@ class ClusterWorker:
             return [self._stopped(self._stop)]
         seat = self._cluster.seat_for(n_beside=self.job.n_beside, avoided=self._avoided)
         if seat is None:
-            return [StageReported(WAITING, 0.0)]
+            is_told, self._is_waiting = self._is_waiting, True
+            return [] if is_told else [StageReported(WAITING, 0.0)]
+        self._is_waiting = False
         started: list[FarChild[TrainTask, Event, None]] = []
 
         def start(
@@ -117,7 +119,7 @@ class ClusterWorker:
 
     def _errand(self, seat: Seat, task: TrainTask) -> Errand[TrainTask]:
         if seat.node.sees_project:
-            return SharedProject(task)
+            return SharedProject(replace(task, project=task.project.absolute(), log=task.log.absolute()))
 
         def report(done: float) -> None:
             self._said = [StageReported(f"{SENDING} to {seat.node.name}", done)]

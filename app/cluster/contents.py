@@ -81,7 +81,7 @@ def progress_contents(project: Project, job: TrainJob) -> tuple[int, list[SentFi
 def job_key(project: Project, job: TrainJob) -> str:
     """Names a training: the same inputs have the same name, whatever machine and threads it runs with."""
     plain = structs.replace(
-        job, is_window_open=False, live_view="off", n_beside=1, n_everywhere=1, claim="", n_threads=None
+        job, is_window_open=False, live_view="off", n_beside=1, n_everywhere=1, n_threads=None, claim=""
     )
     digest = blake2b(encoded(plain), digest_size=DIGEST_BYTES)
     for key in filter(None, (job.reference, job.previous)):
@@ -108,7 +108,7 @@ def _of_capture(capture: Capture, job: TrainJob, *, is_whole: bool) -> Iterator[
             if source is None:
                 continue
             files = _files_of(source)
-            media.update(files)
+            media.update(path for path in files if not capture.is_growing or path.is_file())  # some were lost
             if is_cut and len(files) > 1 and job.reference is not None:
                 heads.update(files)
                 whole.update(files[frame] for frame in clip)
@@ -119,7 +119,8 @@ def _of_capture(capture: Capture, job: TrainJob, *, is_whole: bool) -> Iterator[
         for name in names
         if Path(name).suffix.lower() not in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES)
     }
-    for path in sorted(media | {path for path in others if path.is_file()}):
+    others = {path for path in others if path.is_file()}
+    for path in sorted(media | others):
         if not path.is_relative_to(capture.path):
             raise CaptureError(
                 "A file of the capture lies outside of its folder, so that the capture cannot be copied to a computer.",

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Generic
 
 from msgspec.structs import replace
 
@@ -20,6 +20,7 @@ from app.cluster.nodes import Node
 from app.project.claims.holder_record import machine_name
 from app.training.messages import ClipTrained, SnapshotWritten, TrainingFailed, TrainingStopped
 from app.training.process import TrainTask
+from engine.children.kind import Job
 from engine.errors import CaptureError, DiskError
 from engine.storage.files import checked_path, disk_error, open_to_append
 
@@ -31,16 +32,19 @@ CHECKPOINT_EVERY_S = 240.0
 MAX_LOG_BYTES = 256 << 10
 
 
-class SharedProject:
-    """For a computer that sees the project and its capture. See `Errand`. task: As it is here."""
+class SharedProject(Generic[Job]):
+    """For a computer that sees the project and its capture. See `Errand`.
 
-    def __init__(self, task: TrainTask) -> None:
-        self._task = task
+    Args:
+        job: As it is here. Paths are absolute: where it runs there is another working directory.
+    """
 
-    def begin(self, remote: Remote) -> TrainTask:
+    def __init__(self, job: Job) -> None:
+        self._job = job
+
+    def begin(self, remote: Remote) -> Job:
         """See `Errand`."""
-        task = self._task  # where it runs there is another working directory
-        return replace(task, project=task.project.absolute(), log=task.log.absolute())
+        return self._job
 
     def receive(self, remote: Remote, events: Sequence[Any]) -> None:
         """See `Errand`."""
@@ -84,7 +88,7 @@ class CopiedProject:
                     remote.call("build", _names([*contents, *progress]), job.key)
             except OSError as error:
                 raise CaptureError(f"A file cannot be read ({error.strerror}).", path=error.filename) from error
-        if remote.call("fingerprint") != job.fingerprint:
+        if remote.call("fingerprint", project.settings.is_growing) != job.fingerprint:
             raise CaptureError("The copy of the capture is not understood as the capture is here.")
         log = there / "project" / "logs" / self._files.log.name
         return replace(self._task, project=there / "project", capture=there / "capture", log=log)

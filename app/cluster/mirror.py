@@ -19,7 +19,7 @@ from pathlib import Path
 from app.project.lock import ProcessLock
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import DiskError, ProjectError
-from engine.storage.files import atomic_path, disk_error
+from engine.storage.files import atomic_path, disk_error, partial_path
 from engine.user_folders import cache_dir
 
 MAX_BYTES = 64 << 30
@@ -76,7 +76,7 @@ class Mirror:
     def put(self, parts: Sequence[tuple[str, int, bytes, bool]]) -> None:
         """Take parts of contents: hash, place, bytes, and whether that was the last part."""
         for digest, offset, data, is_last in parts:
-            partial = self._files / f".partial-{os.getpid()}-{digest}"
+            partial = partial_path(self._files / digest)
             try:
                 with open(partial, "r+b" if offset else "wb") as file:
                     file.seek(offset)

@@ -1,14 +1,33 @@
-"""The computers of a cluster: what each has, which may train clips, and who sits where."""
+"""The computers of a cluster: what each has, which may be used, and who sits where."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from app.cluster.ray_library import ray_library
 from app.cluster.runner import Runner
+
+
+class ClusterUse(NamedTuple):
+    """What a cluster is used for, in the words of its messages.
+
+    Attributes:
+        verb, things: As in "train clips".
+        each: What takes memory, as in "a clip takes about 2 GB".
+        needs_project: Whether a computer is of no use that does not see project and capture: it gets no copies.
+    """
+
+    verb: str
+    things: str
+    each: str
+    needs_project: bool
+
+
+TRAINING = ClusterUse("train", "clips", "a clip", needs_project=False)
+MEASURING = ClusterUse("measure", "pictures", "measuring", needs_project=True)
 
 
 @dataclass(eq=False)
@@ -20,7 +39,7 @@ class Node:
         name: For people.
         n_cores, memory_bytes: What Ray may hand out there.
         sees_project: Whether project and capture are there under their paths; None before it was asked.
-        refused: Why it trains no clips; empty where it does.
+        refused: Why it is not used; empty where it is.
         is_alive: Whether Ray still counts it.
         n_clips, n_threads: Taken now.
         shipping: Held while something is sent there, so that nothing is sent twice.
@@ -39,7 +58,7 @@ class Node:
 
     @property
     def is_usable(self) -> bool:
-        """Whether clips may be trained there."""
+        """Whether clips may be trained, or measured, there."""
         return self.is_alive and self.sees_project is not None and not self.refused
 
     def n_slots(self, n_bytes: int) -> int:

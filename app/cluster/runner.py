@@ -16,7 +16,6 @@ from typing import Any
 
 from app.cluster.mirror import Mirror
 from app.cluster.versions import versions
-from app.project.claims.holder_record import machine_name
 from engine.capture.capture import open_capture
 from engine.children.kind import ChildFailed, ChildKind, find
 from engine.children.messages import Refusal, decoded, encoded
@@ -44,23 +43,27 @@ def _answered(method: Callable[..., Any]) -> Callable[..., Answer]:
     return answer
 
 
-def look_around(probe: str, nonce: str, capture: str, follow_links: bool) -> dict[str, Any]:
-    """Describe this computer: name, cores, versions, and whether it sees the project and the capture.
+def look_around(probe: str, nonce: str, capture: str, follow_links: bool, is_growing: bool) -> dict[str, Any]:
+    """Describe this computer: cores, versions, and whether it sees the project and the capture.
 
     Args:
         probe: A file of the project that holds the nonce.
+        capture, follow_links, is_growing: As the project says.
     Returns:
         "sees": whether both are here, "fingerprint" of the capture, and "why" not.
     """
-    found = {"name": machine_name(), "cores": n_cores(), "versions": versions(), "sees": False, "fingerprint": ""}
+    found = {"cores": n_cores(), "versions": versions(), "sees": False, "fingerprint": ""}
     try:
         if Path(probe).read_text("ascii") != nonce:
             return found | {"why": "another project lies in its place"}
-        seen = open_capture(Path(capture), follow_links=follow_links)
+    except (OSError, ValueError) as error:
+        return found | {"why": f"project: {getattr(error, 'strerror', None) or error}"}
+    try:
+        seen = open_capture(Path(capture), follow_links=follow_links, is_growing=is_growing)
         fingerprint = seen.fingerprint
         seen.close()
     except (OSError, ValueError, EngineError) as error:
-        return found | {"why": str(error)}
+        return found | {"why": f"capture: {getattr(error, 'message', str(error)).rstrip('.')}"}
     return found | {"sees": True, "fingerprint": fingerprint}
 
 
@@ -156,9 +159,9 @@ class Runner:
         return self._copy.build(names, key)
 
     @_answered
-    def fingerprint(self) -> str:
+    def fingerprint(self, is_growing: bool) -> str:
         """Of the capture that was copied. Refused where it cannot be opened."""
-        capture = open_capture(self._copy.capture)
+        capture = open_capture(self._copy.capture, is_growing=is_growing)
         capture.close()
         return capture.fingerprint
 

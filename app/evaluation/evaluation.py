@@ -9,11 +9,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS, KeptFigures
+from app.project.project import Project
 from engine.capture.exclusions import exclusion_key
 from engine.metrics.columns import FIGURES_VERSION
 from engine.parallel import n_cores
@@ -181,8 +183,13 @@ def kept_figures(
     excluded = exclusion_key(opened.project.document.exclusions, (first, clip.stop))
     content |= {"excluded": excluded} if excluded else {}
     before = scope.before(clip_index)
-    path = opened.project.folder / EVALUATIONS / f"{clip_index:04d}-{scope.metrics}-{scope.precision}.jsonl"
+    path = figures_path(opened.project, clip_index, scope.metrics, scope.precision)
     return KeptFigures(path, content, None if before is None else _fingerprint(opened, before), say)
+
+
+def figures_path(project: Project, clip_index: int, metrics: Choice, precision: Precision) -> Path:
+    """The file of a clip's kept figures."""
+    return project.folder / EVALUATIONS / f"{clip_index:04d}-{metrics}-{precision}.jsonl"
 
 
 def is_measured(opened: TrainedProject, scope: EvaluationScope) -> bool:

@@ -55,7 +55,7 @@ class KeptFigures:
         self._file: BinaryIO | None = None
         self._is_of_this_clip = False
         self.is_writable = True
-        self._read()
+        self._read(say)
 
     def add(self, item: EvalRow | PairRow) -> None:
         """Add a figure, and write it while `writing`."""
@@ -81,6 +81,8 @@ class KeptFigures:
         with contextlib.ExitStack() as stack:
             try:
                 check_folder(self.path.parent)
+                if not self._is_of_this_clip:
+                    self._read(lambda sentence: None)  # another process may have begun it meanwhile
                 if not self._is_of_this_clip:
                     with atomic_path(self.path) as partial:
                         partial.write_text(checked_line(self._content), encoding="utf-8")
@@ -110,17 +112,17 @@ class KeptFigures:
         self.is_writable = False
         self._say(f"Figures are not kept ({error.strerror or error}) - {self.path}")
 
-    def _read(self) -> None:
+    def _read(self, say: Callable[[str], None]) -> None:
         try:
             lines, n_damaged = read_checked_lines(self.path, max_bytes=MAX_BYTES)
         except (FileNotFoundError, NotADirectoryError):
             return
         except OSError as error:
-            self._say(f"Kept figures cannot be read and are measured again ({error.strerror or error}) - {self.path}")
+            say(f"Kept figures cannot be read and are measured again ({error.strerror or error}) - {self.path}")
             return
         if not lines or {k: v for k, v in lines[0].items() if k not in _FORMER_KEYS} != self._content:
             if n_damaged:
-                self._say(f"Kept figures are damaged and are measured again - {self.path}")
+                say(f"Kept figures are damaged and are measured again - {self.path}")
             return
         self._is_of_this_clip = True
         for line in lines[1:]:
@@ -129,7 +131,7 @@ class KeptFigures:
             except (KeyError, TypeError, ValueError):
                 n_damaged += 1
         if n_damaged:
-            self._say(f"{n_damaged} kept figures are damaged and are measured again - {self.path}")
+            say(f"{n_damaged} kept figures are damaged and are measured again - {self.path}")
 
     def _take(self, line: dict[str, Any]) -> None:
         if "row" in line:

@@ -21,7 +21,7 @@ from app.evaluation.headless import TrainedProject, open_trained
 from app.project.opening.project_access import open_project
 from engine.backends.table import choose_backend, chosen_name
 from engine.children.kind import ChildFailed, ChildKind
-from engine.children.process import MAX_EVENTS_PER_POLL, ChildProcess
+from engine.children.process import MAX_EVENTS_PER_POLL, Child, ChildProcess
 from engine.errors import EngineError
 from engine.kernels.cache import use_kernel_cache
 from engine.metrics.clips.seams import PairRow
@@ -93,8 +93,12 @@ EVALUATING: ChildKind[EvaluationTask, FigureEvent, None] = ChildKind(
     command=MeasureClip,
 )
 StartEvaluating = Callable[
-    [ChildKind[EvaluationTask, FigureEvent, None], EvaluationTask], ChildProcess[EvaluationTask, FigureEvent, None]
+    [ChildKind[EvaluationTask, FigureEvent, None], EvaluationTask], Child[EvaluationTask, FigureEvent, None]
 ]
+
+
+class MeasuringLost(EngineError):
+    """A process is gone, which may not happen again."""
 
 
 def main(task: EvaluationTask, parent: Parent[FigureEvent]) -> None:
@@ -106,7 +110,13 @@ def main(task: EvaluationTask, parent: Parent[FigureEvent]) -> None:
     choose_backend(task.backend)
     warm_cache()  # or several processes would compile the same
     project = open_project(Path(task.project), is_writable=False)
-    capture = open_capture(task.capture, scale=task.scale, frames=task.frames, follow_links=task.follow_links)
+    capture = open_capture(
+        task.capture,
+        scale=task.scale,
+        frames=task.frames,
+        follow_links=task.follow_links,
+        is_growing=project.settings.is_growing,
+    )
     opened, measuring = open_trained(project, capture).measured, ClipMeasuring(task.n_threads)
     while True:
         wanted = parent.receive(POLL_S)
@@ -128,14 +138,14 @@ class MeasuringChildren:
 
     def __init__(self, n_workers: int, *, n_threads: int | None = None, start: StartEvaluating = ChildProcess) -> None:
         self._n_workers, self._n_threads, self._start = n_workers, n_threads, start
-        self._children: list[ChildProcess[EvaluationTask, FigureEvent, None]] = []
+        self._children: list[Child[EvaluationTask, FigureEvent, None]] = []
         self._task: EvaluationTask | None = None
 
     def __enter__(self) -> MeasuringChildren:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._end()
+        self.end()
 
     def __call__(
         self, opened: TrainedProject, scope: EvaluationScope, clip_index: int, unknown: Frames
@@ -143,7 +153,8 @@ class MeasuringChildren:
         """Missing rows and pairs, cameras mixed.
 
         Raises:
-            EngineError: A process failed, or died.
+            MeasuringLost: A process is gone.
+            EngineError: A process failed.
         """
         self._begin(opened, scope)
         busy = []
@@ -174,8 +185,8 @@ class MeasuringChildren:
         """Have processes for this project and scope."""
         capture = opened.capture
         task = EvaluationTask(
-            project=str(opened.project.folder),
-            capture=str(capture.path),
+            project=str(opened.project.folder.absolute()),
+            capture=str(capture.path.absolute()),
             scale=capture.scale,
             frames=capture.frames,
             follow_links=capture.follow_links,
@@ -186,11 +197,12 @@ class MeasuringChildren:
             n_threads=self._n_threads,
         )
         if task != self._task:
-            self._end()
+            self.end()
             self._task = task
             self._children = [self._start(EVALUATING, task) for _ in range(min(self._n_workers, len(scope.cameras)))]
 
-    def _end(self) -> None:
+    def end(self) -> None:
+        """End all processes; the next call starts them anew."""
         for child in self._children:
             child.end()
         self._children, self._task = [], None
@@ -207,12 +219,12 @@ def measuring_here(n_workers: int) -> Iterator[Measuring | None]:
         yield measuring
 
 
-def _failure(child: ChildProcess[EvaluationTask, FigureEvent, None]) -> EngineError:
+def _failure(child: Child[EvaluationTask, FigureEvent, None]) -> EngineError:
+    reason, kind = f"{EVALUATING.what} ended early", EngineError
     try:
         child.result()
-        reason = f"{EVALUATING.what} ended early"
     except EngineError as error:
         return error
     except ChildFailed as error:
-        reason = str(error)
-    return EngineError(f"{reason}.", hint="Figures measured so far are kept; the same command resumes from there.")
+        reason, kind = str(error), EngineError if error.is_final else MeasuringLost
+    return kind(f"{reason}.", hint="Figures measured so far are kept; the same command resumes from there.")

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from app.background.latest import LatestWorker
+from app.plan.makespan import Seldom, time_left
 from app.plan.planning import clip_history, plan_clip, plan_status, sum_known
 from app.plan.speed import known_step_time, step_time
 from app.project.claims.holder_record import ClipProgress
@@ -24,6 +25,7 @@ from app.status import PlanStatus, QueuedClip, QueueStatus, SequenceForecast
 from app.training.due import due_clips, stale_clips
 from app.training.own_settings import is_source
 from app.training.service import TrainingService
+from app.training.train_queue import needed_clips
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
@@ -109,36 +111,55 @@ def together(parts: Sequence[SequenceForecast]) -> SequenceForecast:
 
 
 def at_once(
-    going: Sequence[SequenceForecast], planned_s: Sequence[float | None], rest: SequenceForecast
-) -> SequenceForecast:
-    """Clips that train and those after them, as many at a time as train now.
+    own_s: Mapping[int, float | None],
+    alone_s: Mapping[int, float | None],
+    waiting_s: Mapping[int, float | None],
+    needs: Mapping[int, Sequence[int]],
+    n_workers: int,
+) -> float | None:
+    """Seconds until clips that train and those after them are finished; None where nobody can know.
 
     What they take from one another, as they share cores, shows in how much longer than planned they take; until that is
     known, several at a time are expected to take as long as one after the other.
 
     Args:
-        going: What is left of those that train, by their own speed.
-        planned_s: Seconds left of each of them if it trained alone.
-        rest: Clips that come after them, each as if it trained alone.
+        own_s: What is left of those that train, by their own speed; None where they have none yet.
+        alone_s: The same, as planned, if each trained alone.
+        waiting_s: Of clips that come after them, in their order, if each trained alone.
+        needs, n_workers: See `ends_of`.
     """
-    n, whole = len(going), together([*going, rest])
-    own_s = [part.seconds for part in going]
-    known = [(own, alone) for own, alone in zip(own_s, planned_s, strict=True) if own and alone]
-    if n < 2 or whole.seconds is None or not known:
-        return whole
-    times_longer = sum(own for own, _ in known) / sum(alone for _, alone in known)
-    seconds = (sum_known(own_s) or 0.0) / n + (rest.seconds or 0.0) * times_longer / n
-    return replace(whole, seconds=max(seconds, *(own or 0.0 for own in own_s)))
+    known = [(own, alone) for own, alone in ((own, alone_s[index]) for index, own in own_s.items()) if own and alone]
+    times_longer = float(n_workers)
+    if len(own_s) > 1 and known:
+        times_longer = sum(own for own, _ in known) / sum(alone for _, alone in known)
+    first = {other for needed in needs.values() for other in needed}  # nothing trains next to these
+
+    def expected_s(index: int, planned_s: float | None) -> float | None:
+        return planned_s if planned_s is None or index in first else planned_s * times_longer
+
+    going = {index: expected_s(index, alone_s[index]) if own is None else own for index, own in own_s.items()}
+    waiting = {index: expected_s(index, planned_s) for index, planned_s in waiting_s.items()}
+    return time_left(going, waiting, needs, n_workers)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Waiting:
-    """The waiting clips and the work left, without the clip that trains."""
+    """The waiting clips and the work left, without the clips that train.
+
+    Attributes:
+        clips: As they are shown.
+        queued, everything, stale: The work of those that wait, of all that are left, and of those that are out of date.
+        queued_s, everything_s: Seconds that each of them takes, by clip, in the order of training.
+        needs: Clips that have to be finished before each of them.
+    """
 
     clips: tuple[QueuedClip, ...] = ()
     queued: SequenceForecast = NOTHING
     everything: SequenceForecast = NOTHING
     stale: SequenceForecast = NOTHING
+    queued_s: Mapping[int, float | None] = field(default_factory=dict)
+    everything_s: Mapping[int, float | None] = field(default_factory=dict)
+    needs: Mapping[int, Sequence[int]] = field(default_factory=dict)
 
 
 class Forecasts:
@@ -148,6 +169,7 @@ class Forecasts:
         self._worker: LatestWorker[ForecastRequest, Plans] = LatestWorker("forecasts", self._compute)
         self._parts: list[SequenceForecast] = []
         self._kept = Waiting()
+        self._queued_s, self._everything_s = Seldom(), Seldom()
         self._waiting_of: tuple[object, ...] = ()
         self._progress, self._progress_of = "", (Path(), -1)
 
@@ -197,8 +219,21 @@ class Forecasts:
         plans = NO_PLANS if newest is None else newest[1]
         waiting, running = self._waiting(service, project, plans.kinds), service.progress
         going = [_running_part(one, self._parts[index]) for index, one in running.items()]
-        alone_s = [_planned_left_s(one, self._parts[index]) for index, one in running.items()]
-        queued, everything = (at_once(going, alone_s, rest) for rest in (waiting.queued, waiting.everything))
+        alone_s = {index: _planned_left_s(one, self._parts[index]) for index, one in running.items()}
+        own_s = {index: one.eta_s for index, one in running.items()}
+        n_workers = max(service.n_workers + len(service.elsewhere), 1)
+
+        def at_once_with(rest_s: Mapping[int, float | None], kept: Seldom) -> float | None:
+            basis = (waiting, n_workers, *running)
+            return kept.value(basis, lambda: at_once(own_s, alone_s, rest_s, waiting.needs, n_workers))
+
+        queued, everything = (
+            replace(together([*going, rest]), seconds=at_once_with(rest_s, kept))
+            for rest, rest_s, kept in (
+                (waiting.queued, waiting.queued_s, self._queued_s),
+                (waiting.everything, waiting.everything_s, self._everything_s),
+            )
+        )
         n_done = service.queue.steps_done + sum(one.step for one in running.values())
         return QueueStatus(
             waiting=waiting.clips,
@@ -226,11 +261,17 @@ class Forecasts:
         self._waiting_of = waiting_of
         parts = self._parts = _clip_parts(service, project, kinds, own)
         due, coming = {*due_clips(service.catalog), *clips}.difference(running), running.union(clips)
+        waiting = [index for index in clips if index not in running]
+        left = [*waiting, *sorted(due.difference(clips))]
+        config = project.settings.config()
         self._kept = Waiting(
             tuple(QueuedClip(index, parts[index].n_steps, parts[index].seconds, index in own) for index in clips),
-            together([parts[index] for index in clips if index not in running]),
-            together([parts[index] for index in sorted(due)]),
+            together([parts[index] for index in waiting]),
+            together([parts[index] for index in left]),
             together([parts[index] for index in stale_clips(service.catalog) if index not in coming]),
+            {index: parts[index].seconds for index in waiting},
+            {index: parts[index].seconds for index in left},
+            {index: needed_clips(project, index, config) for index in (*running, *left)},
         )
         return self._kept
 

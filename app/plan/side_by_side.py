@@ -78,16 +78,22 @@ class PlannedClips:
 
     Attributes:
         together: How many train side by side.
-        kinds: A plan of every kind of them, as if trained alone on all cores.
+        kinds: A plan of every kind of them, as if trained alone on all cores of this machine.
+        times_longer: How much longer one takes next to others, but for the reference clip, which comes alone.
     """
 
     together: SideBySide
     kinds: dict[Kind, TrainingPlan]
+    times_longer: float = 1.0
 
     def expected_s(self, project: Project, clip: Clip) -> float | None:
         """How long a clip takes next to the others; None where nobody can know."""
-        plan = self.kinds.get(kind_of(project, clip, project.settings.config()))
-        return None if plan is None or plan.seconds is None else plan.seconds * self.together.n_workers
+        config = project.settings.config()
+        plan = self.kinds.get(kind_of(project, clip, config))
+        if plan is None or plan.seconds is None:
+            return None
+        is_alone = clip.clip_index == project.settings.reference_clip and not config.independent
+        return plan.seconds if is_alone else plan.seconds * self.times_longer
 
 
 def plan_here(
@@ -121,4 +127,4 @@ def plan_here(
         clip_mb=max(kinds[kind_of(project, clip, config)].memory_mb for clip in ready),
         free_mb=None if free is None else free / 1e6,
     )
-    return PlannedClips(together, kinds)
+    return PlannedClips(together, kinds, together.n_workers)

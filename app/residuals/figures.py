@@ -162,6 +162,11 @@ class Figures:
         self._stale_seams |= self._seams_of(clip_index)
         self.revision += 1
 
+    def lacks(self, found: ClipMeasurements) -> bool:
+        """Whether something of this is not known yet."""
+        rows, pairs = ([(f.frame_index, f.camera_index) for f in figures] for figures in (found.rows, found.pairs))
+        return not (all(self.has_row[at] for at in rows) and all(self.has_pair[at] for at in pairs))
+
     def take(self, found: ClipMeasurements) -> None:
         """Take in figures of a clip. Known ones are overwritten."""
         for row in found.rows:
@@ -226,6 +231,12 @@ class Figures:
         return [mean_of(_known(values[found].T)) if is_in[found].all() else None for found in frames]
 
     # ---------------------------------------------------------------- missing figures
+
+    @property
+    def incomplete(self) -> list[int]:
+        """Clips of which something is not measured."""
+        unknown = self.unknown_rows | self.unknown_pairs
+        return [clip.clip_index for clip in self.clips if unknown[clip.start : clip.stop].any()]
 
     @property
     def measured(self) -> dict[str, tuple[int, int]]:

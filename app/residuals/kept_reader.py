@@ -6,12 +6,16 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from app.project.opening.opened_project import OpenedProject
 from app.residuals.figures import ClipMeasurements
 from engine.children.priority import lower_thread
 from engine.errors import EngineError
+
+if TYPE_CHECKING:
+    from app.residuals.kept_reading import Stamp  # brings torch, which only the thread needs
 
 logger = logging.getLogger(__name__)
 
@@ -25,11 +29,22 @@ class KeptReader:
     Args:
         opened: The project.
         trained: Clips that can be measured.
-        clip_indices: Those that are read.
+        clip_indices: Those that are read, as far as figures of them are kept.
+        known: Stamps of clips that are only read if they have another one now.
+
+    Attributes:
+        stamps: Those of the clips before they were read.
     """
 
-    def __init__(self, opened: OpenedProject, trained: Sequence[int], clip_indices: Sequence[int]) -> None:
+    def __init__(
+        self,
+        opened: OpenedProject,
+        trained: Sequence[int],
+        clip_indices: Sequence[int],
+        known: Mapping[int, Stamp] | None = None,
+    ) -> None:
         self._opened, self._trained, self._clip_indices = opened, list(trained), list(clip_indices)
+        self._known, self.stamps = dict(known or {}), dict[int, "Stamp"]()
         self._found: queue.SimpleQueue[ClipMeasurements | str] = queue.SimpleQueue()
         self._is_cancelled = threading.Event()
         self._thread = threading.Thread(target=self._run, name="kept figures", daemon=True)
@@ -65,10 +80,14 @@ class KeptReader:
 
     def _read(self) -> None:
         from app.evaluation.headless import open_trained
-        from app.residuals.kept_reading import read_kept
+        from app.residuals.kept_reading import read_kept, stamps
 
+        self.stamps = stamps(self._opened.project, self._clip_indices)
+        to_read = [index for index, stamp in self.stamps.items() if stamp != self._known.get(index)]
+        if not to_read:
+            return
         opened = open_trained(self._opened.project, self._opened.capture)
-        for found in read_kept(opened, self._trained, self._clip_indices, self._found.put):
+        for found in read_kept(opened, self._trained, to_read, self._found.put):
             if self._is_cancelled.is_set():
                 return
             self._found.put(found)

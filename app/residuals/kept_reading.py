@@ -4,11 +4,14 @@ evaluations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from app.evaluation.evaluation import EvaluationScope, kept_figures
+from app.evaluation.evaluation import EvaluationScope, figures_path, kept_figures
 from app.evaluation.headless import TrainedProject, open_trained
+from app.evaluation.kept_figures import EVALUATIONS
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.residuals.figures import ClipMeasurements, Figures, PairFigures, RowFigures, pair_figures, row_figures
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
 WINDOW_METRICS: Choice = "all"
 """Metrics of the window: the default of `clipgstream eval`, so that neither repeats the other's work. It takes
 half as long again as PSNR and FLIP alone, rendering included."""
+Stamp = tuple[tuple[int, int], ...]
+"""Size and time of the files of a clip's kept figures: another one once figures are added."""
 READ_METRICS: tuple[Choice, ...] = ("quick", WINDOW_METRICS)
 """The choices that are read: quick figures have PSNR and pairs too."""
 
@@ -38,6 +43,21 @@ def note_kept(catalog: ClipCatalog, project: Project, capture: Capture) -> None:
     for found in read_kept(opened, trained, trained, lambda sentence: None):
         figures.take(found)
     catalog.note_evaluated(figures.held_out_psnr(capture.camera_indices(project.settings.holdout)))
+
+
+def stamps(project: Project, clip_indices: Iterable[int]) -> dict[int, Stamp]:
+    """Stamps of the clips of which figures are kept."""
+    found: dict[int, Stamp] = {}
+    names = set[str]()
+    with suppress(OSError):  # the folder comes with the first figures
+        names = set(os.listdir(project.folder / EVALUATIONS))
+    for clip_index in clip_indices:
+        paths = [figures_path(project, clip_index, metrics, "float") for metrics in READ_METRICS]
+        with suppress(OSError):  # replaced just now
+            states = [path.stat() for path in paths if path.name in names]
+            if states:
+                found[clip_index] = tuple((state.st_size, state.st_mtime_ns) for state in states)
+    return found
 
 
 def read_kept(

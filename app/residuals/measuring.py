@@ -1,11 +1,13 @@
 """Measuring: figures of every picture of the open project, read where they were measured before and measured in the
-background where not; forgotten and measured anew when a clip was trained again.
+background where not; forgotten and measured anew when a clip was trained again. While others measure, as
+`clipgstream eval` on many computers, it reads what they find.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +24,9 @@ from app.status import CELL_COLUMNS, ResidualStatus
 from app.training.rate import SmoothedRate
 from engine.parallel import n_cores
 
+if TYPE_CHECKING:
+    from app.residuals.kept_reading import Stamp  # brings torch
+
 SHARE_WHILE_BUSY = 0.05
 """Share of one core's time, while a clip trains on every core: training takes at most that much longer under any
 scheduler, and the order of measuring shows seams long before everything is measured."""
@@ -29,6 +34,8 @@ N_CORES_ENOUGH = 3
 """With so many cores a training leaves one to the window, which uses little of it."""
 START_AFTER_S = 2.0
 """Quiet before the process is started: not while a project opens, nor between two clips of a queue."""
+READ_AGAIN_S = 10.0
+"""Between two looks for figures of others. While they bring any, nothing is measured here."""
 STATUS_EVERY_S = 0.25
 """Figures come more often than the status is needed."""
 RATE_TIME_CONSTANT_S = 300.0
@@ -55,6 +62,10 @@ class BackgroundMeasuring:
         self._revisions: tuple[str, ...] = ()
         self._figures = Figures((), 0)
         self._reader: KeptReader | None = None
+        self._stamps: dict[int, Stamp] = {}
+        self._is_reading_again = False
+        self._read_s = clock()
+        self._written: set[int] = set()
         self._process: Measurer | None = None
         self._look: MeasuringFocus | None = None
         self._told: tuple[MeasuringFocus, float] | None = None
@@ -71,6 +82,7 @@ class BackgroundMeasuring:
         self._end()
         self._opened, self._catalog = opened, catalog
         self._seen, self._revisions = None, ("",) * len(opened.clips)
+        self._stamps, self._written = {}, set()
         usable = opened.project.document.exclusions.usable(opened.rig.names, opened.capture.n_frames)
         self._figures = Figures(opened.clips, len(opened.rig), usable)
         self._look, self._messages = None, []
@@ -93,8 +105,9 @@ class BackgroundMeasuring:
             return False
         self._is_busy = is_busy
         self._take_catalog()
-        self._take_kept()
         self._take_measured()
+        self._read_again()
+        self._take_kept()
         if self._figures.has_stale_seams:
             self._figures.score_seams()
         self._start()
@@ -142,6 +155,7 @@ class BackgroundMeasuring:
         self._revisions = revisions
         for clip_index in changed:
             self._figures.forget(clip_index)
+            self._stamps.pop(clip_index, None)
         trained = [index for index, revision in enumerate(revisions) if revision]
         self._figures.set_trained(trained)
         self._end()
@@ -149,18 +163,39 @@ class BackgroundMeasuring:
         behind = [index + 1 for index in changed if index + 1 < len(revisions)]
         to_read = sorted({*changed, *behind} & {*trained})  # the pair at a boundary belongs to the clip behind it
         if to_read and (opened.project.folder / EVALUATIONS).is_dir():
-            self._reader = KeptReader(opened, trained, to_read)
+            self._reader, self._is_reading_again = KeptReader(opened, trained, to_read), False
+
+    def _read_again(self) -> None:
+        """See what others have measured meanwhile."""
+        opened, now_s = self._opened, self._clock()
+        if opened is None or self._reader is not None or now_s < self._read_s + READ_AGAIN_S:
+            return
+        self._read_s = now_s
+        clips = [index for index in self._figures.incomplete if index not in self._written]
+        self._written = set()
+        if clips and (opened.project.folder / EVALUATIONS).is_dir():
+            trained = [index for index, revision in enumerate(self._revisions) if revision]
+            self._reader, self._is_reading_again = KeptReader(opened, trained, clips, self._stamps), True
 
     def _take_kept(self) -> None:
-        if self._reader is None:
+        reader, is_news = self._reader, False
+        if reader is None:
             return
-        for found in self._reader.poll():
+        for found in reader.poll():
             if isinstance(found, str):
-                self._say(found)
-            else:
-                self._figures.take(found)
-        if self._reader.is_done:
+                if not self._is_reading_again:  # a line that is being written just now is not damaged
+                    self._say(found)
+                continue
+            self._stamps[found.clip_index] = reader.stamps[found.clip_index]
+            is_news = is_news or self._figures.lacks(found)
+            self._figures.take(found)
+        if reader.is_done:
             self._reader = None
+        if is_news and self._is_reading_again:
+            self._changed_s = self._clock() + READ_AGAIN_S
+            if self._process is not None:
+                self._process.end()
+                self._process = self._told = None
 
     def _take_measured(self) -> None:
         process = self._process
@@ -170,6 +205,7 @@ class BackgroundMeasuring:
         for event in process.poll():
             match event:
                 case PictureMeasured(clip_index=clip_index, row=row, pair=pair):
+                    self._written.add(clip_index)
                     n_new += row is not None
                     rows, pairs = () if row is None else (row,), () if pair is None else (pair,)
                     self._figures.take(ClipMeasurements(clip_index, rows, pairs))

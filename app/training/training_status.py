@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
+
+from msgspec.structs import asdict
 
 from app.project.claims.claims import Elsewhere
 from app.project.claims.holder_record import ClipProgress, MachineLoad, machine_name
@@ -68,33 +70,19 @@ def training_status(service: TrainingService, viewed_clip: int | None = None) ->
 def running_clips(service: TrainingService) -> tuple[RunningClip, ...]:
     """All clips in training, here and elsewhere, in the order of their indices."""
     runs = [run for run in service.runs.values() if run.ending is None]
-    found = [replace(_running(run.progress), worker=run.worker_number) for run in runs]
+    found = [_running(run.progress, worker=run.worker_number) for run in runs]
     found += [_elsewhere(clip_index, other) for clip_index, other in service.elsewhere.items()]
     return tuple(sorted(found, key=lambda clip: clip.clip_index))
 
 
-def _running(progress: ClipProgress) -> RunningClip:
-    return RunningClip(
-        progress.clip_index,
-        progress.state,
-        progress.machine,
-        stage=progress.stage,
-        step=progress.step,
-        n_steps=progress.n_steps,
-        steps_per_s=progress.steps_per_s,
-        eta_s=progress.eta_s,
-        held_out_psnr=progress.held_out_psnr,
-        since_s=progress.since_s,
-    )
+def _running(progress: ClipProgress, **known: Any) -> RunningClip:
+    return RunningClip(**(asdict(progress) | known))
 
 
 def _elsewhere(clip_index: int, other: Elsewhere) -> RunningClip:
-    said = other.progress
-    machine = "" if other.holder is None else other.holder.owner.host
-    if said is None:
-        return RunningClip(clip_index, "unknown", machine, is_elsewhere=True, who=other.who)
-    known = _running(said)
-    return replace(known, clip_index=clip_index, machine=known.machine or machine, is_elsewhere=True, who=other.who)
+    said = other.progress or ClipProgress(clip_index, "unknown")
+    machine = said.machine or ("" if other.holder is None else other.holder.owner.host)
+    return _running(said, clip_index=clip_index, machine=machine, is_elsewhere=True, who=other.who)
 
 
 def machines(service: TrainingService, trainings: Sequence[RunningClip]) -> list[MachineStatus]:

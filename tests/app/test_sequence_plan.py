@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.plan.makespan import ends_of
+from app.plan.makespan import ANEW_EVERY_S, Seldom, ends_of
 from engine.capture.capture import open_capture
 from engine.capture.frame_bytes import frame_bytes
 from engine.errors import CaptureError
@@ -97,3 +97,22 @@ def test_a_file_that_is_gone_is_said(capture_folder: Path, tmp_path: Path):
     (folder / "ims" / "1" / "000003.jpg").unlink()
     with pytest.raises(CaptureError, match="No such file"):
         frame_bytes(capture)
+
+
+def test_the_time_left_is_worked_out_anew_now_and_then() -> None:
+    clock, asked = [0.0], []
+
+    def work_out() -> float:
+        asked.append(clock[0])
+        clock[0] += 0.05 if len(asked) > 2 else 0.0
+        return float(len(asked))
+
+    left = Seldom(lambda: clock[0])
+    assert [left.value((1, 2), work_out) for _ in range(3)] == [1.0, 1.0, 1.0]
+    assert left.value((2,), work_out) == 2.0, "other clips train"
+    clock[0] = ANEW_EVERY_S
+    assert left.value((2,), work_out) == 3.0
+    clock[0] += 4.9
+    assert left.value((2,), work_out) == 3.0, "it takes 50 ms, so at most every five seconds"
+    clock[0] += 0.2
+    assert left.value((2,), work_out) == 4.0

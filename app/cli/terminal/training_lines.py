@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from app.cli.terminal.progress import ProgressLine, ProgressRow
 from app.evaluation.headless import ClipOutcome
-from app.plan.makespan import ends_of
+from app.plan.makespan import Seldom, time_left
 from app.plan.planning import begin_text, compared_text, plan_clip
 from app.plan.side_by_side import PlannedClips
 from app.project.clips.clip_catalog import ClipCatalog
@@ -160,6 +160,7 @@ class SequenceTable:
         self._n_clips, config = len(clips), project.settings.config()
         self._needs = {index: needed_clips(project, index, config) for index in self._left}
         self._took_s: list[float] = []
+        self._left_s = Seldom()
 
     def end(self, outcome: ClipOutcome) -> None:
         """A clip has ended, in any way."""
@@ -179,24 +180,20 @@ class SequenceTable:
             )
             for row in running.values()
         ]
-        n_done, eta_s = self._n_clips - len(self._left), self._eta_s(running)
+        n_done = self._n_clips - len(self._left)
+        n_workers = status.n_workers + sum(row.is_elsewhere for row in running.values())
+        eta_s = self._left_s.value((*running, n_done, n_workers), lambda: self._time_left(running, n_workers))
         share = (n_done + sum(row.done or 0.0 for row in rows)) / max(self._n_clips, 1)
         left = "" if eta_s is None else f", {duration_text(eta_s)} left"
         self._line.show([*rows, ProgressRow("All", share, f"{n_done}/{self._n_clips} clips{left}")])
 
-    def _eta_s(self, running: Mapping[int, RunningClip]) -> float | None:
-        """Until the last clip is finished; None while nobody can know."""
+    def _time_left(self, running: Mapping[int, RunningClip], n_workers: int) -> float | None:
         etas = {index: row.eta_s for index, row in running.items() if row.eta_s is not None}
         like_s = [running[index].since_s + eta_s for index, eta_s in etas.items() if self._is_source(index)]
         typical_s = median_of(self._took_s) or median_of(like_s)
-        order = [*running, *(index for index in self._left if index not in running)]
-        left_s = {index: etas.get(index, self._expected_s(index, typical_s)) for index in order}
-        known_s = {index: seconds for index, seconds in left_s.items() if seconds is not None}
-        if len(known_s) < len(left_s):
-            return None
-        n_elsewhere = sum(row.is_elsewhere for row in running.values())
-        ends = ends_of(known_s, self._needs, self._plan.together.n_workers + n_elsewhere)
-        return max(ends.values(), default=0.0)
+        going = {index: etas.get(index, self._expected_s(index, typical_s)) for index in running}
+        waiting = {index: self._expected_s(index, typical_s) for index in self._left if index not in running}
+        return time_left(going, waiting, self._needs, n_workers)
 
     def _expected_s(self, clip_index: int, typical_s: float | None) -> float | None:
         """How long a clip takes: as other source clips, else as planned."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from app.cli.arguments import EXIT_OK, add_figure_choices, add_measuring_workers, path_argument
+from app.cli.arguments import EXIT_OK, add_figure_choices, add_measuring_places, path_argument
 from app.cli.frame_rate_arguments import add_no_fps, wanted_rates
 from app.cli.terminal.progress import ProgressLine, stage_progress
 from app.export.staging import check_target
@@ -43,14 +43,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "(default: where the projects differ most)",
     )
     add_figure_choices(command, default=None, said="all for the project, quick for the others")
-    add_measuring_workers(command)
+    add_measuring_places(command)
     add_no_fps(command)
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
-    from app.evaluation.measuring_children import measuring_here
+    from app.evaluation.cluster_measuring import measuring_at
     from app.lab.bench.settings.exports import measure_exports
     from app.lab.report.paper_figures.by_hand import FigureOptions
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     check_target((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
     line = ProgressLine(is_quiet=options.quiet)
     try:
-        with measuring_here(options.n_workers) as measuring:
+        with measuring_at(options.n_workers, options.cluster, line.say) as measuring:
             page = write_report(
                 options.project,
                 compare=options.compare,

@@ -37,6 +37,7 @@ from app.project.claims.holder_record import (
     ClipProgress,
     HolderRecord,
     MachineLoad,
+    holder_words,
     machine_load,
     read_holder,
     write_holder,
@@ -119,7 +120,7 @@ class Elsewhere:
     @property
     def who(self) -> str:
         """The holder as the subject of a sentence."""
-        return "Another program" if self.holder is None else self.holder.owner.words()
+        return holder_words(self.holder)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,6 +226,7 @@ class Claims:
             if make_claim(claim, self.token):
                 return claim
             made = claim
+        self._elsewhere = {**self._elsewhere, key: Elsewhere(key)}  # until the next look: nobody tries again at once
         raise ClipClaimed("Other programs claim this clip again and again.", hint="Try again later.")
 
     def release(self, key: str) -> None:
@@ -302,13 +304,11 @@ class Claims:
         self._start()
 
     def close(self) -> None:
-        """Release everything, and end the thread."""
+        """Release everything, and let the thread end, which is not waited for: the disk may be slow to answer it."""
         self._is_watching = False
         for key in list(self._held):
             self.release(key)
         self._wake.set()
-        if self._thread is not None:
-            self._thread.join(LOOK_EVERY_S)
 
     # ---------------------------------------------------------------- the thread
 
@@ -331,7 +331,7 @@ class Claims:
         with self._guard:
             self._elsewhere = {key: other for key, other in elsewhere.items() if key not in self._held}
             self._others = tuple(said.values())
-            self._look_at_clips()
+        self._look_at_clips()
 
     def _sweep(self, claims: Mapping[str, ClaimFile], known: Mapping[str, Elsewhere]) -> None:
         """Remove claims of the dead, and records of those that claim nothing and say nothing any more. Raises OSError.
@@ -356,8 +356,8 @@ class Claims:
         """The part of a round for what is claimed here: say that this process lives, see whether a claim was lost and
         what is asked. Looks at files of these clips only, however many others train."""
         self._load = machine_load()
-        if self._held and self._clock() - self._beaten_s >= BEAT_EVERY_S:
-            with self._guard, suppress(OSError):
+        with self._guard, suppress(OSError):
+            if self._held and self._clock() - self._beaten_s >= BEAT_EVERY_S:
                 self._say()
         for key, claim in list(self._held.items()):
             if not is_unsurpassed(claim, self.token):
@@ -368,12 +368,20 @@ class Claims:
                 self._asked.put((key, ask))
 
     def _start(self) -> None:
-        if self._has_thread and (self._thread is None or not self._thread.is_alive()):
-            self._thread = threading.Thread(target=self._run, name="claims", daemon=True)
-            self._thread.start()
+        with self._guard:
+            if self._has_thread and self._thread is None:
+                self._thread = threading.Thread(target=self._run, name="claims", daemon=True)
+                self._thread.start()
+
+    def _is_needed(self) -> bool:
+        """Whether the thread goes on; else whoever needs it next starts another."""
+        with self._guard:
+            if not (self._held or self._is_watching):
+                self._thread = None
+            return self._thread is not None
 
     def _run(self) -> None:
-        while self._held or self._is_watching:
+        while self._is_needed():
             started_s = time.monotonic()
             try:
                 if self._is_watching:
@@ -409,9 +417,7 @@ class Claims:
             return
         try:
             newest = newest_claim(self.folder, key)
-            if (
-                newest is None or newest.number < claim.number
-            ):  # it was removed: by anybody, or by one that took it over
+            if newest is None or newest.number < claim.number:  # removed, by anybody or by one that took it over
                 if not self._was_silent and make_claim(claim, self.token):
                     return
                 newest = newest_claim(self.folder, key)

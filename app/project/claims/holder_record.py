@@ -10,6 +10,7 @@ from pathlib import Path
 from msgspec import Struct, to_builtins
 
 from app.project.lock import LockOwner
+from engine.machine import free_memory_bytes
 from engine.storage.files import atomic_path
 from engine.storage.json_files import JsonError, json_text, read_json_object
 from engine.storage.process_space import boot_id, pid_space
@@ -96,14 +97,15 @@ class HolderRecord(Struct, frozen=True):
 
 def machine_load() -> MachineLoad:
     """Of this computer."""
-    load = free_mb = None
+    load, free = None, free_memory_bytes()
     with suppress(OSError, AttributeError):  # AttributeError: Windows
         load = os.getloadavg()[0]
-    with suppress(OSError, ValueError, IndexError):
-        for line in Path("/proc/meminfo").read_text("ascii").splitlines():
-            if line.startswith("MemAvailable:"):
-                free_mb = int(line.split()[1]) * 1024 / 1e6
-    return MachineLoad(os.cpu_count() or 1, load, free_mb)
+    return MachineLoad(os.cpu_count() or 1, load, None if free is None else free / 1e6)
+
+
+def holder_words(holder: HolderRecord | None) -> str:
+    """A process that trains clips as the subject of a sentence. holder: None where it is not known."""
+    return "Another program" if holder is None else holder.owner.words()
 
 
 def machine_name() -> str:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from app.project.claims.claim_files import ClaimFile, holder_path, list_claims, list_holders, remove_claim
-from app.project.claims.holder_record import HolderRecord, read_holder
+from app.project.claims.holder_record import HolderRecord, holder_words, read_holder
 from engine.errors import ProjectError
 
 
@@ -23,9 +23,8 @@ def check_unclaimed(folder: Path) -> None:
         ProjectError: Somebody does, or may do so.
     """
     for key, holder in live_claims(folder).items():
-        who = "Another program" if holder is None else holder.owner.words()
         raise ProjectError(
-            f"{who} trains {_named(key)} of this project.",
+            f"{holder_words(holder)} trains {_named(key)} of this project.",
             hint="Stop it there first, or wait for it. If nothing runs there, remove the folder.",
             path=folder / "claims",
         )

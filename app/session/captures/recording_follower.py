@@ -17,6 +17,7 @@ from app.session.notices import Notices
 from app.session.part import SessionPart
 from app.session.training.live_training import LiveTraining
 from app.status import RecordingStatus
+from app.training.recording.followed_recording import check_unfinished
 from app.training.recording.intake import LOOK_EVERY_S, Intake, TakenIn, base_of, check_can_follow, n_taken_of
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, ProjectError
@@ -157,17 +158,14 @@ class RecordingFollower(SessionPart):
     def poll(self) -> bool:
         """Take in clips that have become complete. Whether there were any."""
         intake, now_s = self._intake, time.monotonic()
-        if intake is None:
+        if intake is None or now_s < self._next_s or self._worker.is_busy:  # each look is heard before the next one
             return False
-        newest = self._worker.newest
-        if newest is None or newest[0].number != self._number:
-            if self._number == 0 or now_s >= self._next_s:
-                self._look(intake, now_s)
-            return False
-        if now_s < self._next_s:
-            return False
-        taken, has_ended = newest[1], intake.has_ended
+        newest, has_ended = self._worker.newest, intake.has_ended
+        is_heard = newest is not None and newest[0].number == self._number  # else it has failed, or is the first
         self._look(intake, now_s)
+        if newest is None or not is_heard:
+            return False
+        taken = newest[1]
         if taken is not None:
             self._take(taken, intake)
         if taken is None and has_ended:
@@ -185,6 +183,7 @@ class RecordingFollower(SessionPart):
         assert opened is not None
         n_before = len(opened.clips)
         try:
+            check_unfinished(opened.project, taken.stop)
             if taken.lost:
                 document = taken.without_lost(opened.project.document, opened.capture)
                 self._document.change(document, "exclude frames that did not come")

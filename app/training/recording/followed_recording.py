@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.project.project import Project
-from app.training.recording.intake import Intake, TakenIn
+from app.training.recording.intake import Intake, TakenIn, n_taken_of
 from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
@@ -49,7 +49,7 @@ class FollowedRecording:
         if taken is None:
             return None if self._intake.has_ended else []
         n_before = len(self._service.clips)
-        check_unfinished(self._project, self._service, taken.stop)
+        check_unfinished(self._project, taken.stop)
         take_in(self._project, taken, self.capture)
         before, self.capture = self.capture, self.capture.grown(taken.stop)
         before.close()
@@ -68,11 +68,15 @@ def take_in(project: Project, taken: TakenIn, capture: Capture) -> None:
         project.update(grown)
 
 
-def check_unfinished(project: Project, service: TrainingService, stop: int) -> None:
-    """Check that no clip is trained that would have more frames now. Raises ProjectError."""
-    known = project.settings.frames
-    last = len(service.clips)
-    if known is None or stop <= known[1] - known[0] or not project.is_trained(last):
+def check_unfinished(project: Project, stop: int) -> None:
+    """Check that no clip is trained that would have more frames now. stop: One past the last frame.
+
+    Raises:
+        ProjectError: One is.
+    """
+    known, n_whole = project.settings.frames, n_taken_of(project.settings)
+    last = len(project.clips(n_whole)) if n_whole else 0
+    if known is None or stop <= known[1] - known[0] or n_whole == known[1] - known[0] or not project.is_trained(last):
         return
     raise ProjectError(
         f"The recording seemed to have ended at frame {known[1] - known[0]}, and clip {last} was trained with the "

@@ -20,6 +20,8 @@ from engine.errors import ProjectError
 from engine.training.config import config_of
 
 LOOK_EVERY_S = 0.25
+LOOK_SHARE = 0.2
+"""Share of the time that looking may take: it asks for many files, and the folder may lie on a slow network."""
 UNTIL_IDLE_S = 120.0
 """A recording has ended once no camera has had a new frame for so long."""
 
@@ -129,7 +131,7 @@ class Intake:
         now_s = self._clock()
         if not self.has_ended and now_s >= self._next_s:
             self.growth = self._watch.look()
-            self._next_s = now_s + LOOK_EVERY_S
+            self._next_s = now_s + max(LOOK_EVERY_S, (self._clock() - now_s) / LOOK_SHARE)
             self.has_ended = self._is_over(self.growth)
         n_complete = 0 if self.growth is None else self._within(self.growth.n_complete)
         n_whole = n_complete - (n_complete - self._base) % self._length

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,14 +12,18 @@ import pytest
 from msgspec.structs import replace
 
 from app.cluster import mirror as mirror_module
-from app.cluster.cluster import Cluster, connect
+from app.cluster.cluster import Cluster
+from app.cluster.connecting import connect
 from app.cluster.contents import HEAD_BYTES, contents_of, job_key
 from app.cluster.mirror import Mirror, file_digest
 from app.cluster.nodes import Node, take_seat
 from app.cluster.versions import difference, versions
+from app.project.opening.project_access import create_project, default_settings
 from app.training.jobs import train_job
+from engine.capture.capture import open_capture
 from engine.errors import DiskError, EngineError, ProjectError
-from tests.app.fakes import write_trained
+from tests.app.fakes import write_capture, write_trained
+from tests.faults.record import Recorder
 
 
 def put(mirror: Mirror, folder: Path, data: bytes) -> str:
@@ -109,8 +115,28 @@ def test_of_pictures_only_those_of_the_clip_are_sent_in_full(make_opened, tmp_pa
         assert ("project/clips/0000.safetensors" in found) == (job is jobs[1])
         assert {"project/project.json", "capture/train_meta.json"} < found.keys()
     assert job_key(opened.project, jobs[0]) != job_key(opened.project, jobs[1])
-    again = replace(jobs[0], claim="of the next driver", n_beside=2, n_everywhere=30, n_threads=2, is_window_open=False)
-    assert job_key(opened.project, jobs[0]) == job_key(opened.project, again), "its copy continues"
+    again = replace(jobs[0], claim="c" * 32, n_beside=7, n_everywhere=9, n_threads=3)
+    assert job_key(opened.project, again) == job_key(opened.project, jobs[0]), "another process continues with its copy"
+
+
+def test_a_copy_of_a_capture_that_was_followed_is_understood_like_it(tmp_path: Path) -> None:
+    source = open_capture(write_capture(tmp_path / "source"))
+    recorder = Recorder(source, tmp_path / "c", lost=[("2", 4)])
+    for tick in range(source.n_frames):
+        recorder.write(tick)
+    capture = open_capture(tmp_path / "c", is_growing=True)
+    settings = default_settings(capture, clip_length=3, overrides={"backgrounds": "clip"})
+    project = create_project(tmp_path / "p", settings)
+    job = train_job(project, project.clips(capture.n_frames)[0], holdout=(0,))
+    (tmp_path / "made").mkdir()
+    contents = contents_of(project, capture, job, tmp_path / "made", is_whole=False)
+    assert "capture/ims/2/000004.jpg" not in [content.name for content in contents]
+    mirror = Mirror("a", tmp_path / "m")
+    for content in contents:
+        mirror.put([(content.digest, 0, content.path.read_bytes()[: content.n_bytes], True)])
+    mirror.build([(content.name, content.digest) for content in contents], job.key)
+    assert open_capture(mirror.capture, is_growing=True).fingerprint == job.fingerprint
+    project.close()
 
 
 # ---------------------------------------------------------------- places and addresses
@@ -154,6 +180,22 @@ def test_an_address_that_is_none_is_bad_input(address: str) -> None:
 def test_an_address_at_which_nothing_listens_is_said_at_once(address: str) -> None:
     with pytest.raises(EngineError, match=rf"The cluster at {address} cannot be reached"):
         connect(address, SimpleNamespace())  # pyright: ignore[reportArgumentType]
+
+
+def test_a_cluster_that_a_thread_has_started_outlives_that_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes of Ray end with the thread that started them, and the window joins on one that ends then."""
+    started_by: list[threading.Thread] = []
+    ray = SimpleNamespace(init=lambda **_: started_by.append(threading.current_thread()))
+    monkeypatch.setattr("app.cluster.connecting.ray_library", lambda: ray)
+    monkeypatch.setattr(os, "environ", dict(os.environ))
+    with ExitStack() as kept:
+        thread = threading.Thread(target=connect, args=("local:1", kept))
+        thread.start()
+        thread.join(60)
+        assert started_by[0].is_alive()
+        assert not thread.is_alive()
+    started_by[0].join(60)
+    assert not started_by[0].is_alive()
 
 
 def test_without_ray_the_remedy_is_said(make_opened, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -201,3 +201,14 @@ def test_a_full_disk_ends_keeping_and_not_measuring(tmp_path):
     assert not kept.is_writable
     assert len(said) == 1
     assert "No space left" in said[0]
+
+
+def test_two_processes_that_measure_a_clip_keep_each_others_figures(tmp_path):
+    path, rows = tmp_path / "a.jsonl", [EvalRow(0, k, "a", False, dict.fromkeys(COLUMNS), {}) for k in range(3)]
+    one, other = (KeptFigures(path, {"clip": "x"}, None, pytest.fail) for _ in range(2))
+    with one.writing():
+        one.add(rows[0])
+        with other.writing():
+            other.add(rows[1])
+        one.add(rows[2])
+    assert KeptFigures(path, {"clip": "x"}, None, pytest.fail).rows == {("a", k): row for k, row in enumerate(rows)}

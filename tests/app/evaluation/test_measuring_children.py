@@ -6,7 +6,8 @@ import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -14,12 +15,20 @@ from app.cli.cli import main
 from app.evaluation.evaluation import ClipMeasuring, evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.kept_figures import EVALUATIONS
-from app.evaluation.measuring_children import EVALUATING, ClipMeasured, FigureMeasured, MeasureClip, MeasuringChildren
+from app.evaluation.measuring_children import (
+    EVALUATING,
+    ClipMeasured,
+    EvaluationTask,
+    FigureMeasured,
+    MeasureClip,
+    MeasuringChildren,
+)
+from app.evaluation.measuring_children import main as measure
 from app.project.opening.project_access import open_project
 from engine.children.kind import ChildFailed
 from engine.children.messages import decoded, encoded
 from engine.children.process import ChildProcess
-from engine.errors import EngineError
+from engine.errors import CaptureError, EngineError
 from engine.metrics.clips.summary import EvalRow
 from tests.app.evaluation.test_kept_figures import make_project
 
@@ -34,6 +43,25 @@ def _nothing_kept(project: Path) -> Iterator[None]:
     yield
     for path in (project / EVALUATIONS).glob("*"):
         path.unlink()
+
+
+def test_a_capture_that_was_followed_is_read_as_one_that_grows(tmp_path: Path, monkeypatch) -> None:
+    """As a whole it may lack frames of some cameras."""
+    seen: list[dict[str, Any]] = []
+
+    def opened(path: str, **known: Any) -> None:
+        seen.append(known)
+        raise CaptureError("enough seen")
+
+    for name in ("start_logging", "use_kernel_cache", "choose_backend", "warm_cache"):
+        monkeypatch.setattr(f"app.evaluation.measuring_children.{name}", lambda *_: None)
+    settings = SimpleNamespace(settings=SimpleNamespace(is_growing=True))
+    monkeypatch.setattr("app.evaluation.measuring_children.open_project", lambda *_, **__: settings)
+    monkeypatch.setattr("engine.capture.capture.open_capture", opened)
+    task = EvaluationTask(str(tmp_path), "c", 0.5, (0, 9), False, (0,), (0,), "quick", "float", backend="cpu")
+    with pytest.raises(CaptureError):
+        measure(task, cast(Any, None))
+    assert seen == [{"scale": 0.5, "frames": (0, 9), "follow_links": False, "is_growing": True}]
 
 
 class InlineChild:

@@ -218,6 +218,33 @@ def test_kept_figures_are_there_without_measuring(open_residuals, launched, proj
     assert status.message == ""
 
 
+def test_while_others_measure_their_figures_are_read_and_nothing_is_measured_here(open_residuals, launched, project):
+    clock = Clock()
+    opened = open_residuals(launch=launched, clock=clock)
+    opened.residuals.look_at(opened.timeline, None)
+    assert poll(opened).is_measuring
+    evaluate(project, "--clips", "0")
+    with (project / "evaluations" / "0000-all-float.jsonl").open("ab") as file:
+        file.write(b'{"half a li')  # being written just now
+    clock.now_s += measuring.READ_AGAIN_S
+    status = poll_until(opened, lambda status: status.n_done == 12)
+    assert (status.is_measuring, status.message) == (False, "")
+    assert launched.all[0].is_ended
+    assert not poll(opened).is_measuring, "more may come"
+    clock.now_s += measuring.READ_AGAIN_S
+    poll_until(opened, lambda status: status.is_measuring)
+    assert not launched.all[1].job.rows[:3].any()
+    assert launched.all[1].job.rows[3:].all()
+    evaluate(project)
+    clock.now_s += measuring.READ_AGAIN_S
+    status = poll_until(opened, lambda status: status.n_done == 24)
+    assert launched.all[1].is_ended
+    for _ in range(3):
+        clock.now_s += measuring.READ_AGAIN_S
+        assert not poll(opened).is_measuring
+    assert len(launched.all) == 2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("metrics", ["all", "quick"])
 def test_the_held_out_psnr_of_a_clip_is_the_evaluations_everywhere(open_residuals, launched, project, capsys, metrics):

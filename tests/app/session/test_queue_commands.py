@@ -124,14 +124,15 @@ def test_a_stopped_clip_counts_with_what_is_left_of_it() -> None:
 
 
 def test_clips_side_by_side_take_as_long_as_their_speeds_say() -> None:
-    rest = SequenceForecast(4, 400, 400.0, 4.0)
-    going = [SequenceForecast(1, 50, 80.0, 1.0), SequenceForecast(1, 50, 70.0, 1.0)]
-    whole = at_once(going, [50.0, 50.0], rest)
-    assert whole == SequenceForecast(6, 500, 75.0 + 400.0 * 1.5 / 2, 6.0), "each takes half as long again as alone"
-    assert at_once(going, [None, None], rest).seconds == 550.0, "not known yet: as one after the other"
-    assert at_once(going[:1], [50.0], rest).seconds == 480.0
-    assert at_once(going, [50.0, 50.0], together([])).seconds == 80.0, "the last one ends it"
-    assert at_once([], [], rest) == rest
+    alone_s, rest_s = {1: 50.0, 2: 50.0}, {index: 100.0 for index in range(3, 7)}
+    needs = {index: (0,) for index in (1, 2, *rest_s)}
+    assert at_once({1: 80.0, 2: 70.0}, alone_s, rest_s, needs, 2) == 80.0 + 2 * 150.0, "half as long again as alone"
+    assert at_once({1: None, 2: None}, alone_s, rest_s, needs, 2) == 500.0, "not known yet: as one after the other"
+    assert at_once({1: 80.0}, {1: 50.0}, rest_s, needs, 1) == 480.0
+    assert at_once({1: 80.0, 2: 70.0}, alone_s, {}, needs, 2) == 80.0, "the last one ends it"
+    assert at_once({}, {}, rest_s, needs, 1) == 400.0
+    assert at_once({0: 30.0}, {0: 20.0}, rest_s, needs, 2) == 430.0, "the reference clip comes alone"
+    assert at_once({1: 80.0}, alone_s, rest_s | {7: None}, needs, 1) is None
 
 
 def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,8 @@ from app.training.recording.followed_recording import FollowedRecording
 from app.training.recording.intake import FollowLimits, Intake, check_can_follow, n_taken_of
 from app.training.service import TrainingService
 from engine.capture.capture import Capture, open_capture
-from engine.capture.growing.watch import END_FILE
+from engine.capture.growing.growth import Growth
+from engine.capture.growing.watch import END_FILE, GrowthWatch
 from engine.errors import ProjectError
 from tests.app.conftest import inline
 from tests.app.fakes import make_fake, write_capture
@@ -201,6 +203,22 @@ def test_the_command_line_follows_and_says_what_is_wrong(run, source: Capture, t
     code, _, err = run("follow", tmp_path / "nowhere", "--project", tmp_path / "r")
     assert (code, "There is no such folder" in err) == (2, True)
     assert not (tmp_path / "r").exists()
+
+
+def test_a_folder_that_answers_slowly_is_asked_less_often(source: Capture, tmp_path: Path, monkeypatch) -> None:
+    show, looked_s, look = Show(source, tmp_path), [], GrowthWatch.look
+
+    def slow(watch: GrowthWatch) -> Growth:
+        looked_s.append(show.clock.now_s)
+        show.clock.now_s += 2.0
+        return look(watch)
+
+    monkeypatch.setattr(GrowthWatch, "look", slow)
+    for _ in range(20):
+        show.intake.ready()
+        show.clock.now_s += 1.0
+    show.close()
+    assert [later - earlier for earlier, later in pairwise(looked_s)] == [10.0, 10.0]
 
 
 @pytest.mark.parametrize(

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
 from app.cli.cli import main
 from app.plan import side_by_side as module
-from app.plan.side_by_side import SideBySide, plan_here, side_by_side
+from app.plan.side_by_side import PlannedClips, SideBySide, plan_here, side_by_side
 from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
 from app.training.process import ProcessWorker
 from engine.errors import ProjectError
+from engine.training.plan.plan import TrainingPlan
 from tests.app.fakes import write_trained
 from tests.app.training.test_train_queue import six
 
@@ -75,6 +77,12 @@ def test_the_reference_clip_comes_alone_and_does_not_count(six: OpenedProject, m
     assert plan_here(six.project, six.capture, six.clips[1:4], catalog, 2).together == SideBySide(2)
 
 
+def test_clips_take_longer_next_to_others_but_the_reference_clip_comes_alone(six: OpenedProject) -> None:
+    plan = TrainingPlan(1, 0, 1, "source", 100, (), 5.0, 40.0, 1.0, 2.0)
+    planned = PlannedClips(SideBySide(4), {(False, 1): plan, (True, 1): plan}, times_longer=2.0)
+    assert [planned.expected_s(six.project, clip) for clip in six.clips[:2]] == [45.0, 90.0]
+
+
 def test_the_command_refuses_what_memory_cannot_hold_and_leaves_nothing(run, capture_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "n_cores", lambda: 2)
     monkeypatch.setattr(module, "free_memory_bytes", lambda: 10**9)
@@ -101,6 +109,16 @@ def test_the_command_names_clips_that_were_not_begun(run, capture_folder, tmp_pa
     assert [clip["state"] for clip in json.loads(out)["clips"]] == ["failed", *["left_out"] * 5]
     assert "nan at step 5" in err
     assert err.rstrip().endswith("\nNot begun, because clip 0 is not finished: clip 1 to 5.")
+
+
+def test_the_command_shows_all_of_them_and_plans_none_by_its_pictures(run, capture_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "n_cores", lambda: 2)
+    monkeypatch.setattr("app.cli.terminal.training_lines.plan_clip", None)  # it decodes pictures of every clip
+    arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 1, "--workers", 2)
+    code, _, err = run(*arguments)
+    assert code == 0, err
+    assert re.search(r"^All +\d+ %  \d/6 clips", err, re.MULTILINE)
+    assert not re.search(r"^Clip \d: \d+ steps", err, re.MULTILINE)
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ __all__ = ["six"]
 def shown(table: SequenceTable, stream: io.StringIO, *rows: RunningClip) -> list[str]:
     stream.seek(0)
     stream.truncate()
-    table.show(TrainingStatus(trainings=rows))
+    table.show(TrainingStatus(trainings=rows, n_workers=2))
     return stream.getvalue().splitlines()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -409,3 +410,57 @@ def test_a_disk_that_cannot_be_written_is_named_as_the_cause(tmp_path: Path, mon
     monkeypatch.setattr("app.project.claims.claims.write_holder", refuse)
     with pytest.raises(DiskError, match="Read-only file system"):
         make(tmp_path).take(KEY)
+
+
+def test_who_loses_every_race_for_a_clip_leaves_it_to_the_others(tmp_path: Path, monkeypatch) -> None:
+    """Else a queue would try for ever to start it."""
+    claims = make(tmp_path)
+    monkeypatch.setattr("app.project.claims.claims.make_claim", lambda *_: False)
+    with pytest.raises(ClipClaimed, match="again and again"):
+        claims.take(KEY)
+    assert KEY in claims.elsewhere
+
+
+def test_a_disk_that_does_not_answer_a_look_keeps_nobody_waiting(tmp_path: Path, monkeypatch) -> None:
+    """Those who claim, release and close are the window's thread."""
+    (tmp_path / "clips").mkdir()
+    claims, may_answer, is_asked = Claims(tmp_path), threading.Event(), threading.Event()
+    scandir = os.scandir
+
+    def slow(folder: Path) -> object:
+        is_asked.set()
+        assert may_answer.wait(60)
+        return scandir(folder)
+
+    monkeypatch.setattr("app.project.claims.claims.os.scandir", slow)
+    claims.watch()
+    assert is_asked.wait(60)
+    claims.take(KEY)
+    claims.release(KEY)
+    claims.close()
+    assert not may_answer.is_set()
+    thread = claims._thread
+    assert thread is not None
+    may_answer.set()
+    thread.join(60)
+    assert not thread.is_alive()
+
+
+def test_a_thread_that_ends_while_a_clip_is_claimed_is_followed_by_another(tmp_path: Path, monkeypatch) -> None:
+    claims = Claims(tmp_path)
+    ends, is_needed = threading.Event(), claims._is_needed
+
+    def seen() -> bool:
+        found = is_needed()
+        if not found and not ends.is_set():
+            claims.take(KEY)  # before the thread is gone
+            ends.set()
+        return found
+
+    monkeypatch.setattr(claims, "_is_needed", seen)
+    claims.watch()
+    first = claims._thread
+    claims.close()
+    assert ends.wait(60)
+    assert claims._thread not in (None, first)
+    claims.close()
