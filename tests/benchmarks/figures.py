@@ -205,6 +205,11 @@ TABLES: dict[str, Clips | Printed] = {
     "timeline": Printed("the timeline", ("python -m tests.benchmarks.bench_timeline",), is_long=False),
     "window": Printed("the window", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_window DIR --no-training")),
     "opening": Printed("opening", ("python -m tests.benchmarks.bench_opening OUT",), which=None),
+    "workers": Printed(
+        "several workers",
+        ("python -m tests.benchmarks.bench_workers OUT BASKETBALL --scale 0.5 --frames 0:36 --clip-length 4",),
+        which=-1,
+    ),
     "large": Printed("a project of 1,000 clips", ("python -m tests.benchmarks.bench_project",), which=None),
     "faults": Printed("faults", ("make faults",), which=None),
 }
