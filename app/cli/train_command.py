@@ -44,7 +44,7 @@ from app.status import TrainingStatus
 from app.training.due import is_due
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture
-from engine.errors import CaptureError, DiskError, ProjectError
+from engine.errors import DiskError, EngineError, ProjectError
 from engine.parallel import n_cores
 from engine.portable import NATIVE, PROCESSORS, environment_of
 from engine.storage.json_files import json_text
@@ -113,7 +113,9 @@ def exit_code(outcomes: Sequence[ClipOutcome]) -> int:
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
     if failed and all(outcome.kind in BAD_INPUT_KINDS for outcome in failed):
         return EXIT_BAD_INPUT
-    return EXIT_FAILED if any(outcome.state in ("failed", "damaged") for outcome in outcomes) else EXIT_OK
+    if any(outcome.state in ("failed", "damaged") for outcome in outcomes):
+        return EXIT_FAILED
+    return EXIT_STOPPED if any(outcome.state == "stopped" for outcome in outcomes) else EXIT_OK
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
@@ -134,7 +136,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     try:
         outcomes = _train(options, launch, project, capture, line)
         is_refused = exit_code(outcomes) == EXIT_BAD_INPUT
-    except (CaptureError, ProjectError) as error:
+    except EngineError as error:  # also a cluster that does not answer
         is_refused = not isinstance(error, DiskError)
         raise
     finally:
@@ -164,7 +166,7 @@ def _train(
         if options.cluster is None:
             sequence = plan_here(project, capture, to_train, catalog, options.workers or 1)
         else:
-            joined = JoinedCluster(options.cluster, project, capture, to_train, catalog)
+            joined = JoinedCluster(options.cluster, project, capture, to_train, catalog, cpu=options.cpu)
             kept.callback(joined.close)
             cluster, launch = joined.cluster, joined.launch
             n_slots = joined.n_slots

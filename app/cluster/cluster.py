@@ -19,6 +19,7 @@ from app.cluster.versions import difference
 from app.project.project import Project
 from engine.capture.capture import Capture
 from engine.errors import EngineError, ProjectError, TrainingError
+from engine.portable import NATIVE, Processor
 from engine.storage.files import discard, disk_error, partial_path
 
 logger = logging.getLogger(__name__)
@@ -35,6 +36,7 @@ class Cluster:
         project, capture: What is trained, or measured.
         n_bytes: Memory of a training.
         use: What it is for.
+        cpu: With the instructions of which processor its computers compute.
 
     Attributes:
         bytes_sent, bytes_received: Of clips that were trained where the project is not seen, by clip.
@@ -45,9 +47,16 @@ class Cluster:
     """
 
     def __init__(
-        self, address: str, project: Project, capture: Capture, *, n_bytes: int, use: ClusterUse = TRAINING
+        self,
+        address: str,
+        project: Project,
+        capture: Capture,
+        *,
+        n_bytes: int,
+        use: ClusterUse = TRAINING,
+        cpu: Processor = NATIVE,
     ) -> None:
-        self.project, self.capture, self.n_bytes, self._use = project, capture, n_bytes, use
+        self.project, self.capture, self.n_bytes, self._use, self._cpu = project, capture, n_bytes, use, cpu
         self.bytes_sent: dict[int, int] = {}
         self.bytes_received: dict[int, int] = {}
         self._nodes: dict[str, Node] = {}
@@ -102,6 +111,8 @@ class Cluster:
         n, of, things = self.n_slots, len(usable), self._use.things
         n_things = f"{n} {things if n > 1 else things.removesuffix('s')}"
         found = [f"the cluster {self._use.verb}s {n_things} at once, on {of} computer{'s' * (of > 1)}"]
+        if len({node.cpu_kind for node in usable}) > 1:
+            found.append(f"their processors differ, so last digits depend on which of them {self._use.verb}s what")
         if copied:
             found.append(f"what a clip needs is copied to {', '.join(copied)}, where the project cannot be seen")
         return found
@@ -205,7 +216,7 @@ class Cluster:
         settings = self.project.settings
         look = self._ray.remote(look_around).options(**node.pinned(num_cpus=0, max_retries=0))
         seen = settings.capture, settings.follow_links, settings.is_growing
-        answer = look.remote(str(self._probe), self._nonce, *seen)
+        answer = look.remote(str(self._probe), self._nonce, *seen, self._cpu)
         with self._guard:
             node.sees_project = None
             self._looks[answer] = node, time.monotonic()
@@ -221,9 +232,11 @@ class Cluster:
         is_same = found["fingerprint"] == self.project.settings.fingerprint
         node.sees_project = found["sees"] and is_same
         why = found.get("why", "" if is_same else "the capture is another one there")
-        other = difference(found["versions"])
+        other, node.cpu_kind = difference(found["versions"]), found.get("cpu", "")
         if other:
             self.refuse(node, other)
+        elif "no_cpu" in found:
+            self.refuse(node, f"cannot compute as asked: {found['no_cpu'].rstrip('.')}")
         elif why and self._use.needs_project:
             self.refuse(node, f"does not see the project and its capture ({why})")
         elif node.n_slots(self.n_bytes) < 1:

@@ -13,6 +13,7 @@ from app.project.project import Project
 from app.training.service import Launch
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.portable import NATIVE, Processor
 from engine.training.plan.plan import TrainingPlan
 
 
@@ -28,16 +29,24 @@ class JoinedCluster:
         project, capture: What is trained.
         to_train: The clips that are left.
         catalog: Of the project.
+        cpu: See Cluster.
     Raises:
         ProjectError, TrainingError: As of Cluster.
     """
 
     def __init__(
-        self, address: str, project: Project, capture: Capture, to_train: Sequence[Clip], catalog: ClipCatalog
+        self,
+        address: str,
+        project: Project,
+        capture: Capture,
+        to_train: Sequence[Clip],
+        catalog: ClipCatalog,
+        *,
+        cpu: Processor = NATIVE,
     ) -> None:
         self.kinds: dict[Kind, TrainingPlan] = plans_of_kinds(project, capture, to_train, catalog)
         memory_mb = max((plan.memory_mb for plan in self.kinds.values()), default=0.0)
-        self.cluster = Cluster(address, project, capture, n_bytes=int(memory_mb * 1e6))
+        self.cluster = Cluster(address, project, capture, n_bytes=int(memory_mb * 1e6), cpu=cpu)
 
     @property
     def launch(self) -> Launch:

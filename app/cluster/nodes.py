@@ -40,6 +40,7 @@ class Node:
         n_cores, memory_bytes: What Ray may hand out there.
         sees_project: Whether project and capture are there under their paths; None before it was asked.
         refused: Why it is not used; empty where it is.
+        cpu_kind: See engine.portable.cpu_kind.
         is_alive: Whether Ray still counts it.
         n_clips, n_threads: Taken now.
         shipping: Held while something is sent there, so that nothing is sent twice.
@@ -51,6 +52,7 @@ class Node:
     memory_bytes: int
     sees_project: bool | None = None
     refused: str = ""
+    cpu_kind: str = ""
     is_alive: bool = True
     n_clips: int = 0
     n_threads: int = 0

@@ -22,6 +22,7 @@ from engine.children.messages import Refusal, decoded, encoded
 from engine.children.process import ChildProcess
 from engine.errors import EngineError
 from engine.parallel import n_cores
+from engine.portable import Processor, cpu_kind
 
 ALONE_AFTER_S = 120.0
 """A driver that has said nothing for so long has lost this computer."""
@@ -43,16 +44,24 @@ def _answered(method: Callable[..., Any]) -> Callable[..., Answer]:
     return answer
 
 
-def look_around(probe: str, nonce: str, capture: str, follow_links: bool, is_growing: bool) -> dict[str, Any]:
+def look_around(
+    probe: str, nonce: str, capture: str, follow_links: bool, is_growing: bool, cpu: Processor
+) -> dict[str, Any]:
     """Describe this computer: cores, versions, and whether it sees the project and the capture.
 
     Args:
         probe: A file of the project that holds the nonce.
         capture, follow_links, is_growing: As the project says.
+        cpu: With the instructions of which processor it is to compute.
     Returns:
-        "sees": whether both are here, "fingerprint" of the capture, and "why" not.
+        "cpu": the kind of its processor, or "no_cpu": why it cannot compute so; "sees": whether project and capture are
+        here, "fingerprint" of the capture, and "why" not.
     """
     found = {"cores": n_cores(), "versions": versions(), "sees": False, "fingerprint": ""}
+    try:
+        found["cpu"] = cpu_kind(cpu)
+    except EngineError as error:
+        found["no_cpu"] = error.message
     try:
         if Path(probe).read_text("ascii") != nonce:
             return found | {"why": "another project lies in its place"}

@@ -78,7 +78,7 @@ def show_outcome(line: ProgressLine, outcome: ClipOutcome, *, has_others: bool =
 
 
 def failure_text(outcomes: Sequence[ClipOutcome]) -> str:
-    """What failed of a training that has ended, and the clips that were not begun because of it; a line each."""
+    """What failed or was stopped of a training that has ended, and the clips that were not begun because of it."""
     lost = [outcome for outcome in outcomes if outcome.state in ("failed", "damaged")]
     lines = []
     for outcome in lost[:MAX_FAILURES]:
@@ -90,6 +90,9 @@ def failure_text(outcomes: Sequence[ClipOutcome]) -> str:
     for cause in dict.fromkeys(outcome.left_out_by for outcome in outcomes if outcome.left_out_by is not None):
         left = sorted(outcome.clip_index for outcome in outcomes if outcome.left_out_by == cause)
         lines.append(f"Not begun, because clip {cause} is not finished: clip {spans_text(left)}.")
+    stopped = sorted(outcome.clip_index for outcome in outcomes if outcome.state == "stopped")
+    if stopped:
+        lines.append(f"Stopped from elsewhere, with progress kept: clip {spans_text(stopped)}.")
     return "\n".join(lines)
 
 

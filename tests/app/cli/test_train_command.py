@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 
 from app.cli.cli import main
+from app.cli.terminal.training_lines import failure_text
+from app.cli.train_command import exit_code
+from app.evaluation.headless import ClipOutcome
 from app.project.opening.project_access import open_project, read_settings
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.fakes import N_STEPS, make_fake, write_capture
@@ -210,3 +213,14 @@ def test_a_dead_worker_ends_with_1(capture_folder, tmp_path, capsys):
     assert code == 1
     assert "ended by signal 9" in err
     assert "clip-0000.log" in err
+
+
+def test_a_training_that_somebody_stopped_is_no_finished_one() -> None:
+    outcomes = [ClipOutcome(0, "trained"), ClipOutcome(1, "stopped", 5), ClipOutcome(2, "left_out", left_out_by=1)]
+    assert exit_code(outcomes) == 3
+    assert failure_text(outcomes).splitlines() == [
+        "Not begun, because clip 1 is not finished: clip 2.",
+        "Stopped from elsewhere, with progress kept: clip 1.",
+    ]
+    assert exit_code([*outcomes, ClipOutcome(3, "failed", kind="ProjectError")]) == 2
+    assert exit_code([ClipOutcome(0, "trained"), ClipOutcome(1, "skipped")]) == 0
