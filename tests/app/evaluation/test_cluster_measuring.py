@@ -141,7 +141,7 @@ def test_two_nodes_of_which_one_is_lost(project: Path, tmp_path: Path, monkeypat
                     yield item
 
             assert measured(project, watched) == alone
-        assert said[0] == "Note: the cluster measures 2 pictures side by side, on 2 computers"
+        assert said[0] == "Note: the cluster measures 2 pictures at once, on 2 computers"
         assert any("What it has not sent is measured elsewhere." in sentence for sentence in said[1:])
         forget(project)
         monkeypatch.setattr(cluster_measuring, "Cluster", BlindCluster)

@@ -12,7 +12,8 @@ from app.session.commands import CloseQuestion
 from app.session.projects.project_commands import OpenCapture, OpenProject
 from app.session.projects.settings import Settings
 from app.session.training.train_commands import TrainNextClip
-from tests.app.conftest import poll_until
+from tests.app.conftest import inline, poll_until
+from tests.app.fakes import make_fake
 
 
 def ask(session, folder):
@@ -56,9 +57,12 @@ def test_answers_make_the_project_and_are_offered_the_next_time(make_session, ca
 @pytest.mark.slow
 def test_frames_that_were_chosen_are_those_that_are_trained(make_session, capture_folder, tmp_path):
     jobs = []
-    session = make_session(is_open=False, launch=None)
-    launch = session.live_training._launch
-    session.live_training._launch = lambda job, project: (jobs.append(job), launch(job, project))[1]
+
+    def launch(job, project):
+        jobs.append(job)
+        return inline(job, project, make_training=make_fake)
+
+    session = make_session(is_open=False, launch=launch)
     session.dispatch(OpenCapture(capture_folder, answers=OpeningAnswers((2, 6), 1.0, 4, ("0",))))
     poll_until(session, lambda: session.capture is not None)
     session.dispatch(TrainNextClip())

@@ -14,9 +14,9 @@ from engine.capture.growing.arrivals import LOOK_AHEAD, VideoArrivals
 from engine.capture.growing.numbered_files import numbered_files
 from engine.capture.growing.watch import END_FILE, GrowthWatch
 from engine.errors import CaptureError
-from tests.app.fakes import write_capture
 from tests.engine.capture.layouts.all_layouts import ALL
 from tests.engine.capture.made_videos import number_of, write_video_of_kind
+from tests.engine.capture.small_ring import write_capture
 from tests.faults.record import Recorder
 
 PATIENCE_S = 10.0

@@ -56,7 +56,9 @@ def _draw_number(n_cores: int, ui: UiState) -> None:
     imgui.text("Clips at once")
     imgui.same_line()
     imgui.set_next_item_width(WORKERS_WIDTH)
+    imgui.push_item_flag(imgui.ItemFlags_.no_tab_stop, True)  # Tab shows and hides marks; it must not land here
     is_changed, n = imgui.input_int("##workers", min(preferences.n_workers, n_cores), 1, 4)
+    imgui.pop_item_flag()
     ui.mark("training.workers")
     imgui.set_item_tooltip("How many clips train side by side on this computer, as cores and memory allow")
     if is_changed:
