@@ -58,6 +58,8 @@ DEAD_AFTER_S = 60.0
 """A holder that has said nothing for so long has ended; one that was only slow notices that its claim is lost."""
 LONGEST_GAP_S = 10.0
 """Of silence, between two looks, no more counts."""
+FRESH_S = 1.0
+"""What was said so long ago need not be said again before a clip is put in its place."""
 MAX_SAID_AT_ONCE = 16
 """Clips in training up to which the record is written when one more begins; that of hundreds takes a while."""
 _MAX_TRIES = 100
@@ -258,8 +260,9 @@ class Claims:
         """
         with self._guard:
             if key in self._held:
-                with suppress(OSError):
-                    self._say()  # also makes a computer of the network list the folder as it is
+                if self._clock() - self._said_s >= FRESH_S:  # nobody takes over from one that has just spoken
+                    with suppress(OSError):
+                        self._say()  # also makes a computer of the network list the folder as it is
                 self._check_held(key)
             if key not in self._held or key in self._lost:
                 raise lost_claim()
