@@ -187,7 +187,7 @@ class Runner:
 
     @_answered
     def forget(self) -> None:
-        """The copy is no longer needed."""
+        """Let the copy go."""
         self._copy.forget()
 
     @property

@@ -160,6 +160,11 @@ def test_who_follows_the_training_sees_the_one_that_leads(session: Session) -> N
     session.dispatch(SetFrame(5))
     session.timeline.is_following = True
     poll_until(session, lambda: session.timeline.frame_index == 1)
+    service = session.live_training.service
+    assert service is not None
+    assert session.timeline.is_following
+    assert service.running_clip == 1
+    assert service.runs[1].live_view == "live", "what is followed is shown"
 
 
 @pytest.fixture
