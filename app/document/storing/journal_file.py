@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +31,9 @@ from engine.storage.json_files import CHECKSUM, JsonError, checksum_of, parse_ob
 
 FORMAT, WITHOUT_COUNT = 2, 1
 MAX_JOURNAL_BYTES = 256 << 20
+SETTLING_S = 0.01
+"""An event is written over the last line while others may read. A file counts as damaged or broken off only where it
+is still the same after this time."""
 AFTER = "after"
 Row = dict[str, Any]
 
@@ -100,16 +104,36 @@ def read_journal(path: Path) -> tuple[JournalFile, JournalDamage | None]:
     Raises:
         JournalDamage: Not even its first line can be read.
     """
+    data = _bytes_of(path)
+    while True:
+        known, damage = _parsed(path, data)
+        if known is not None and known.is_whole and damage is None:
+            return known, None
+        time.sleep(SETTLING_S)
+        before, data = data, _bytes_of(path)
+        if data != before:
+            continue
+        if known is None:
+            assert damage is not None
+            raise damage
+        return known, damage
+
+
+def _bytes_of(path: Path) -> bytes:
     try:
-        data = read_bytes(path, max_bytes=MAX_JOURNAL_BYTES)
+        return read_bytes(path, max_bytes=MAX_JOURNAL_BYTES)
     except OSError as error:
         raise _damage(path, f"It cannot be read ({error.strerror or error})") from error
+
+
+def _parsed(path: Path, data: bytes) -> tuple[JournalFile | None, JournalDamage | None]:
+    """As read_journal returns it, from what the file holds; no file where its first line cannot be read."""
     *lines, rest = data.split(b"\n")
     try:
         first = _row(lines[0] if lines else b"", None)
         start, document, after, has_count = _header(first)
     except (JsonError, KeyError) as error:
-        raise _damage(path, f"Line 1 is damaged ({error})") from error
+        return None, _damage(path, f"Line 1 is damaged ({error})")
     link = first[CHECKSUM]
     rows: list[Row] = []
     n_head = 2 if has_count else 1

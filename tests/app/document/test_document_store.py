@@ -404,3 +404,28 @@ def test_a_damaged_project_file_names_the_command_that_says_what_is_left(tmp_pat
     with pytest.raises(ProjectError) as caught:
         DocumentStore(tmp_path / "p").read()
     assert caught.value.hint == f'"clipgstream repair {tmp_path / "p"}" shows what can be kept.'
+
+
+def test_who_reads_while_events_are_written_sees_no_damage(tmp_path: Path) -> None:
+    path = tmp_path / "00000000.jsonl"
+    journal, is_over = journal_file.create_journal(path, 0, document="", after=""), threading.Event()
+    problems: list[str] = []
+
+    def read() -> None:
+        while not is_over.is_set():
+            known, damage = read_journal(path)
+            if damage is not None or not known.is_whole:
+                problems.append(str(damage))
+
+    readers = [threading.Thread(target=read) for _ in range(2)]
+    for reader in readers:
+        reader.start()
+    try:
+        for step in range(1, 300):
+            journal = journal_file.append_rows(journal, [{"step": step, "do": "change", "name": "a" * 300}])
+    finally:
+        is_over.set()
+        for reader in readers:
+            reader.join()
+    assert problems == []
+    assert read_journal(path) == (journal, None)
