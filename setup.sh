@@ -207,13 +207,13 @@ check_system() {
 }
 
 # ---------------------------------------------------------------- programs that the tests ask
-cluster_key() { cksum <requirements-cluster.lock; }
+extras_key() { cksum <requirements-extras.lock; }
 
-install_cluster() { # without it the tests of clusters are skipped
-    if pip install -qq --no-deps --retries 2 -r requirements-cluster.lock; then
-        stamp cluster "$(cluster_key)"
+install_extras() { # without it the tests of clusters and of USD are skipped
+    if pip install -qq --no-deps --retries 2 -r requirements-extras.lock; then
+        stamp extras "$(extras_key)"
     else
-        say "Ray could not be installed; the tests of clusters are skipped"
+        say "Ray and USD could not be installed; their tests are skipped"
     fi
 }
 
@@ -256,6 +256,6 @@ fi
 if [ "$WITH_TESTS" = yes ] && ! { [ -d tests/oracles/node_modules ] && is_stamped oracles "$(oracles_key)"; }; then
     install_oracles
 fi
-if [ "$WITH_TESTS" = yes ] && ! is_stamped cluster "$(cluster_key)"; then
-    install_cluster
+if [ "$WITH_TESTS" = yes ] && ! is_stamped extras "$(extras_key)"; then
+    install_extras
 fi

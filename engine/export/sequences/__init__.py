@@ -1,0 +1,1 @@
+"""Files that hold a whole sequence of Gaussians: one file over time."""

@@ -1,0 +1,78 @@
+"""A sequence of splats over time: what a file over time is written from, and what its reader gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from engine.export.splats import Splats
+
+
+@dataclass(frozen=True, slots=True)
+class MovingSplats:
+    """What moves, at one frame.
+
+    Attributes:
+        splats: The Gaussians. N of them.
+        ids: The same Gaussian has the same number at each frame of a stretch where it exists. [N] int64, no two equal
+    """
+
+    splats: Splats
+    ids: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Consecutive frames that share what stands still, normally those of a clip.
+
+    Attributes:
+        first_frame: Of the file, counted from 0.
+        n_frames: At least one.
+        still: What is the same at all of these frames.
+        moving: The rest of a frame of the file.
+    """
+
+    first_frame: int
+    n_frames: int
+    still: Splats
+    moving: Callable[[int], MovingSplats]
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceTiming:
+    """When the frames of a file are shown.
+
+    Attributes:
+        n_frames: Of the file, at least one.
+        fps: Frames per second.
+        sound: An audio file that starts with the first frame, as WAV; None without sound.
+    """
+
+    n_frames: int
+    fps: float
+    sound: bytes | None = None
+
+
+class SequenceReader(Protocol):
+    """An opened file over time. Frames may be read in any order; memory stays bounded."""
+
+    @property
+    def timing(self) -> SequenceTiming:
+        """When its frames are shown."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the file is not kept, as sentences for the user."""
+        ...
+
+    def splats(self, frame: int) -> Splats:
+        """All Gaussians of a frame of the file. Raises ProjectError where it is damaged there."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the file."""
+        ...
