@@ -40,3 +40,18 @@ def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     render, aspect = scene.render, camera.data[PIXEL_ASPECT]
     render.resolution_x, render.resolution_y = camera.data[SIZE]
     render.pixel_aspect_x, render.pixel_aspect_y = max(1.0, 1.0 / aspect), max(1.0, aspect)
+
+
+def pixel_width(scene: bpy.types.Scene) -> float:
+    """Width of a pixel of the render at the distance 1; 0 without a camera with perspective."""
+    camera, render = scene.camera, scene.render
+    if camera is None or camera.type != "CAMERA" or camera.data.type != "PERSP":
+        return 0.0
+    width_px = render.resolution_x * render.resolution_percentage / 100
+    height_px = render.resolution_y * render.resolution_percentage / 100
+    aspect = render.pixel_aspect_y / render.pixel_aspect_x
+    lens = camera.data
+    if lens.sensor_fit == "VERTICAL":
+        return lens.sensor_height / lens.lens / (height_px * aspect)
+    is_wide = lens.sensor_fit == "HORIZONTAL" or width_px >= height_px * aspect
+    return lens.sensor_width / lens.lens / (width_px if is_wide else height_px * aspect)

@@ -11,6 +11,9 @@ PART, CAMERA = "clipgstream_part", "clipgstream_camera"
 """Properties of objects: the part of the scene that a mesh shows; the name of a camera in the capture. A collection with the latter holds the
 cameras."""
 
+N_BOUNCES = 256
+"""Gaussians that a ray of Cycles passes through at most."""
+
 
 def make(scene: bpy.types.Scene, sequence: Sequence) -> bpy.types.Object:
     """Make collection and empty of a sequence, turned so that z is up, in metres where the project says how long its
@@ -64,7 +67,9 @@ def set_scene(scene: bpy.types.Scene, root: bpy.types.Object, sequence: Sequence
     scene.frame_set(sequence.first_frame)
     scene.view_settings.view_transform = "Standard"
     if hasattr(scene, "cycles"):
-        scene.cycles.transparent_max_bounces = max(scene.cycles.transparent_max_bounces, 256)
+        # rays pass through many Gaussians: without the second they would give up at random, which is noise
+        scene.cycles.transparent_max_bounces = max(scene.cycles.transparent_max_bounces, N_BOUNCES)
+        scene.cycles.min_transparent_bounces = max(scene.cycles.min_transparent_bounces, N_BOUNCES)
     if sequence.cameras:
         first = next(child for child in root.children if child.get(CAMERA) == sequence.cameras[0].name)
         cameras.look_through(scene, first)

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from . import linking, points
+from . import cameras, linking, look, points
 from .clouds import CloudCache, Stamp, stamp_of
 from .problem import SequenceProblem
 from .sidecar import Sequence, read_sequence
@@ -66,6 +66,7 @@ def show(root: bpy.types.Object, scene: bpy.types.Scene) -> None:
     seconds = (scene.frame_current + scene.frame_subframe - settings.start) / scene_fps
     frame = sequence.first_frame + seconds * settings.speed * sequence.fps + _EPSILON
     is_outside = not sequence.first_frame <= frame < sequence.last_frame + 1
+    pixel = cameras.pixel_width(scene)
     for part, mesh_object in linking.objects_of(root).items():
         is_hidden = (is_outside and settings.outside == "HIDE") or (
             part != "all" and settings.part not in ("ALL", part.upper())
@@ -74,6 +75,7 @@ def show(root: bpy.types.Object, scene: bpy.types.Scene) -> None:
             mesh_object.hide_render = mesh_object.hide_viewport = is_hidden
         if is_hidden or part not in sequence.files:
             continue
+        look.set_pixel(mesh_object.modifiers[look.NAME], pixel)
         path = sequence.file_at(part, min(max(frame, sequence.first_frame), sequence.last_frame + _EPSILON))
         stamp = stamp_of(path)
         wanted = (path, stamp, settings.size, settings.limit, settings.colors)

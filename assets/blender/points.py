@@ -6,6 +6,9 @@ import numpy as np
 
 from .ply import Cloud
 
+_THINNEST = np.float32(1e-4)
+"""Of a Gaussian's longest side: what is thinner has no inverse in single precision."""
+
 
 def fill(mesh: bpy.types.Mesh, cloud: Cloud, *, size: float, is_linear: bool) -> None:
     """Replace the points of a mesh.
@@ -15,6 +18,7 @@ def fill(mesh: bpy.types.Mesh, cloud: Cloud, *, size: float, is_linear: bool) ->
         is_linear: Whether colours are written in linear light instead of display-encoded.
     """
     n = len(cloud)
+    scales = np.maximum(cloud.scales, _THINNEST * cloud.scales.max(axis=1, initial=0.0, keepdims=True))
     if len(mesh.vertices) != n:
         mesh.clear_geometry()
         mesh.vertices.add(n)
@@ -22,7 +26,7 @@ def fill(mesh: bpy.types.Mesh, cloud: Cloud, *, size: float, is_linear: bool) ->
     colors = np.ones((n, 4), np.float32)
     colors[:, :3] = _linear(cloud.colors) if is_linear else cloud.colors
     for name, kind, field, values in (
-        ("scale", "FLOAT_VECTOR", "vector", cloud.scales * np.float32(size)),
+        ("scale", "FLOAT_VECTOR", "vector", scales * np.float32(size)),
         ("rotation", "QUATERNION", "value", cloud.quats),
         ("opacity", "FLOAT", "value", cloud.opacities),
         ("color", "FLOAT_COLOR", "color", colors),

@@ -11,6 +11,11 @@ def _show(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None
     playback.show_again(settings.id_data, context.scene)
 
 
+def _recolor(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    context.scene.view_settings.view_transform = "Standard" if settings.colors == "LINEAR" else "Raw"
+    _show(settings, context)
+
+
 def _relink(settings: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     playback.relink_or_note(settings.id_data, context.scene)
 
@@ -63,12 +68,12 @@ class SequenceSettings(bpy.types.PropertyGroup):
     )
     colors: EnumProperty(
         name="Colours",
-        description="How colours are stored in the points",
+        description="How colours blend where Gaussians are transparent; sets the view transform of the scene",
         items=(
             ("LINEAR", "Scene", "Linear, to go with other objects; view transform Standard"),
             ("DISPLAY", "As trained", "Display-encoded, blended as ClipGStream Studio does; view transform Raw"),
         ),
-        update=_show,
+        update=_recolor,
     )
     problem: StringProperty()
 
