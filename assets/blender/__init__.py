@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Opens sequences of Gaussians that ClipGStream Studio exported: File > Import > ClipGStream sequence.
 
-The code of this add-on is ClipGStream Studio's own, under the MIT licence. It runs inside Blender and uses bpy, which is
-GPL-3.0-or-later: whoever distributes both together as one program follows the GPL.
+The code of this add-on is ClipGStream Studio's own, under the MIT licence. It runs inside Blender and uses bpy, which
+is GPL-3.0-or-later: whoever distributes both together as one program follows the GPL.
 """
 
 from . import operators, panel, playback, properties

@@ -8,8 +8,8 @@ from . import cameras, look
 from .sidecar import PARTS, Sequence
 
 PART, CAMERA = "clipgstream_part", "clipgstream_camera"
-"""Properties of objects: the part of the scene that a mesh shows; the name of a camera in the capture. A collection with the latter holds the
-cameras."""
+"""Properties of objects: the part of the scene that a mesh shows; the name of a camera in the capture. A collection
+with the latter holds the cameras."""
 
 N_BOUNCES = 256
 """Gaussians that a ray of Cycles passes through at most."""
@@ -62,7 +62,6 @@ def set_scene(scene: bpy.types.Scene, root: bpy.types.Object, sequence: Sequence
     render = scene.render
     render.fps = max(1, round(sequence.fps))
     render.fps_base = render.fps / sequence.fps
-    root.clipgstream.start = sequence.first_frame
     scene.frame_start, scene.frame_end = sequence.first_frame, sequence.last_frame
     scene.frame_set(sequence.first_frame)
     scene.view_settings.view_transform = "Standard"

@@ -2,6 +2,7 @@
 """What users do with sequences: import one, relink it, look through its cameras."""
 
 from pathlib import Path
+from typing import ClassVar
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
@@ -26,7 +27,7 @@ class ImportSequence(bpy.types.Operator, ImportHelper):
 
     bl_idname = "import_scene.clipgstream"
     bl_label = "Import ClipGStream sequence"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
     filename_ext = ".json"
     filter_glob: StringProperty(default=f"*{SUFFIX}", options={"HIDDEN"})
     is_setting_scene: BoolProperty(
@@ -44,16 +45,14 @@ class ImportSequence(bpy.types.Operator, ImportHelper):
         except SequenceProblem as problem:
             self.report({"ERROR"}, str(problem))
             return {"CANCELLED"}
-        linking.link(root, sequence)
-        root.clipgstream.start = scene.frame_start
-        if self.is_setting_scene:
-            linking.set_scene(scene, root, sequence)
-        root.clipgstream.path = str(path)  # shows the present frame
-        context.view_layer.update()
+        root.clipgstream.start = sequence.first_frame if self.is_setting_scene else scene.frame_start
+        root.clipgstream.path = str(path)  # makes the objects and shows the present frame
         if root.clipgstream.problem:
             self.report({"ERROR"}, root.clipgstream.problem)
             linking.remove(root)
             return {"CANCELLED"}
+        if self.is_setting_scene:
+            linking.set_scene(scene, root, sequence)
         for one in context.selected_objects:
             one.select_set(False)
         root.select_set(True)
@@ -62,10 +61,11 @@ class ImportSequence(bpy.types.Operator, ImportHelper):
 
 
 class _OnSequence:
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        """Only where an object of a sequence is active."""
         return root_of(context) is not None
 
 
@@ -114,7 +114,7 @@ class LookThroughCamera(bpy.types.Operator):
 
     bl_idname = "clipgstream.look_through"
     bl_label = "Render through this camera"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

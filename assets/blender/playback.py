@@ -13,6 +13,8 @@ from .problem import SequenceProblem
 from .sidecar import Sequence, read_sequence
 
 _LOOK_EVERY_S = 2.0
+_LINKED = "clipgstream_linked"
+"""Property of an empty: the stamp of the description that its objects and cameras come from."""
 _EPSILON = 1e-4
 
 
@@ -23,7 +25,7 @@ class _Shown:
     path: Path
     stamp: Stamp
     sequence: Sequence
-    filled: dict[str, tuple] = field(default_factory=dict)
+    filled: dict[int, tuple] = field(default_factory=dict)
 
 
 _clouds = CloudCache()
@@ -54,6 +56,7 @@ def sequence_of(root: bpy.types.Object) -> Sequence:
 def relink(root: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """Read the sequence, make objects and cameras its own, and show the present frame. Raises SequenceProblem."""
     linking.link(root, sequence_of(root))
+    root[_LINKED] = _text(_shown[root.session_uid].stamp)
     show(root, scene)
     root.clipgstream.problem = ""
 
@@ -79,10 +82,10 @@ def show(root: bpy.types.Object, scene: bpy.types.Scene) -> None:
         path = sequence.file_at(part, min(max(frame, sequence.first_frame), sequence.last_frame + _EPSILON))
         stamp = stamp_of(path)
         wanted = (path, stamp, settings.size, settings.limit, settings.colors)
-        if filled.get(mesh_object.data.name) != wanted:
+        if filled.get(mesh_object.data.session_uid) != wanted:
             cloud = _clouds.read(path, stamp).largest(settings.limit)
             points.fill(mesh_object.data, cloud, size=settings.size, is_linear=settings.colors == "LINEAR")
-            filled[mesh_object.data.name] = wanted
+            filled[mesh_object.data.session_uid] = wanted
 
 
 def show_again(root: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -122,25 +125,35 @@ def _on_frame(scene: bpy.types.Scene, *_: object) -> None:
 
 @persistent
 def _on_load(*_: object) -> None:
+    """Meshes may hold something else than they were filled with."""
     _shown.clear()
+    _look_for_changes()
     for scene in bpy.data.scenes:
         _on_frame(scene)
 
 
 def _look_for_changes() -> float:
-    """Relinks what was exported again while nothing else happens."""
+    """Relink what was exported again. Cameras that were not are left alone: the user may have changed them."""
     for scene in bpy.data.scenes:
         for root in roots(scene):
-            kept = _shown.get(root.session_uid)
             try:
-                if kept is None or stamp_of(path_of(root)) != kept.stamp:
-                    relink_or_note(root, scene)
+                if root.get(_LINKED) != _text(stamp_of(path_of(root))):
+                    relink(root, scene)
             except SequenceProblem as problem:
                 _note(root, str(problem))
     return _LOOK_EVERY_S
 
 
-_HANDLERS = (("frame_change_pre", _on_frame), ("load_post", _on_load))
+def _text(stamp: Stamp) -> str:
+    return " ".join(map(str, stamp))
+
+
+_HANDLERS = (
+    ("frame_change_pre", _on_frame),
+    ("load_post", _on_load),
+    ("undo_post", _on_load),
+    ("redo_post", _on_load),
+)
 
 
 def register() -> None:

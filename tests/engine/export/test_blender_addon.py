@@ -186,7 +186,8 @@ def test_files_are_read_once_and_again_when_they_change_in_bounded_memory(addon:
     assert read(paths[0]) is first, "used last"
     read(paths[2])
     assert read(paths[0]) is first
-    read(paths[3]), read(paths[1])
+    read(paths[3])
+    read(paths[1])
     assert read(paths[0]) is not first, "no room for it any more"
     with paths[0].open("wb") as file:
         FORMATS["ply"].write(chance_splats(50), file)
