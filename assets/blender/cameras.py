@@ -13,11 +13,11 @@ SIZE, PIXEL_ASPECT = "clipgstream_size", "clipgstream_pixel_aspect"
 """Properties of a camera: width and height of its picture; height of a pixel in widths."""
 
 
-def set_camera(camera: bpy.types.Object, row: SequenceCamera, *, meters_per_unit: float) -> None:
+def set_camera(camera: bpy.types.Object, row: SequenceCamera, *, near_m: float) -> None:
     """Give a camera lens, place and picture of a captured one. A skew of its pixels is left out.
 
     Args:
-        meters_per_unit: Of the files.
+        near_m: Nearest depth that is drawn, metres of the scene.
     """
     (width, height), K = row.size, row.K
     aspect = K[0][0] / K[1][1]
@@ -27,9 +27,9 @@ def set_camera(camera: bpy.types.Object, row: SequenceCamera, *, meters_per_unit
     lens.shift_x = (width / 2 - K[0][2]) / width
     lens.shift_y = (K[1][2] - height / 2) * aspect / width
     lens[SIZE], lens[PIXEL_ASPECT] = row.size, aspect
-    lens.clip_start = row.near * meters_per_unit
+    lens.clip_start = near_m
     camera.matrix_parent_inverse.identity()
-    camera.matrix_basis = Matrix(row.camera_to_world) @ _FROM_OPENCV
+    camera.matrix_basis = Matrix((*row.camera_to_world, (0.0, 0.0, 0.0, 1.0))) @ _FROM_OPENCV
 
 
 def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:

@@ -11,6 +11,7 @@ PART, CAMERA = "clipgstream_part", "clipgstream_camera"
 """Properties of objects: the part of the scene that a mesh shows; the name of a camera in the capture. A collection
 with the latter holds the cameras."""
 
+_NEAR = 0.01
 N_BOUNCES = 256
 """Gaussians that a ray of Cycles passes through at most."""
 
@@ -45,9 +46,10 @@ def link(root: bpy.types.Object, sequence: Sequence) -> None:
         elif part not in sequence.files and part in parts:
             _remove(parts[part])
     there = {child[CAMERA]: child for child in root.children if CAMERA in child}
+    near_m = (sequence.near_plane or _NEAR) * (sequence.meters_per_unit or 1.0)
     for row in sequence.cameras:
         camera = there.pop(row.name, None) or _add_camera(root, collection, row.name)
-        cameras.set_camera(camera, row, meters_per_unit=sequence.meters_per_unit or 1.0)
+        cameras.set_camera(camera, row, near_m=near_m)
     for camera in there.values():
         _remove(camera)
 

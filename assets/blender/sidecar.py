@@ -27,15 +27,13 @@ class SequenceCamera:
     Attributes:
         size: Width and height, pixels.
         K: Intrinsics, pixels, pixel centres at +0.5. 3 rows of 3
-        camera_to_world: In the coordinates of the files; x right, y down, z forward. 4 rows of 4
-        near: Nearest depth that is drawn, in units of the files.
+        camera_to_world: In the coordinates of the files; x right, y down, z forward. 3 rows of 4
     """
 
     name: str
     size: tuple[int, int]
     K: list[list[float]]
     camera_to_world: list[list[float]]
-    near: float
 
 
 @dataclass(frozen=True)
@@ -48,6 +46,7 @@ class Sequence:
         up: Which way is up in the files. [3]
         meters_per_unit: Of the files; None where the project does not say.
         files: By part the first frame of each file, rising, and its path.
+        near_plane: Nearest depth that is drawn, in units of the files; None in exports of earlier versions.
         cameras: May be none, in exports of earlier versions.
     """
 
@@ -59,6 +58,7 @@ class Sequence:
     up: tuple[float, float, float]
     meters_per_unit: float | None
     files: dict[str, tuple[list[int], list[Path]]]
+    near_plane: float | None
     cameras: list[SequenceCamera]
 
     def file_at(self, part: str, frame: float) -> Path:
@@ -118,6 +118,7 @@ def _sequence(document: dict[str, Any], path: Path) -> Sequence:
         up=(x, y, z),
         meters_per_unit=None if meters is None else _positive(meters, 1e9),
         files=files,
+        near_plane=_positive(document["near_plane"], 1e9) if "near_plane" in document else None,
         cameras=[_camera(row) for row in document.get("cameras", ())],
     )
 
@@ -126,11 +127,11 @@ def _camera(row: dict[str, Any]) -> SequenceCamera:
     width, height = (_whole(side, 1, _MAX_PX) for side in row["image_size"])
     K = [_numbers(line, 3) for line in row["K"]]
     pose = [_numbers(line, 4) for line in row["camera_to_world"]]
-    if len(K) != 3 or len(pose) != 4:
+    if len(K) != 3 or len(pose) != 3:
         raise ValueError("a camera is not complete")
     _positive(K[0][0], 1e9)
     _positive(K[1][1], 1e9)
-    return SequenceCamera(str(row["name"])[:200], (width, height), K, pose, _positive(row["near"], 1e9))
+    return SequenceCamera(str(row["name"])[:200], (width, height), K, pose)
 
 
 def _whole(value: Any, low: int, high: int) -> int:

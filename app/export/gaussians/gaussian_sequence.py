@@ -143,7 +143,8 @@ class GaussianSequence:
 
     def document(self) -> dict[str, Any]:
         """The document that is written next to the files. Its cameras are those of the capture as refined, where they
-        stand in the files; its meters_per_unit is of the files, null where the project does not say."""
+        stand in the files. In units of the files are meters_per_unit, null where the project does not say, and
+        near_plane, the nearest depth that is drawn."""
         opened = self._scene.opened
         meters_per_unit = opened.project.document.world.meters_per_unit
         return {
@@ -173,7 +174,8 @@ class GaussianSequence:
                 }
                 for written in self.files
             ],
-            "cameras": camera_rows(opened.rig, self._placement, near_plane=self._near_plane),
+            "near_plane": self._near_plane * self._placement.scale,
+            "cameras": camera_rows(opened.rig, self._placement),
         }
 
     @property
@@ -215,17 +217,12 @@ class GaussianSequence:
         return lines
 
 
-def camera_rows(rig: CameraRig, placement: FileWorld, *, near_plane: float) -> list[dict[str, Any]]:
-    """Cameras as the document lists them: name, size in pixels, intrinsics (pixel centres at +0.5), camera_to_world in
-    the coordinates of the files (x right, y down, z forward), and the nearest depth that is drawn, in their units.
-
-    Args:
-        near_plane: Scene units.
-    """
-    near = near_plane * placement.scale
-    poses = placement.placed_cameras(rig.world_to_camera)
+def camera_rows(rig: CameraRig, placement: FileWorld) -> list[dict[str, Any]]:
+    """Cameras as the document lists them: name, size in pixels, intrinsics (pixel centres at +0.5), and the upper three
+    rows of camera_to_world in the coordinates of the files (x right, y down, z forward)."""
+    poses = placement.placed_cameras(rig.world_to_camera)[:, :3]
     return [
-        {"name": name, "image_size": size.tolist(), "K": K.tolist(), "camera_to_world": pose.tolist(), "near": near}
+        {"name": name, "image_size": size.tolist(), "K": K.tolist(), "camera_to_world": pose.tolist()}
         for name, size, K, pose in zip(rig.names, rig.image_sizes, rig.Ks, poses, strict=True)
     ]
 

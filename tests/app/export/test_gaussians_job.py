@@ -108,12 +108,11 @@ def test_the_document_has_cameras_where_they_stand_in_the_files(opened: TrainedP
     written = read(tmp_path / "out" / "p.ply", "ply").means
     for camera, row in enumerate(document["cameras"]):
         assert row["image_size"] == rig.image_sizes[camera].tolist()
-        pose = np.linalg.inv(row["camera_to_world"])
+        pose = np.linalg.inv([*row["camera_to_world"], [0.0, 0.0, 0.0, 1.0]])
         np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
         expected = to_pixels(to_camera(live, rig.world_to_camera[camera]), rig.Ks[camera])
         np.testing.assert_allclose(to_pixels(to_camera(written, pose), np.array(row["K"])), expected, rtol=1e-3)
-        assert row["near"] == pytest.approx(3.0 * 0.1)
-    assert document["meters_per_unit"] is None
+    assert (document["near_plane"], document["meters_per_unit"]) == (pytest.approx(3.0 * 0.1), None)
 
 
 def test_full_fields_are_read_back_and_measured_as_others(opened: TrainedProject, tmp_path: Path):

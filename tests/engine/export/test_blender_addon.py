@@ -25,8 +25,7 @@ CAMERA = {
     "name": "cam",
     "image_size": [8, 6],
     "K": [[9.0, 0.0, 4.0], [0.0, 9.0, 3.0], [0.0, 0.0, 1.0]],
-    "camera_to_world": np.eye(4).tolist(),
-    "near": 0.1,
+    "camera_to_world": np.eye(4)[:3].tolist(),
 }
 GOOD = {
     "schema": 1,
@@ -35,6 +34,7 @@ GOOD = {
     "fps": 29.97,
     "up": [0.0, -1.0, 0.0],
     "meters_per_unit": 0.5,
+    "near_plane": 0.1,
     "files": [
         {"file": "p_static.ply", "part": "static", "frame": 3},
         {"file": "p_moving_0006.ply", "part": "moving", "frame": 6},
@@ -85,7 +85,7 @@ def test_a_description_becomes_a_sequence(addon: Any, tmp_path: Path):
     shown = [found.file_at("moving", frame).name for frame in (0, 3, 5.99, 6, 20)]
     assert shown == ["p_moving_0003.ply"] * 3 + ["p_moving_0006.ply"] * 2
     assert (found.cameras[0].size, found.cameras[0].K) == ((8, 6), CAMERA["K"])
-    earlier = {name: value for name, value in GOOD.items() if name not in ("cameras", "meters_per_unit")}
+    earlier = {name: value for name, value in GOOD.items() if name not in ("cameras", "near_plane", "meters_per_unit")}
     (tmp_path / "p_export.json").write_text(json.dumps(earlier))
     found = addon.sidecar.read_sequence(tmp_path / "p_export.json")
     assert (found.cameras, found.meters_per_unit) == ([], None)
@@ -111,6 +111,7 @@ def test_a_description_becomes_a_sequence(addon: Any, tmp_path: Path):
         ({"up": "up"}, "numbers were expected"),
         ({"cameras": [CAMERA | {"K": [[1, 2]]}]}, "numbers were expected"),
         ({"cameras": [CAMERA | {"image_size": [0, 6]}]}, "not a whole number"),
+        ({"near_plane": None}, "not the description"),
         ({"cameras": [{}]}, "is missing"),
     ],
 )
