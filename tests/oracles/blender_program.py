@@ -3,7 +3,7 @@
 Called by test_blender.py with the name of a function, a folder to work in, and the zip of the add-on.
 """
 
-# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false, reportArgumentType=false
 
 import json
 import sys
