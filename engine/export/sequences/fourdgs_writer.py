@@ -21,7 +21,7 @@ from fourdgs.serialization import MAGIC, crc32
 
 from engine.export.sequences.fourdgs_grid import ChunkRows, Grid
 from engine.export.sequences.segments import segments
-from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
 from engine.export.splats import Splats
 
@@ -41,7 +41,7 @@ FPS_KEY = "clipgstream_fps"
 """Attribute with the frames per second of the take that was written; the format itself knows seconds only."""
 
 
-def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
+def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
     """Write a file; memory holds a few frames at a time.
 
     Args:
@@ -62,7 +62,9 @@ def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> t
     return chunks.notes()
 
 
-def _rows(stretches: Iterable[Stretch], timing: SequenceTiming, look: Callable[[Splats], None]) -> Iterator[ChunkRows]:
+def _rows(
+    stretches: Iterable[SequenceStretch], timing: SequenceTiming, look: Callable[[Splats], None]
+) -> Iterator[ChunkRows]:
     """Rows of each chunk, in order of the frames at which they end. look: is shown each still part beforehand."""
     still = StillRows()
     span = max(1, round(SPAN_S * timing.fps))

@@ -15,7 +15,7 @@ import numpy as np
 from engine.conventions import ALPHA_MIN
 from engine.errors import ProjectError
 from engine.export.player.blocks import joined
-from engine.export.sequences.sequence import SequenceTiming, Stretch
+from engine.export.sequences.sequence import SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
 from engine.export.splats import Splats, colors_of
 from engine.export.world import FileWorld
@@ -52,7 +52,7 @@ def _library() -> Any:
 # -------------------------------------------------------------------- writing
 
 
-def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
+def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
     """Write a file, as text where its suffix is .usda; memory holds a few frames, but of text all of them.
 
     Returns:
