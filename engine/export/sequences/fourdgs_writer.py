@@ -19,7 +19,7 @@ import numpy as np
 from fourdgs import records
 from fourdgs.serialization import MAGIC, crc32
 
-from engine.export.sequences.fourdgs_grid import ChunkRows, Grid
+from engine.export.sequences.fourdgs_grid import ChunkRows, FourdgsGrid
 from engine.export.sequences.segments import segments
 from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
@@ -115,7 +115,7 @@ class _Chunks:
 
     def __init__(self, body: BinaryIO, timing: SequenceTiming) -> None:
         self._body, self._timing = body, timing
-        self._grid: Grid | None = None
+        self._grid: FourdgsGrid | None = None
         self._first_still: list[Splats] = []
         self._windows: dict[tuple[int, int], int] = {}
         self._entries: list[records.ChunkIndexEntry] = []
@@ -131,7 +131,7 @@ class _Chunks:
     def add(self, rows: ChunkRows) -> None:
         """Add a chunk."""
         if self._grid is None:
-            self._grid = Grid([rows.splats, *self._first_still], self._timing.fps)
+            self._grid = FourdgsGrid([rows.splats, *self._first_still], self._timing.fps)
             self._first_still, self._up = [], rows.splats.up
         is_storable = self._grid.storable(rows.splats)
         if not is_storable.all():
@@ -165,7 +165,7 @@ class _Chunks:
 
     def _front(self) -> Iterator[bytes]:
         """Everything before the chunks."""
-        timing, grid = self._timing, self._grid or Grid([_NOTHING], self._timing.fps)
+        timing, grid = self._timing, self._grid or FourdgsGrid([_NOTHING], self._timing.fps)
         duration_s = grid.seconds(timing.n_frames)
         box = [*self._low.tolist(), *self._high.tolist()] if self._entries else [0.0] * 6
         yield records.Header(
