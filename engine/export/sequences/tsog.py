@@ -1,0 +1,284 @@
+"""Writes .tsog: the pictures of a .sog with a timeline, in which every Gaussian has its moment and its speed.
+
+Version 4 of Xiaomi Research's temporal SOG in the playback profile 1 of OpsiClear. A continuous timeline gives every
+Gaussian a bell over time. What stands still throughout is there once, under a bell that is as good as flat. Everything
+else is there once per frame, under a bell that is narrow enough not to be seen at the next frame, and travels under it
+at the speed at which it is followed to its neighbours: so players show motion between frames. A discrete timeline shows
+every Gaussian at one frame only; it is for scenes in which hardly anything can be followed or stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from engine.errors import ProjectError
+from engine.export.formats.sog_pictures import attributes_of, bytes_of, write_pictures
+from engine.export.packing import morton_order
+from engine.export.player.still_part import shared_rows
+from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.sequences.tsog_meta import (
+    MAX_ROWS,
+    MOST_FRAMES,
+    MOST_SOUND_BYTES,
+    PROFILE_ID,
+    PROFILE_VERSION,
+    VERSION,
+)
+from engine.export.splats import Splats
+
+BELL_FRAMES = 0.38
+"""Standard deviation of what moves: 0.03 of its opacity is left one frame away, where it lies on what is shown there,
+and 0.42 half way between two frames, where those of both lie on each other."""
+STILL_SIGMA = 50.0
+"""Of what stands still, in lengths of the file: 0.99995 of its opacity at either end."""
+SAME_COLOR = 4.0 / 255.0
+"""A still Gaussian whose colours differ by less than this gets the one in the middle: two levels off at most."""
+_SPEED_LEVELS = 127
+_SPEED_QUANTILE = 0.999
+_PLAYER_ROWS = 1_000_000
+_EFFORT = 50
+_SOUND = "audio/track.wav"
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Gaussians for the file.
+
+    Attributes:
+        frames: Where each is shown; -1 at all of them. [N] int32
+        splats: N of them.
+        speeds: Units per frame. [N, 3] float32
+    """
+
+    frames: np.ndarray
+    splats: Splats
+    speeds: np.ndarray
+
+
+def write(stretches: Iterable[Stretch], timing: SequenceTiming, file: BinaryIO) -> tuple[str, ...]:
+    """See SequenceFormat.
+
+    Raises:
+        ProjectError: There are more frames or Gaussians than such a file holds; says how many frames fit.
+    """
+    n = timing.n_frames
+    if n > MOST_FRAMES:
+        raise _too_many(f"{n:,} frames, and the timeline of a .tsog tells {MOST_FRAMES:,} apart", MOST_FRAMES)
+    stretches, parts, n_followed, n_moving = list(stretches), list[_Rows](), 0, np.zeros(n, np.int64)
+    for stretch in stretches:
+        rows, n_known = _moving(stretch, n_moving)
+        parts.append(rows)
+        n_followed += n_known
+    shared, others = _shared(stretches)
+    n_still = _by_frame(stretches, [one.still for one in stretches])
+    n_others = _by_frame(stretches, others)
+    is_followed = 2 * (len(shared) * n + n_followed) >= int((n_still + n_moving).sum())
+    if is_followed or n == 1:
+        _check_rows(n_others + n_moving, len(shared))
+        at_once = shared[morton_order(shared.means)]
+        parts.append(_Rows(np.full(len(shared), -1, np.int32), at_once, np.zeros((len(shared), 3), np.float32)))
+    else:
+        _check_rows(n_still + n_moving, 0)
+        others = [one.still for one in stretches]
+    parts += [_repeated(stretch, still) for stretch, still in zip(stretches, others, strict=True)]
+    n_written = _write(parts, timing, is_followed, file)
+    return tuple(_notes(timing, is_followed, n_written, int(n_others.max())))
+
+
+def _too_many(what: str, n_fit: int) -> ProjectError:
+    return ProjectError(
+        f"The scene has {what}. The first {n_fit:,} frames fit.", hint="Export fewer frames (--frames)."
+    )
+
+
+def _check_rows(n_at: np.ndarray, n_once: int) -> None:
+    """Raises ProjectError where the frames, counted by their Gaussians, are too many for one file."""
+    total = n_once + np.cumsum(n_at)
+    if total[-1] > MAX_ROWS:
+        n_fit = int(np.searchsorted(total, MAX_ROWS, side="right"))
+        raise _too_many(f"{total[-1]:,} Gaussians in {len(n_at):,} frames, and a .tsog holds {MAX_ROWS:,}", n_fit)
+
+
+def _by_frame(stretches: list[Stretch], splats: list[Splats]) -> np.ndarray:
+    """How many Gaussians of each stretch there are at each frame. [n_frames] int64"""
+    return np.repeat([len(one) for one in splats], [stretch.n_frames for stretch in stretches])
+
+
+def _moving(stretch: Stretch, n_moving: np.ndarray) -> tuple[_Rows, int]:
+    """What moves in a stretch, and how much of that can be followed to another frame. One Gaussian comes after the
+    other, each frame by frame: a quarter smaller as pictures than frame after frame.
+
+    Args:
+        n_moving: Gets the numbers at its frames.
+    """
+    end, n_followed = stretch.first_frame + stretch.n_frames, 0
+    ids, frames, splats, speeds = list[np.ndarray](), list[np.ndarray](), list[Splats](), list[np.ndarray]()
+    before, now = None, stretch.moving(stretch.first_frame)
+    for frame in range(stretch.first_frame, end):
+        after = stretch.moving(frame + 1) if frame + 1 < end else None
+        steps, n = _steps(now, before, after)
+        n_followed += int((n > 0).sum())
+        n_moving[frame] = len(now.ids)
+        _check_rows(n_moving[: frame + 1], 0)
+        ids.append(now.ids)
+        frames.append(np.full(len(now.ids), frame, np.int32))
+        splats.append(now.splats)
+        speeds.append(steps)
+        if after is not None:
+            before, now = now, after
+    order = np.lexsort((np.concatenate(frames), np.concatenate(ids)))
+    return _Rows(np.concatenate(frames)[order], _joined(splats)[order], np.concatenate(speeds)[order]), n_followed
+
+
+def _steps(now: MovingSplats, before: MovingSplats | None, after: MovingSplats | None) -> tuple[np.ndarray, np.ndarray]:
+    """Mean steps from and to the neighbouring frames, scene units, and from how many of them. [N, 3] float32; [N]"""
+    steps, n = np.zeros((len(now.ids), 3)), np.zeros(len(now.ids))
+    for other, sign in ((before, -1.0), (after, 1.0)):
+        if other is not None:
+            _, mine, theirs = np.intersect1d(now.ids, other.ids, assume_unique=True, return_indices=True)
+            steps[mine] += sign * (other.splats.means[theirs].astype(np.float64) - now.splats.means[mine])
+            n[mine] += 1.0
+    return (steps / np.maximum(n, 1.0)[:, None]).astype(np.float32), n
+
+
+def _repeated(stretch: Stretch, still: Splats) -> _Rows:
+    """What stands still in a stretch at each of its frames."""
+    n = stretch.n_frames
+    frames = np.tile(np.arange(stretch.first_frame, stretch.first_frame + n, dtype=np.int32), len(still))
+    along = still[np.repeat(morton_order(still.means), n)]
+    return _Rows(frames, along, np.zeros((len(frames), 3), np.float32))
+
+
+def _shared(stretches: list[Stretch]) -> tuple[Splats, list[Splats]]:
+    """What stands still in all stretches, in colours between theirs, and what else stands still in each."""
+    first = stretches[0].still
+    is_shared = np.ones(len(first), bool)
+    low, high = first.colors.copy(), first.colors.copy()
+    found = []
+    for stretch in stretches:
+        rows, is_hidden = shared_rows(first, stretch.still)
+        colors = stretch.still.colors[rows >= 0]
+        at = rows[rows >= 0]
+        low[at], high[at] = np.minimum(low[at], colors), np.maximum(high[at], colors)
+        is_shared &= ~is_hidden
+        found.append(rows)
+    is_shared &= ((high - low) <= SAME_COLOR).all(1)
+    others = [
+        one.still[~((rows >= 0) & is_shared[np.maximum(rows, 0)])] if len(first) else one.still
+        for one, rows in zip(stretches, found, strict=True)
+    ]
+    return replace(first, colors=(low + high) / np.float32(2.0))[is_shared], others
+
+
+def _write(parts: list[_Rows], timing: SequenceTiming, is_continuous: bool, file: BinaryIO) -> int:
+    """Returns the number of Gaussians in the file."""
+    frames, speeds = (np.concatenate([getattr(part, name) for part in parts]) for name in ("frames", "speeds"))
+    splats = _joined([part.splats for part in parts])
+    parts.clear()
+    if not len(splats):
+        frames, speeds, splats = np.zeros(1, np.int32), np.zeros((1, 3), np.float32), _NOTHING
+    described, pixels = attributes_of(splats)
+    playback: dict[str, Any] = {"fps": timing.fps, "loop": True}
+    meta: dict[str, Any] = {
+        "version": VERSION,
+        "profile": {"id": PROFILE_ID, "version": PROFILE_VERSION},
+        "asset": {"generator": "ClipGStream Studio"},
+        **described,
+        "fps": timing.fps,
+        "playback": playback,
+    }
+    if timing.n_frames == 1:
+        playback["duration"] = 1.0 / timing.fps
+    elif is_continuous:
+        playback["duration"] = (timing.n_frames - 1) / timing.fps
+        _add_bells(meta, pixels, frames, timing.n_frames)
+        _add_speeds(meta, pixels, speeds * (timing.n_frames - 1))
+    else:
+        _add_frames(meta, pixels, frames, timing.n_frames)
+    others = {}
+    if timing.sound is not None and len(timing.sound) <= MOST_SOUND_BYTES:
+        meta["audio"] = {"file": _SOUND, "mimeType": "audio/wav"}
+        others[_SOUND] = timing.sound
+    write_pictures(file, meta, pixels, len(splats), effort=_EFFORT, others=others)
+    return len(splats)
+
+
+_NOTHING = Splats(
+    np.zeros((1, 3), np.float32),
+    np.array([[1.0, 0.0, 0.0, 0.0]], np.float32),
+    np.ones((1, 3), np.float32),
+    np.zeros(1, np.float32),
+    np.zeros((1, 3), np.float32),
+)
+"""One Gaussian that nobody sees: a file has one at least."""
+
+
+def _joined(parts: list[Splats]) -> Splats:
+    """One column after the other, so that the parts and the whole are not in memory at once."""
+    names = ("means", "quats", "scales", "opacities", "colors")
+    return replace(parts[0], **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
+def _add_bells(meta: dict[str, Any], pixels: dict[str, np.ndarray], frames: np.ndarray, n_frames: int) -> None:
+    """A continuous timeline. The range of centres is such that every frame is a whole number."""
+    step = 65535 // (n_frames - 1)
+    is_still = frames < 0
+    centers = np.where(is_still, step * (n_frames - 1) // 2, step * frames)
+    codes = np.stack([centers, np.where(is_still, 65535, 0)], axis=1)
+    files = ["timeline_l.webp", "timeline_u.webp"]
+    pixels.update(zip(files, bytes_of(codes), strict=True))
+    meta["timeline"] = {
+        "type": 1,
+        "mins": [0.0, BELL_FRAMES / (n_frames - 1)],
+        "maxs": [65535 / (step * (n_frames - 1)), STILL_SIGMA],
+        "files": files,
+    }
+
+
+def _add_speeds(meta: dict[str, Any], pixels: dict[str, np.ndarray], speeds: np.ndarray) -> None:
+    """Translations in units per length of the file. The range is such that no speed is a whole number."""
+    moving = np.abs(speeds[speeds.any(1)])
+    if not len(moving):
+        return
+    level = np.maximum(np.quantile(moving, _SPEED_QUANTILE, axis=0), 1e-12) / _SPEED_LEVELS
+    codes = np.clip(np.rint(speeds / level), -_SPEED_LEVELS - 1, _SPEED_LEVELS) + _SPEED_LEVELS + 1
+    pixels["speeds.webp"] = codes
+    mins, maxs = (level * limit for limit in (-_SPEED_LEVELS - 1, _SPEED_LEVELS))
+    meta["temporal"] = {"means": {"mins": [mins.tolist()], "maxs": [maxs.tolist()], "files": ["speeds.webp"]}}
+
+
+def _add_frames(meta: dict[str, Any], pixels: dict[str, np.ndarray], frames: np.ndarray, n_frames: int) -> None:
+    """A discrete timeline."""
+    delta = 65536 // n_frames
+    files = ["timeline_l.webp", "timeline_u.webp"]
+    pixels.update(zip(files, bytes_of((frames * delta + delta // 2)[:, None]), strict=True))
+    meta["timeline"] = {"type": 0, "N": n_frames, "delta": delta, "files": files}
+
+
+def _notes(timing: SequenceTiming, is_continuous: bool, n_written: int, n_repeated: int) -> Iterator[str]:
+    if is_continuous and timing.n_frames > 1:
+        yield (
+            "Timeline: continuous. Still Gaussians are stored once, what moves at every frame with its speed. Where players "
+            "show moments between frames, one frame fades into the next."
+        )
+        if n_repeated:
+            yield (
+                f"Up to {n_repeated:,} Gaussians of a frame stand still in a part of the scene only, or in changing "
+                "light; they are stored at every frame, and fade as well."
+            )
+    elif timing.n_frames > 1:
+        yield (
+            "Timeline: discrete, as too few Gaussians stand still or can be followed from frame to frame. All of them "
+            "are stored at every frame, and players show no motion between frames."
+        )
+    if n_written > _PLAYER_ROWS:
+        yield (
+            f"The file has {n_written:,} Gaussians. OpsiClear's player shows {_PLAYER_ROWS:,} of a file unless its "
+            "limit is raised (maxPoints)."
+        )
+    if timing.sound is not None and len(timing.sound) > MOST_SOUND_BYTES:
+        yield f"The sound of {len(timing.sound) >> 20} MB is left out: a .tsog holds {MOST_SOUND_BYTES >> 20} MB."
