@@ -10,16 +10,15 @@ every Gaussian at one frame only; it is for scenes in which hardly anything can 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from engine.errors import ProjectError
 from engine.export.formats.sog_pictures import attributes_of, bytes_of, write_pictures
-from engine.export.packing import morton_order
-from engine.export.player.still_part import shared_rows
-from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.player.blocks import joined
+from engine.export.sequences.sequence import SequenceTiming, Stretch
 from engine.export.sequences.tsog_meta import (
     MAX_ROWS,
     MOST_FRAMES,
@@ -28,6 +27,15 @@ from engine.export.sequences.tsog_meta import (
     PROFILE_VERSION,
     VERSION,
 )
+from engine.export.sequences.tsog_rows import (
+    EVERY_FRAME,
+    StretchRows,
+    TimedRows,
+    at_every_frame,
+    repeated,
+    shared_still,
+    stretch_rows,
+)
 from engine.export.splats import Splats
 
 BELL_FRAMES = 0.38
@@ -35,57 +43,54 @@ BELL_FRAMES = 0.38
 and 0.42 half way between two frames, where those of both lie on each other."""
 STILL_SIGMA = 50.0
 """Of what stands still, in lengths of the file: 0.99995 of its opacity at either end."""
-SAME_COLOR = 4.0 / 255.0
-"""A still Gaussian whose colours differ by less than this gets the one in the middle: two levels off at most."""
 _SPEED_LEVELS = 127
 _SPEED_QUANTILE = 0.999
 _PLAYER_ROWS = 1_000_000
 _EFFORT = 50
 _SOUND = "audio/track.wav"
+LIMITS = (
+    "Positions have 16 bits, rotations 8; scales and colours are of 256 values each. Light on still Gaussians that "
+    "changes by up to four levels of 255 becomes its mean.",
+    "Between frames, moving Gaussians fade into the next frame on a straight path.",
+)
 
 
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """Gaussians for the file.
-
-    Attributes:
-        frames: Where each is shown; -1 at all of them. [N] int32
-        splats: N of them.
-        speeds: Units per frame. [N, 3] float32
-    """
-
-    frames: np.ndarray
-    splats: Splats
-    speeds: np.ndarray
-
-
-def write(stretches: Iterable[Stretch], timing: SequenceTiming, file: BinaryIO) -> tuple[str, ...]:
-    """See SequenceFormat.
+def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
+    """See SequenceFormat. Memory holds all Gaussians of the file: 2 GB for as many as it can have.
 
     Raises:
         ProjectError: There are more frames or Gaussians than such a file holds; says how many frames fit.
+        OSError: The disk refused.
     """
     n = timing.n_frames
     if n > MOST_FRAMES:
         raise _too_many(f"{n:,} frames, and the timeline of a .tsog tells {MOST_FRAMES:,} apart", MOST_FRAMES)
-    stretches, parts, n_followed, n_moving = list(stretches), list[_Rows](), 0, np.zeros(n, np.int64)
+    n_moving = np.zeros(n, np.int64)
+
+    def count(frame: int, n_rows: int) -> None:
+        n_moving[frame] = n_rows
+        _check_rows(n_moving[: frame + 1], 0)
+
+    found: list[StretchRows] = []
     for stretch in stretches:
-        rows, n_known = _moving(stretch, n_moving)
-        parts.append(rows)
-        n_followed += n_known
-    shared, others = _shared(stretches)
-    n_still = _by_frame(stretches, [one.still for one in stretches])
-    n_others = _by_frame(stretches, others)
-    is_followed = 2 * (len(shared) * n + n_followed) >= int((n_still + n_moving).sum())
-    if is_followed or n == 1:
+        found.append(stretch_rows(stretch, count))
+        end = stretch.first_frame + stretch.n_frames
+        n_moving[stretch.first_frame : end] = np.bincount(found[-1].moving.frames, minlength=end)[stretch.first_frame :]
+    shared, others = shared_still(found)
+    n_still = _by_frame(found, [one.still for one in found])
+    n_others = _by_frame(found, others)
+    n_followed = len(shared) * n + sum(one.n_followed for one in found)
+    is_followed = n == 1 or 2 * n_followed >= int((n_still + n_moving).sum())
+    parts = [one.moving for one in found]
+    if is_followed:
         _check_rows(n_others + n_moving, len(shared))
-        at_once = shared[morton_order(shared.means)]
-        parts.append(_Rows(np.full(len(shared), -1, np.int32), at_once, np.zeros((len(shared), 3), np.float32)))
+        parts.append(at_every_frame(shared))
     else:
         _check_rows(n_still + n_moving, 0)
-        others = [one.still for one in stretches]
-    parts += [_repeated(stretch, still) for stretch, still in zip(stretches, others, strict=True)]
-    n_written = _write(parts, timing, is_followed, file)
+        others = [one.still for one in found]
+    parts += [repeated(one, still) for one, still in zip(found, others, strict=True)]
+    with path.open("wb") as file:
+        n_written = _write(parts, timing, is_followed, file)
     return tuple(_notes(timing, is_followed, n_written, int(n_others.max())))
 
 
@@ -103,81 +108,15 @@ def _check_rows(n_at: np.ndarray, n_once: int) -> None:
         raise _too_many(f"{total[-1]:,} Gaussians in {len(n_at):,} frames, and a .tsog holds {MAX_ROWS:,}", n_fit)
 
 
-def _by_frame(stretches: list[Stretch], splats: list[Splats]) -> np.ndarray:
+def _by_frame(stretches: list[StretchRows], splats: list[Splats]) -> np.ndarray:
     """How many Gaussians of each stretch there are at each frame. [n_frames] int64"""
     return np.repeat([len(one) for one in splats], [stretch.n_frames for stretch in stretches])
 
 
-def _moving(stretch: Stretch, n_moving: np.ndarray) -> tuple[_Rows, int]:
-    """What moves in a stretch, and how much of that can be followed to another frame. One Gaussian comes after the
-    other, each frame by frame: a quarter smaller as pictures than frame after frame.
-
-    Args:
-        n_moving: Gets the numbers at its frames.
-    """
-    end, n_followed = stretch.first_frame + stretch.n_frames, 0
-    ids, frames, splats, speeds = list[np.ndarray](), list[np.ndarray](), list[Splats](), list[np.ndarray]()
-    before, now = None, stretch.moving(stretch.first_frame)
-    for frame in range(stretch.first_frame, end):
-        after = stretch.moving(frame + 1) if frame + 1 < end else None
-        steps, n = _steps(now, before, after)
-        n_followed += int((n > 0).sum())
-        n_moving[frame] = len(now.ids)
-        _check_rows(n_moving[: frame + 1], 0)
-        ids.append(now.ids)
-        frames.append(np.full(len(now.ids), frame, np.int32))
-        splats.append(now.splats)
-        speeds.append(steps)
-        if after is not None:
-            before, now = now, after
-    order = np.lexsort((np.concatenate(frames), np.concatenate(ids)))
-    return _Rows(np.concatenate(frames)[order], _joined(splats)[order], np.concatenate(speeds)[order]), n_followed
-
-
-def _steps(now: MovingSplats, before: MovingSplats | None, after: MovingSplats | None) -> tuple[np.ndarray, np.ndarray]:
-    """Mean steps from and to the neighbouring frames, scene units, and from how many of them. [N, 3] float32; [N]"""
-    steps, n = np.zeros((len(now.ids), 3)), np.zeros(len(now.ids))
-    for other, sign in ((before, -1.0), (after, 1.0)):
-        if other is not None:
-            _, mine, theirs = np.intersect1d(now.ids, other.ids, assume_unique=True, return_indices=True)
-            steps[mine] += sign * (other.splats.means[theirs].astype(np.float64) - now.splats.means[mine])
-            n[mine] += 1.0
-    return (steps / np.maximum(n, 1.0)[:, None]).astype(np.float32), n
-
-
-def _repeated(stretch: Stretch, still: Splats) -> _Rows:
-    """What stands still in a stretch at each of its frames."""
-    n = stretch.n_frames
-    frames = np.tile(np.arange(stretch.first_frame, stretch.first_frame + n, dtype=np.int32), len(still))
-    along = still[np.repeat(morton_order(still.means), n)]
-    return _Rows(frames, along, np.zeros((len(frames), 3), np.float32))
-
-
-def _shared(stretches: list[Stretch]) -> tuple[Splats, list[Splats]]:
-    """What stands still in all stretches, in colours between theirs, and what else stands still in each."""
-    first = stretches[0].still
-    is_shared = np.ones(len(first), bool)
-    low, high = first.colors.copy(), first.colors.copy()
-    found = []
-    for stretch in stretches:
-        rows, is_hidden = shared_rows(first, stretch.still)
-        colors = stretch.still.colors[rows >= 0]
-        at = rows[rows >= 0]
-        low[at], high[at] = np.minimum(low[at], colors), np.maximum(high[at], colors)
-        is_shared &= ~is_hidden
-        found.append(rows)
-    is_shared &= ((high - low) <= SAME_COLOR).all(1)
-    others = [
-        one.still[~((rows >= 0) & is_shared[np.maximum(rows, 0)])] if len(first) else one.still
-        for one, rows in zip(stretches, found, strict=True)
-    ]
-    return replace(first, colors=(low + high) / np.float32(2.0))[is_shared], others
-
-
-def _write(parts: list[_Rows], timing: SequenceTiming, is_continuous: bool, file: BinaryIO) -> int:
+def _write(parts: list[TimedRows], timing: SequenceTiming, is_continuous: bool, file: BinaryIO) -> int:
     """Returns the number of Gaussians in the file."""
     frames, speeds = (np.concatenate([getattr(part, name) for part in parts]) for name in ("frames", "speeds"))
-    splats = _joined([part.splats for part in parts])
+    splats = joined(*(part.splats for part in parts))
     parts.clear()
     if not len(splats):
         frames, speeds, splats = np.zeros(1, np.int32), np.zeros((1, 3), np.float32), _NOTHING
@@ -217,16 +156,10 @@ _NOTHING = Splats(
 """One Gaussian that nobody sees: a file has one at least."""
 
 
-def _joined(parts: list[Splats]) -> Splats:
-    """One column after the other, so that the parts and the whole are not in memory at once."""
-    names = ("means", "quats", "scales", "opacities", "colors")
-    return replace(parts[0], **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
-
-
 def _add_bells(meta: dict[str, Any], pixels: dict[str, np.ndarray], frames: np.ndarray, n_frames: int) -> None:
     """A continuous timeline. The range of centres is such that every frame is a whole number."""
     step = 65535 // (n_frames - 1)
-    is_still = frames < 0
+    is_still = frames == EVERY_FRAME
     centers = np.where(is_still, step * (n_frames - 1) // 2, step * frames)
     codes = np.stack([centers, np.where(is_still, 65535, 0)], axis=1)
     files = ["timeline_l.webp", "timeline_u.webp"]
@@ -262,8 +195,8 @@ def _add_frames(meta: dict[str, Any], pixels: dict[str, np.ndarray], frames: np.
 def _notes(timing: SequenceTiming, is_continuous: bool, n_written: int, n_repeated: int) -> Iterator[str]:
     if is_continuous and timing.n_frames > 1:
         yield (
-            "Timeline: continuous. Still Gaussians are stored once, what moves at every frame with its speed. Where players "
-            "show moments between frames, one frame fades into the next."
+            "Timeline: continuous. Still Gaussians are stored once, what moves at every frame with its speed. Players that "
+            "show moments between frames let one frame fade into the next."
         )
         if n_repeated:
             yield (
