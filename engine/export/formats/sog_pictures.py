@@ -129,19 +129,21 @@ def pixels_of(data: bytes, n: int, *, most_pixels: int) -> np.ndarray:
     """The pixels of a picture, row by row. [n, 4] uint8
 
     Raises:
-        ValueError: It is not a lossless WebP picture, has fewer pixels than n or more than the limit, which nothing was
-            decoded of then.
-        OSError: It is damaged.
+        ValueError: It is not a lossless WebP picture, is damaged, has fewer pixels than n, or more than the limit; then
+            nothing of it was decoded.
     """
     width, height = webp_size(data)
     if width * height < n:
         raise ValueError("too few pixels")
     if width * height > most_pixels:
         raise ValueError("too many pixels")
-    with Image.open(io.BytesIO(data), formats=["WEBP"]) as picture:
-        if picture.size != (width, height):
-            raise ValueError("two sizes")
-        return np.asarray(picture.convert("RGBA")).reshape(-1, 4)[:n]
+    try:
+        with Image.open(io.BytesIO(data), formats=["WEBP"]) as picture:
+            if picture.size != (width, height):
+                raise ValueError("two sizes")
+            return np.asarray(picture.convert("RGBA")).reshape(-1, 4)[:n]
+    except OSError as error:
+        raise ValueError("a damaged picture") from error
 
 
 def webp_size(data: bytes) -> tuple[int, int]:

@@ -96,7 +96,7 @@ def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> t
 
 def _too_many(what: str, n_fit: int) -> ProjectError:
     return ProjectError(
-        f"The scene has {what}. The first {n_fit:,} frames fit.", hint="Export fewer frames (--frames)."
+        f"The scene has {what}. At most the first {n_fit:,} frames fit.", hint="Export fewer frames (--frames)."
     )
 
 
@@ -195,8 +195,8 @@ def _add_frames(meta: dict[str, Any], pixels: dict[str, np.ndarray], frames: np.
 def _notes(timing: SequenceTiming, is_continuous: bool, n_written: int, n_repeated: int) -> Iterator[str]:
     if is_continuous and timing.n_frames > 1:
         yield (
-            "Timeline: continuous. Still Gaussians are stored once, what moves at every frame with its speed. Players that "
-            "show moments between frames let one frame fade into the next."
+            "Timeline: continuous. Still Gaussians are stored once, what moves at every frame with its speed. Players "
+            "that show moments between frames let one frame fade into the next."
         )
         if n_repeated:
             yield (

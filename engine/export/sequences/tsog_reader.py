@@ -16,7 +16,7 @@ from msgspec import UNSET
 
 from engine.errors import ProjectError
 from engine.export.formats.damaged import damaged
-from engine.export.formats.sog_pictures import between, member, pixels_of, shares, splats_of
+from engine.export.formats.sog_pictures import between, member, pixels_of, shares, splats_of, webp_size
 from engine.export.sequences.sequence import SequenceTiming
 from engine.export.sequences.tsog_meta import (
     MAX_ROWS,
@@ -32,7 +32,7 @@ from engine.export.sequences.tsog_meta import (
     TsogMotion,
 )
 from engine.export.splats import Splats
-from engine.storage.files import disk_error, open_regular
+from engine.storage.files import open_regular
 
 _MOST_PIXELS = 2 * MAX_ROWS
 _MOST_PICTURE_BYTES = 5 * _MOST_PIXELS
@@ -56,9 +56,9 @@ def open_tsog(path: Path) -> TsogReader:
         raise ProjectError(error.message, hint=error.hint, path=path) from error
     except (zipfile.BadZipFile, EOFError, zlib.error, ValueError, KeyError, NotImplementedError, struct.error) as error:
         reason = str(error).strip("'\"") if str(error) else type(error).__name__
-        raise ProjectError(damaged(f"it is not a .tsog file ({reason})").message, path=path) from error
+        raise ProjectError(damaged(f"it is not a .tsog file, or is damaged ({reason})").message, path=path) from error
     except OSError as error:
-        raise disk_error(error, what="The file of Gaussians could not be read", path=path) from error
+        raise ProjectError(f"The file of Gaussians cannot be read: {error.strerror or error}.", path=path) from error
 
 
 class TsogReader:
@@ -83,10 +83,14 @@ class TsogReader:
                 f"{MOST_FRAMES:,} can be opened."
             )
         self._meta, self._described = meta, msgspec.to_builtins(meta)
-        self._pixels = {
-            name: pixels_of(member(archive, name, _MOST_PICTURE_BYTES), meta.count, most_pixels=_MOST_PIXELS)
-            for name in _pictures(meta)
-        }
+        self._pixels = dict[str, np.ndarray]()
+        sizes = set[tuple[int, int]]()
+        for name in _pictures(meta):
+            data = member(archive, name, _MOST_PICTURE_BYTES)
+            self._pixels[name] = pixels_of(data, meta.count, most_pixels=_MOST_PIXELS)
+            sizes.add(webp_size(data))
+        if len(sizes) > 1:
+            raise ValueError("pictures of different sizes")
         self._notes = list[str]()
         self._timing = SequenceTiming(n_frames, fps, self._sound(archive))
         if meta.sh_n is not UNSET:
