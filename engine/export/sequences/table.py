@@ -6,9 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from engine.export.sequences import fourdgs_reader, fourdgs_writer, tsog, tsog_reader
-    ),
-from engine.export.sequences import fourdgs_reader, fourdgs_writer, usd
+from engine.export.sequences import fourdgs_reader, fourdgs_writer, tsog, tsog_reader, usd
 from engine.export.sequences.sequence import SequenceReader, SequenceTiming, Stretch
 
 
@@ -84,7 +82,6 @@ SEQUENCES: dict[str, SequenceFormat] = {
         has_sound=True,
         problems=fourdgs_reader.problems,
     ),
-<<<<<<< HEAD
     "tsog": SequenceFormat(
         "TSOG",
         "temporal SOG, with sound, for OpsiClear's player in browsers",
@@ -96,7 +93,8 @@ SEQUENCES: dict[str, SequenceFormat] = {
         tsog.write,
         tsog_reader.open_tsog,
         has_sound=True,
-=======
+        up="+y",
+    ),
     "usd": _USD,
     "usda": _USD._replace(
         title="USD as text",
@@ -104,7 +102,6 @@ SEQUENCES: dict[str, SequenceFormat] = {
         suffix=".usda",
         still_bytes=160.0,
         moving_bytes=100.0,
->>>>>>> wt-fourdgs
     ),
 }
 """By the name that the command line has for it, in the order in which they are offered."""
