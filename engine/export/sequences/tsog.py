@@ -18,7 +18,7 @@ import numpy as np
 from engine.errors import ProjectError
 from engine.export.formats.sog_pictures import attributes_of, bytes_of, write_pictures
 from engine.export.player.blocks import joined
-from engine.export.sequences.sequence import SequenceTiming, Stretch
+from engine.export.sequences.sequence import SequenceTiming, SequenceStretch
 from engine.export.sequences.tsog_meta import (
     MAX_ROWS,
     MOST_FRAMES,
@@ -55,7 +55,7 @@ LIMITS = (
 )
 
 
-def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
+def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
     """See SequenceFormat. Memory holds all Gaussians of the file: 2 GB for as many as it can have.
 
     Raises:

@@ -10,7 +10,7 @@ import numpy as np
 from engine.export.packing import morton_order
 from engine.export.player.blocks import joined
 from engine.export.player.still_part import shared_rows
-from engine.export.sequences.sequence import MovingSplats, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch
 from engine.export.splats import Splats
 
 SAME_COLOR = 4.0 / 255.0
@@ -39,7 +39,7 @@ class StretchRows:
     """The Gaussians of a stretch.
 
     Attributes:
-        first_frame, n_frames: As of Stretch.
+        first_frame, n_frames: As of SequenceStretch.
         still: What changes only its light, in the same order in every stretch.
         moving: One Gaussian after the other, each frame by frame: a quarter smaller as pictures than frame after frame.
         n_followed: So many of those are there in a neighbouring frame, too.
@@ -52,7 +52,7 @@ class StretchRows:
     n_followed: int
 
 
-def stretch_rows(stretch: Stretch, count: Callable[[int, int], None]) -> StretchRows:
+def stretch_rows(stretch: SequenceStretch, count: Callable[[int, int], None]) -> StretchRows:
     """The rows of a stretch.
 
     Args:

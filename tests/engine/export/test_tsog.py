@@ -17,7 +17,7 @@ from PIL import Image
 
 from engine.errors import ProjectError
 from engine.export.sequences import tsog
-from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceTiming, SequenceStretch
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
 from tests.engine.export.scenes import angles_deg, chance_splats, one_splat, order_of
@@ -96,7 +96,7 @@ LIT = 7
 """A row that is much brighter in the second stretch."""
 
 
-def scene() -> list[Stretch]:
+def scene() -> list[SequenceStretch]:
     """Two stretches of four frames: still rows with a little light in one and much in another, and steady motion."""
     STILL.opacities[:], MOVING.opacities[:] = np.maximum(STILL.opacities, 0.1), np.maximum(MOVING.opacities, 0.1)
     lit = STILL[np.arange(200)]
@@ -107,7 +107,7 @@ def scene() -> list[Stretch]:
         rows = np.random.default_rng(frame).permutation(60)[: 60 - frame % 4]
         return MovingSplats(moved(MOVING, frame * STEPS)[rows], 5 * rows.astype(np.int64))
 
-    return [Stretch(0, 4, STILL, moving), Stretch(4, 4, lit, moving)]
+    return [SequenceStretch(0, 4, STILL, moving), SequenceStretch(4, 4, lit, moving)]
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_half_way_between_frames_both_lie_where_the_motion_is(path: Path):
 
 def test_what_cannot_be_followed_is_discrete_and_exact(path: Path):
     frames = [chance_splats(50 + k, seed=k) for k in range(5)]
-    stretch = Stretch(0, 5, STILL[:10], lambda k: MovingSplats(frames[k], np.arange(len(frames[k])) + 1000 * k))
+    stretch = SequenceStretch(0, 5, STILL[:10], lambda k: MovingSplats(frames[k], np.arange(len(frames[k])) + 1000 * k))
     (note,) = FORMAT.write([stretch], SequenceTiming(5, 30.0), path)
     assert "discrete" in note
     reader = FORMAT.open(path)
@@ -181,14 +181,14 @@ def test_light_that_moves_a_little_within_a_stretch_stands_still(path: Path):
         lit.colors[:] += np.float32(frame / 255)
         return MovingSplats(lit, np.arange(50))
 
-    FORMAT.write([Stretch(0, 4, STILL[50:], moving)], SequenceTiming(4, 30.0), path)
+    FORMAT.write([SequenceStretch(0, 4, STILL[50:], moving)], SequenceTiming(4, 30.0), path)
     assert taken_apart(path)[0]["count"] == 200
 
 
 @pytest.mark.parametrize("n", [0, 1, 300])
 def test_a_single_frame_is_static(path: Path, n: int):
     splats, sound = chance_splats(n), b"RIFF" + bytes(500)
-    stretch = Stretch(0, 1, splats, lambda _: MovingSplats(splats[:0], np.zeros(0, np.int64)))
+    stretch = SequenceStretch(0, 1, splats, lambda _: MovingSplats(splats[:0], np.zeros(0, np.int64)))
     assert FORMAT.write([stretch], SequenceTiming(1, 30.0, sound), path) == ()
     assert "timeline" not in taken_apart(path)[0]
     reader = FORMAT.open(path)
@@ -361,7 +361,7 @@ def test_damaged_archives_are_refused(path: Path):
 
 def test_one_gaussian_far_away_and_one_without_motion(path: Path):
     far, near = one_splat(means=[[3000.0, 0.0, -2.0]]), one_splat()
-    stretch = Stretch(0, 2, far, lambda _: MovingSplats(near, np.array([4])))
+    stretch = SequenceStretch(0, 2, far, lambda _: MovingSplats(near, np.array([4])))
     FORMAT.write([stretch], SequenceTiming(2, 30.0), path)
     found = FORMAT.open(path).splats(1)
     np.testing.assert_allclose(sorted(found.means[:, 0]), [0.5, 3000.0], rtol=2e-4)
