@@ -18,7 +18,7 @@ import numpy as np
 from engine.errors import ProjectError
 from engine.export.formats.sog_pictures import attributes_of, bytes_of, write_pictures
 from engine.export.player.blocks import joined
-from engine.export.sequences.sequence import SequenceTiming, SequenceStretch
+from engine.export.sequences.sequence import SequenceStretch, SequenceTiming
 from engine.export.sequences.tsog_meta import (
     MAX_ROWS,
     MOST_FRAMES,

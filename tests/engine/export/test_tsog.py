@@ -17,7 +17,7 @@ from PIL import Image
 
 from engine.errors import ProjectError
 from engine.export.sequences import tsog
-from engine.export.sequences.sequence import MovingSplats, SequenceTiming, SequenceStretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
 from tests.engine.export.scenes import angles_deg, chance_splats, one_splat, order_of
