@@ -207,6 +207,10 @@ TABLES: dict[str, Clips | Printed] = {
         "offsets in time", ("python -m tests.benchmarks.bench_synchronisation SAMPLE BASKETBALL",), seeds=(0, 1)
     ),
     "gl": Printed("OpenGL against the rasterizer", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_gl DIR")),
+    "splat4d": Printed(
+        "files over time and .splat4d",
+        (_TRAIN_HALF, "python -m tests.benchmarks.bench_splat4d DIR OUT"),
+    ),
     "timeline": Printed("the timeline", ("python -m tests.benchmarks.bench_timeline",), is_long=False),
     "window": Printed("the window", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_window DIR --no-training")),
     "opening": Printed("opening", ("python -m tests.benchmarks.bench_opening OUT",), which=None),

@@ -17,14 +17,18 @@ _ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("q
 def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
     """Centres and scales as they are, colour, opacity and rotation in bytes. The largest and most opaque come first."""
     sizes = np.log(splats.scales.astype(np.float64)).sum(1) + np.log(np.maximum(splats.opacities, 1e-9))
-    splats = splats[np.argsort(-sizes, kind="stable")]
+    file.write(packed_rows(splats[np.argsort(-sizes, kind="stable")]).tobytes())
+    return ()
+
+
+def packed_rows(splats: Splats) -> np.ndarray:
+    """Rows as they are in a file, in the order of the splats."""
     rows = np.empty(len(splats), _ROW)
     rows["mean"], rows["scale"] = splats.means, splats.scales
     rows["rgba"][:, :3] = as_levels(splats.colors)
     rows["rgba"][:, 3] = as_levels(splats.opacities)
     rows["quat"] = np.clip(np.round(splats.quats * 128.0 + 128.0), 0, 255)
-    file.write(rows.tobytes())
-    return ()
+    return rows
 
 
 def read(file: BinaryIO) -> Splats:

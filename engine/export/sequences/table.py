@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from engine.export.sequences import fourdgs_reader, fourdgs_writer, usd
+from engine.export.sequences import fourdgs_reader, fourdgs_writer, tsog, tsog_reader, usd
 from engine.export.sequences.sequence import SequenceReader, SequenceStretch, SequenceTiming
 
 
@@ -81,6 +81,19 @@ SEQUENCES: dict[str, SequenceFormat] = {
         fourdgs_reader.FourdgsReader,
         has_sound=True,
         problems=fourdgs_reader.problems,
+    ),
+    "tsog": SequenceFormat(
+        "TSOG",
+        "temporal SOG, with sound, for OpsiClear's player in browsers",
+        ".tsog",
+        45.0,
+        11.0,
+        10.5,
+        tsog.LIMITS,
+        tsog.write,
+        tsog_reader.open_tsog,
+        has_sound=True,
+        up="+y",
     ),
     "usd": _USD,
     "usda": _USD._replace(
