@@ -23,6 +23,7 @@ from app.training.service import Launch
 from engine.backends.table import choose_backend
 from engine.errors import CaptureError, DiskError, EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
+from engine.own_modules import module_name
 from engine.text import printable
 
 logger = logging.getLogger(__name__)
@@ -130,7 +131,7 @@ class _Notes(logging.Handler):
 @contextmanager
 def notes_on_terminal() -> Iterator[None]:
     """In this block, report on standard error missing parts of projects that are read."""
-    handler, package = _Notes(), logging.getLogger(DOCUMENTS)
+    handler, package = _Notes(), logging.getLogger(module_name(DOCUMENTS))
     package.addHandler(handler)
     try:
         yield

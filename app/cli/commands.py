@@ -7,8 +7,9 @@ nothing until it is called, and the product does not depend on the laboratory wh
 from __future__ import annotations
 
 import argparse
-import importlib
 from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+
+from engine.own_modules import import_own
 
 if TYPE_CHECKING:
     from app.training.service import Launch
@@ -45,7 +46,7 @@ class Command(NamedTuple):
 
     def load(self) -> CommandModule:
         """Import the command's module."""
-        return cast("CommandModule", importlib.import_module(self.module))
+        return cast("CommandModule", import_own(self.module))
 
 
 COMMANDS = {

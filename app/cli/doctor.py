@@ -153,7 +153,7 @@ def _threads() -> MachineFinding:
 def _gl() -> MachineFinding:
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _GL_PROBE],
+            [sys.executable, "-P", "-c", _GL_PROBE],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
