@@ -27,6 +27,16 @@ def import_own(name: str) -> ModuleType:
     return import_module(module_name(name))
 
 
+def program_version() -> str:
+    """Version of this program; "unknown" where it runs without being installed."""
+    import importlib.metadata  # which takes longer than all of this file
+
+    try:
+        return importlib.metadata.version("clipgstream")
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"
+
+
 def python_path() -> str:
     """PYTHONPATH of a process that is to import our modules as this one does, with that of this process behind."""
     root = Path(__file__).resolve().parents[1 + __name__.count(".")]

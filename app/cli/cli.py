@@ -6,6 +6,7 @@ go to standard output, progress and messages to standard error.
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import io
 import logging
@@ -43,6 +44,12 @@ def build_parser(used: Collection[str]) -> PlainParser:
             if command.has_backend:
                 add_backend(subparser)
     return parser
+
+
+def parsers_of_commands() -> dict[str, PlainParser]:
+    """Every command's parser with all its arguments, by name."""
+    parser = build_parser(used=COMMANDS)
+    return next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction)).choices
 
 
 def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -> int:

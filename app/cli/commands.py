@@ -139,6 +139,10 @@ COMMANDS = {
     "doctor": Command(
         "check this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.captures.doctor_command"
     ),
+    "desktop": Command(
+        "put the program into the menu of a Linux desktop, or take it out of it",
+        "app.cli.installing.desktop_command",
+    ),
     "bench": Command("measure speed against error, of kernels and settings, on this machine", "app.lab.bench.command"),
     "report": Command(
         "write a report page about a project, alone or next to others",
