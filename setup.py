@@ -80,4 +80,5 @@ class OneNameInfo(egg_info):
         Path(self.egg_info, "top_level.txt").write_text(f"{NAME}\n", encoding="ascii")
 
 
-setup(cmdclass={"build_py": BuildOnePackage, "egg_info": OneNameInfo})
+if __name__ == "__main__":
+    setup(cmdclass={"build_py": BuildOnePackage, "egg_info": OneNameInfo})

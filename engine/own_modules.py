@@ -39,5 +39,5 @@ def program_version() -> str:
 
 def python_path() -> str:
     """PYTHONPATH of a process that is to import our modules as this one does, with that of this process behind."""
-    root = Path(__file__).resolve().parents[1 + __name__.count(".")]
+    root = Path(__file__).resolve().parents[__name__.count(".")]
     return os.pathsep.join(filter(None, (str(root), os.environ.get("PYTHONPATH"))))
