@@ -73,7 +73,8 @@ class _Version(argparse.Action):
     """As argparse's own, but asked for the version when it is wanted only: that takes a while."""
 
     def __call__(self, parser: argparse.ArgumentParser, *rest: object) -> None:
-        parser.exit(message=f"clipgstream {program_version()}\n")
+        sys.stdout.write(f"clipgstream {program_version()}\n")
+        parser.exit()
 
 
 def _summaries() -> dict[str, str]:
