@@ -131,7 +131,7 @@ project_key() { cksum <pyproject.toml; } # entry point and package list of the e
 # ---------------------------------------------------------------- system libraries
 missing_libraries() { # Debian packages whose library cannot be loaded, one line
     [ "$(uname -s)" = Linux ] || return 0
-    "$VENV/bin/python" -c "from engine.system_libraries import missing_packages; print(*missing_packages())"
+    "$VENV/bin/python" -c "from app.cli.installing.system_libraries import missing_packages; print(*missing_packages())"
 }
 
 check_browser() { # apart from the others: not every system has a package of this name

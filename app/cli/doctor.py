@@ -13,12 +13,12 @@ import sys
 from dataclasses import dataclass
 
 from app.background.kernels import use_threads
+from app.cli.installing.system_libraries import install_line, missing_packages
 from app.export.video.formats import FORMATS, missing_codecs
 from app.training.worker.worker import n_training_threads
 from engine.kernels.cache import UNWRITABLE, cache_state
 from engine.machine import memory_bytes
 from engine.parallel import n_cores
-from engine.system_libraries import install_line, missing_packages
 from engine.user_folders import cache_dir, data_dir
 
 PACKAGES = ("torch", "numpy", "numba", "scipy", "av", "open3d-cpu", "open3d", "pycolmap", "pyglet", "moderngl")
