@@ -135,7 +135,7 @@ def test_the_wheel_has_one_package_with_everything(wheel: Path) -> None:
         path.relative_to(ROOT).as_posix()
         for name in ("app", "engine", "ui", "assets")
         for path in (ROOT / name).rglob("*")
-        if path.is_file() and not ignored(str(path.parent), path.relative_to(ROOT).parts)
+        if path.is_file() and not ignored(str(path.parent), list(path.relative_to(ROOT).parts))
     }
     assert inside == expected | {"__init__.py"}
 
