@@ -132,34 +132,7 @@ project_key() { cksum <pyproject.toml; } # entry point and package list of the e
 # ---------------------------------------------------------------- system libraries
 missing_libraries() { # Debian packages whose library cannot be loaded, one line
     [ "$(uname -s)" = Linux ] || return 0
-    "$VENV/bin/python" - <<'PYTHON'
-import ctypes, glob
-
-LIBRARIES = {
-    "libegl1": "libEGL.so.1",
-    "libgl1": "libGL.so.1",
-    "libglx-mesa0": "libGLX_mesa.so.0",
-    "libegl-mesa0": "libEGL_mesa.so.0",
-    "libx11-6": "libX11.so.6",
-    "libxext6": "libXext.so.6",
-    "libusb-1.0-0": "libusb-1.0.so.0",
-    "libgomp1": "libgomp.so.1",
-    "libudev1": "libudev.so.1",
-    "libidn2-0": "libidn2.so.0",
-}
-
-def loads(name):
-    try:
-        ctypes.CDLL(name)
-    except OSError:
-        return False
-    return True
-
-missing = [package for package, name in LIBRARIES.items() if not loads(name)]
-if not glob.glob("/usr/lib/*/dri/*_dri.so") + glob.glob("/usr/lib*/dri/*_dri.so"):
-    missing.append("libgl1-mesa-dri")
-print(" ".join(missing))
-PYTHON
+    "$VENV/bin/python" -c "from app.cli.installing.system_libraries import missing_packages; print(*missing_packages())"
 }
 
 check_browser() { # apart from the others: not every system has a package of this name

@@ -13,17 +13,24 @@ from typing import TYPE_CHECKING
 from app.background.logs import PrintableFormatter, start_logging
 from app.cli.arguments import PlainParser, add_backend, add_follow_links, parse, path_argument, suggestion
 from app.cli.commands import COMMANDS
+from app.cli.installing.completion import SHELLS, completion_script
 from engine.assets import asset_path
 from engine.backends.table import AUTO, choose_backend
 from engine.errors import ProjectError
 from engine.kernels.cache import use_kernel_cache
+from engine.own_modules import program_version
 from ui.style.ui_scale import parse_scale
 
 if TYPE_CHECKING:
     from app.project.opening.opened_project import OpenedProject
     from app.session.training.cluster_joining import ClusterConnection
 
-DEMO = {"demo": "train the first two clips, then write figures, a picture of the window and a video"}
+WITH_WINDOW = {
+    "sample": "open the sample capture that comes with the program, as a path would be",
+    "demo": "train the first two clips, then write figures, a picture of the window and a video",
+    "completion": "print a script with which bash, zsh or fish completes this command line",
+}
+"""Commands that belong to the window's side of the program, beside those of app.cli.commands."""
 SWITCH_INTERVAL_S = 0.0005
 """How long another thread may keep the interpreter from the window's. A frame asks for it some twenty times, and the
 default of 5 ms adds up to a visible stall while a thread imports what draws."""
@@ -38,12 +45,11 @@ def has_display() -> bool:
 
 def build_parser() -> PlainParser:
     """Arguments of the window and of the headless demo; the other commands have their own."""
-    summaries = {name: command.summary for name, command in COMMANDS.items()} | DEMO
     parser = PlainParser(
         prog="clipgstream",
         description="View, train and replay dynamic captures clip by clip.",
         epilog="without a window, each with its own --help:\n"
-        + "\n".join(f"  clipgstream {name:<8} {summary}" for name, summary in summaries.items()),
+        + "\n".join(f"  clipgstream {name:<8} {summary}" for name, summary in _summaries().items()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("path", nargs="?", type=path_argument, help="capture or project folder to open")
@@ -59,10 +65,23 @@ def build_parser() -> PlainParser:
     )
     add_backend(parser)
     parser.add_argument("--verbose", action="store_true", help="log more detail")
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version of the program and exit")
     return parser
 
 
-def build_demo_parser() -> argparse.ArgumentParser:
+class _Version(argparse.Action):
+    """As argparse's own, but asked for the version when it is wanted only: that takes a while."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *rest: object) -> None:
+        sys.stdout.write(f"clipgstream {program_version()}\n")
+        parser.exit()
+
+
+def _summaries() -> dict[str, str]:
+    return {name: command.summary for name, command in COMMANDS.items()} | WITH_WINDOW
+
+
+def build_demo_parser() -> PlainParser:
     """Arguments of the headless job."""
     parser = PlainParser(
         prog="clipgstream demo",
@@ -77,6 +96,22 @@ def build_demo_parser() -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="only a few steps, to check that every part works")
     add_backend(parser)
     return parser
+
+
+def build_completion_parser() -> PlainParser:
+    """Arguments of `clipgstream completion`."""
+    summary = WITH_WINDOW["completion"]
+    parser = PlainParser(prog="clipgstream completion", description=f"{summary[0].upper()}{summary[1:]}.")
+    parser.add_argument("shell", choices=SHELLS, help="the shell that is to read it")
+    return parser
+
+
+def all_parsers() -> dict[str, PlainParser]:
+    """Parsers by command, that of the window under "". Imports every command."""
+    from app.cli.cli import parsers_of_commands
+
+    own = {"": build_parser(), "sample": build_parser(), "demo": build_demo_parser()}
+    return own | {"completion": build_completion_parser()} | parsers_of_commands()
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -98,6 +133,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         demo_options = demo_parser.parse_args(arguments[1:])
         _choose_backend(demo_parser, demo_options)
         return _run_demo(demo_options)
+    if arguments and arguments[0] == "completion":
+        shell = build_completion_parser().parse_args(arguments[1:]).shell
+        sys.stdout.write(completion_script(shell, all_parsers(), _summaries()))
+        return 0
+    if arguments and arguments[0] == "sample":
+        arguments[0] = str(asset_path("sample"))
     parser = build_parser()
     mistake = _mistyped_command(arguments)
     if mistake:
@@ -128,7 +169,7 @@ def _mistyped_command(arguments: Sequence[str]) -> str:
     word = arguments[0] if arguments else ""
     if not word or word.startswith("-") or os.path.lexists(word):
         return ""
-    near = suggestion(word, [*COMMANDS, *DEMO])
+    near = suggestion(word, _summaries())
     is_word = not os.path.dirname(word) and len(arguments) > 1 and not arguments[1].startswith("-")
     said = f"'{word}' is neither a command nor a file or folder"
     return f"{said}.{near}" if near else said if is_word else ""

@@ -71,7 +71,7 @@ def prepare_decoding() -> None:
     """Once on a thread that decodes: one core, and everything loaded that a first frame needs."""
     load_libraries()
     with uncollected():
-        import engine.model.clip_model  # noqa: F401
+        from engine.model import clip_model  # noqa: F401
 
         use_threads(1)
 

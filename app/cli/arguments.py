@@ -9,12 +9,14 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from engine.backends.table import AUTO, backend_names
-from engine.capture.capture import Capture
 from engine.errors import ProjectError
 from engine.text import printable, shown
+
+if TYPE_CHECKING:
+    from engine.capture.capture import Capture
 
 logger = logging.getLogger(__name__)
 

@@ -6,6 +6,7 @@ go to standard output, progress and messages to standard error.
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import io
 import logging
@@ -23,6 +24,7 @@ from app.training.service import Launch
 from engine.backends.table import choose_backend
 from engine.errors import CaptureError, DiskError, EngineError, ProjectError
 from engine.kernels.cache import use_kernel_cache
+from engine.own_modules import module_name
 from engine.text import printable
 
 logger = logging.getLogger(__name__)
@@ -42,6 +44,12 @@ def build_parser(used: Collection[str]) -> PlainParser:
             if command.has_backend:
                 add_backend(subparser)
     return parser
+
+
+def parsers_of_commands() -> dict[str, PlainParser]:
+    """Every command's parser with all its arguments, by name."""
+    parser = build_parser(used=COMMANDS)
+    return next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction)).choices
 
 
 def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -> int:
@@ -130,7 +138,7 @@ class _Notes(logging.Handler):
 @contextmanager
 def notes_on_terminal() -> Iterator[None]:
     """In this block, report on standard error missing parts of projects that are read."""
-    handler, package = _Notes(), logging.getLogger(DOCUMENTS)
+    handler, package = _Notes(), logging.getLogger(module_name(DOCUMENTS))
     package.addHandler(handler)
     try:
         yield

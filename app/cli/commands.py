@@ -7,8 +7,9 @@ nothing until it is called, and the product does not depend on the laboratory wh
 from __future__ import annotations
 
 import argparse
-import importlib
 from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+
+from engine.own_modules import import_own
 
 if TYPE_CHECKING:
     from app.training.service import Launch
@@ -45,7 +46,7 @@ class Command(NamedTuple):
 
     def load(self) -> CommandModule:
         """Import the command's module."""
-        return cast("CommandModule", importlib.import_module(self.module))
+        return cast("CommandModule", import_own(self.module))
 
 
 COMMANDS = {
@@ -140,6 +141,10 @@ COMMANDS = {
     "repair": Command("show what is left of a damaged project, and repair it", "app.cli.projects.repair_command"),
     "doctor": Command(
         "check this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.captures.doctor_command"
+    ),
+    "desktop": Command(
+        "put the program into the menu of a Linux desktop, or take it out of it",
+        "app.cli.installing.desktop_command",
     ),
     "bench": Command("measure speed against error, of kernels and settings, on this machine", "app.lab.bench.command"),
     "report": Command(

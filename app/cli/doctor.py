@@ -6,12 +6,15 @@ import importlib.metadata
 import json
 import os
 import platform
+import shlex
 import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
 
 from app.background.kernels import use_threads
+from app.cli.installing.system_libraries import install_line, missing_packages
+from app.export.video.formats import FORMATS, missing_codecs
 from app.training.worker.worker import n_training_threads
 from engine.kernels.cache import UNWRITABLE, cache_state
 from engine.machine import memory_bytes
@@ -19,7 +22,9 @@ from engine.parallel import n_cores
 from engine.user_folders import cache_dir, data_dir
 
 PACKAGES = ("torch", "numpy", "numba", "scipy", "av", "open3d-cpu", "open3d", "pycolmap", "pyglet", "moderngl")
-PACKAGES += ("imgui-bundle", "safetensors")
+PACKAGES += ("imgui-bundle", "safetensors", "fourdgs", "opencv-python-headless", "matplotlib")
+EXTRAS = {"cluster": ("ray", "training on several computers"), "usd": ("usd-core", "USD files")}
+"""Extras of the package: what each brings, and for what."""
 _GL_PROBE = """
 import json, sys
 import moderngl
@@ -43,6 +48,9 @@ def examine() -> list[MachineFinding]:
     return [
         _python(),
         *_packages(),
+        _extras(),
+        _encoders(),
+        _libraries(),
         _cores(),
         _memory(),
         _kernels(),
@@ -71,8 +79,39 @@ def _packages() -> list[MachineFinding]:
         missing = [name for name in missing if not name.startswith("open3d")]
     findings = [MachineFinding("Packages", ", ".join(found))]
     if missing:
-        findings.append(MachineFinding("Missing", f"{', '.join(missing)}. Run `make setup`.", is_fine=False))
+        how = f"Run: {_pip_line(*missing)}"
+        findings.append(MachineFinding("Missing", f"{', '.join(missing)}. {how}", is_fine=False))
     return findings
+
+
+def _pip_line(*names: str) -> str:
+    return f"{shlex.quote(sys.executable)} -m pip install {shlex.join(names)}"
+
+
+def _extras() -> MachineFinding:
+    texts = []
+    for name, (package, use) in EXTRAS.items():
+        try:
+            texts.append(f"{package} {importlib.metadata.version(package)}")
+        except importlib.metadata.PackageNotFoundError:
+            texts.append(f"no {package}, for {use} ({_pip_line(f'clipgstream[{name}]')})")
+    return MachineFinding("Extras", "; ".join(texts))
+
+
+def _encoders() -> MachineFinding:
+    missing = [codec for name in FORMATS for codec in missing_codecs(name, needs_sound=True)]
+    if missing:
+        how = f"The wheel of PyAV brings them. Run: {_pip_line('--force-reinstall', '--only-binary=:all:', 'av')}"
+        return MachineFinding("Encoders", f"FFmpeg lacks {', '.join(missing)}. {how}", is_fine=False)
+    return MachineFinding("Encoders", f"FFmpeg writes {', '.join(kind.label for kind in FORMATS.values())}")
+
+
+def _libraries() -> MachineFinding:
+    missing = missing_packages()
+    if not missing:
+        return MachineFinding("System", "all libraries that the window needs are there")
+    text = f"missing {', '.join(missing)}, which the window needs. On Debian and Ubuntu run: {install_line(missing)}"
+    return MachineFinding("System", text, is_fine=False)
 
 
 def _cores() -> MachineFinding:
@@ -153,7 +192,7 @@ def _threads() -> MachineFinding:
 def _gl() -> MachineFinding:
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _GL_PROBE],
+            [sys.executable, "-P", "-c", _GL_PROBE],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,

@@ -8,8 +8,6 @@ from functools import cache
 from hashlib import blake2b
 from pathlib import Path
 
-import engine
-
 LIBRARIES = ("numba", "numpy", "torch")
 
 
@@ -32,7 +30,7 @@ def difference(there: dict[str, str]) -> str:
 
 def _sources() -> str:
     """Hash of the program: a version number does not see what a developer changed."""
-    root, digest = Path(engine.__file__).parents[1], blake2b(digest_size=8)
+    root, digest = Path(__file__).parents[2], blake2b(digest_size=8)
     for package in ("app", "engine"):
         for path in sorted((root / package).rglob("*.py")):
             digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import logging
 from functools import cache
-from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from engine.errors import ProjectError
+from engine.own_modules import import_own
 
 if TYPE_CHECKING:
     import torch
@@ -56,7 +56,7 @@ def backend_called(name: str) -> Backend:
     """
     entry, device = _entry(name)
     module, _, kind = entry.place.partition(":")
-    make = getattr(import_module(module), kind)
+    make = getattr(import_own(module), kind)
     try:
         backend: Backend = make(device=_device(device)) if device else make()
     except RuntimeError as error:  # torch has no device of that name

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, Generic, Literal, TypeVar, cast
 
+from engine.own_modules import import_own
 from engine.progress import Progress
 
 Job = TypeVar("Job")
@@ -68,4 +68,4 @@ class ChildKind(Generic[Job, Event, Result]):
 def find(place: str) -> Any:
     """The object at "module:name"."""
     module, _, name = place.partition(":")
-    return cast("Any", getattr(import_module(module), name))
+    return cast("Any", getattr(import_own(module), name))

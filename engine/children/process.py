@@ -24,9 +24,9 @@ from typing import IO, Generic, cast
 
 import msgspec
 
-import engine
 from engine.children.kind import ChildFailed, ChildKind, Event, Job, Result
 from engine.children.messages import Message, Refusal, decoded, framed, read_message, write_all
+from engine.own_modules import module_name, python_path
 
 logger = logging.getLogger(__name__)
 
@@ -225,12 +225,17 @@ class ChildProcess(Child[Job, Event, Result]):
 def _start(
     kind: ChildKind[Job, Event, Result], folder: Path | None, added: Mapping[str, str], said: IO[bytes]
 ) -> subprocess.Popen[bytes]:
-    root = str(Path(engine.__file__).resolve().parents[1])
-    paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, **added, "PYTHONPATH": os.pathsep.join(paths)}
+    environment = {**os.environ, **added, "PYTHONPATH": python_path()}
     if kind.is_spreading:
         environment["OPENBLAS_NUM_THREADS"] = "1"
-    command = [sys.executable, "-P", "-m", "engine.children", kind.place, *([str(folder)] if folder else [])]
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        module_name("engine.children"),
+        kind.place,
+        *([str(folder)] if folder else []),
+    ]
     with undisturbed():
         return subprocess.Popen(
             command,

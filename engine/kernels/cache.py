@@ -48,7 +48,7 @@ _WHOLE_FOLDERS = ("kernels/", "cpu/")
 """Folders that hold nothing but kernels and what calls them: all their files count."""
 _WARM_UP = "warm.py"
 """Files of this name say which kernels are compiled, and for which types."""
-_FROM = re.compile(rb"from (engine[\w.]*) import (\([^)]*\)|[^\n#]*)")
+_FROM = re.compile(rb"from (?:clipgstream\.)?(engine[\w.]*) import (\([^)]*\)|[^\n#]*)")
 _RENAMED = re.compile(rb"\s+as\s+\w+")
 _CODE_VARIABLES = (
     CPU_VARIABLE,

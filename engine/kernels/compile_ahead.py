@@ -13,11 +13,11 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from engine.kernels.cache import MARKER, VARIABLE, current_key, kernel_folder, read_marker, write_marker
+from engine.own_modules import import_own, module_name, python_path
 from engine.parallel import n_cores
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def load_groups_of_cpu(*, is_training: bool) -> None:
     """
     for name, module, _ in GROUPS:
         if name in OF_CPU and (is_training or name == "rasterizer"):
-            import_module(module).warm_up()
+            import_own(module).warm_up()
 
 
 def compile_all(report: ReportGroups | None = None, *, backend: str = "cpu", n_processes: int | None = None) -> bool:
@@ -139,18 +139,16 @@ def _names(bundle: _Bundle) -> str:
 
 
 _IMPORT = "from importlib import import_module"
-_END_WITH_PARENT = "from engine.kernels.parent import end_with_parent; end_with_parent()"
+_END_WITH_PARENT = f"from {module_name('engine.kernels.parent')} import end_with_parent; end_with_parent()"
 """A compiler that nobody waits for takes a core for a minute all the same."""
 
 
 def _start(bundle: _Bundle, folder: Path) -> subprocess.Popen[bytes]:
-    root = str(Path(__file__).resolve().parents[2])
-    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
-    calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module, _ in bundle)
+    calls = "; ".join(f"import_module({module_name(module)!r}).warm_up()" for _, module, _ in bundle)
     return subprocess.Popen(
         # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
         [sys.executable, "-P", "-c", f"{_END_WITH_PARENT}; import gc; gc.disable(); {_IMPORT}; {calls}"],
-        env={**os.environ, "PYTHONPATH": path, VARIABLE: str(folder)},
+        env={**os.environ, "PYTHONPATH": python_path(), VARIABLE: str(folder)},
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

@@ -99,7 +99,7 @@ def test_a_back_end_without_compiled_kernels_compiles_none(monkeypatch, tmp_path
 
     monkeypatch.setenv(compile_ahead.VARIABLE, str(tmp_path))
     monkeypatch.setattr(compile_ahead, "_bundles", note)
-    monkeypatch.setattr(compile_ahead, "import_module", lambda name: pytest.fail(f"{name} was loaded"))
+    monkeypatch.setattr(compile_ahead, "import_own", lambda name: pytest.fail(f"{name} was loaded"))
     backend = backend_called("reference")
     for _ in range(2):  # the second time it is known that they are compiled
         assert compile_ahead.compile_all(backend=backend.name)

@@ -101,6 +101,15 @@ def test_importing_ui_main_loads_no_torch_and_no_window_library() -> None:
     assert not loaded_modules("import ui.main") & (WINDOW_LIBRARIES | {"torch"})
 
 
+def test_the_window_draws_before_it_loads_what_computes() -> None:
+    loaded = loaded_modules(
+        "import pyglet\npyglet.options.headless = True\nimport ui.shell.window, app.session.session\n"
+        "import app.session.projects.preferences, app.project.opening.project_choices"
+    )
+    assert {"pyglet", "imgui_bundle"} <= loaded
+    assert not loaded & {"cv2", "fourdgs", "matplotlib", "numba", "open3d", "scipy", "torch"}
+
+
 def test_importing_the_command_line_loads_no_window_library() -> None:
     assert not loaded_modules("import app.cli.cli") & WINDOW_LIBRARIES
 

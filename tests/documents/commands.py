@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import argparse
 
-from app.cli.cli import build_parser
-from app.cli.commands import COMMANDS
+from app.cli.cli import parsers_of_commands
 from tests.documents.table import table
 from ui import main as window
 
 
 def command_sections() -> str:
     """The window, the demo, then every command without a window: how it is called, what it does, its options."""
-    parser = build_parser(used=COMMANDS)
-    subparsers = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction)).choices
-    parsers = [window.build_parser(), window.build_demo_parser()]
-    for subparser in subparsers.values():
-        parsers += [subparser, *subparser.verbs.values()]
+    parsers = [window.build_parser(), window.build_demo_parser(), window.build_completion_parser()]
+    for parser in parsers_of_commands().values():
+        parsers += [parser, *parser.verbs.values()]
     return "\n\n".join(map(_section, parsers))
 
 

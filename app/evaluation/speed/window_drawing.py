@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from pathlib import Path
 
 from app.evaluation.speed.laps import Lap
 from engine.children.process import undisturbed
+from engine.own_modules import module_name, python_path
 
 logger = logging.getLogger(__name__)
 
@@ -39,11 +41,16 @@ def drawn_laps(project_folder: Path) -> WindowLaps:
     """Render frames of a project as the window does. Never raises for want of a display or a driver."""
     if not _module:
         return _none("this program has no window")
-    command = [sys.executable, "-m", _module, str(project_folder)]
+    command = [sys.executable, "-P", "-m", module_name(_module), str(project_folder)]
     try:
         with undisturbed():
             child = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                command,
+                env={**os.environ, "PYTHONPATH": python_path()},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
             )
         with child:
             try:

@@ -10,7 +10,6 @@ it is needed:
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, cast
@@ -21,6 +20,7 @@ from msgspec.structs import force_setattr
 from app.export.export_progress import ExportEstimate, ExportResult, Report
 from app.export.jobs.question import Question
 from app.export.picked_frames import PickedFrames
+from engine.own_modules import import_own
 from engine.setting import Declared, Flag, setting, settings_of
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ class ExportJob(Declared, frozen=True, tag=True):
     @classmethod
     def load(cls) -> JobModule:
         """Import its work."""
-        return cast("JobModule", importlib.import_module(cls.work))
+        return cast("JobModule", import_own(cls.work))
 
     @classmethod
     def takes(cls, name: str) -> bool:

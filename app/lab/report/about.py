@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
@@ -15,17 +14,10 @@ from app.lab.report.page.parts import Section
 from app.lab.report.page.tables import Table, TableColumn
 from app.project.project_facts import ClipFacts, ProjectFacts
 from app.spans import MAX_SPANS, spans_text
+from engine.own_modules import program_version
 from engine.training.config import SETTINGS
 
 _PAIR = (TableColumn("what", "Name"), TableColumn("value", "Value"))
-
-
-def program_version() -> str:
-    """Version of this program; "unknown" where it runs without being installed."""
-    try:
-        return importlib.metadata.version("clipgstream")
-    except importlib.metadata.PackageNotFoundError:
-        return "unknown"
 
 
 def setup_section(facts: ProjectFacts, machine: Machine, now: datetime, evaluation: Mapping[str, Any]) -> Section:

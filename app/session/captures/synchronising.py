@@ -19,7 +19,6 @@ from engine.errors import EngineError, ProjectError
 from engine.progress import Progress
 from engine.storage.files import disk_error
 from engine.synchronisation.applying import corrections_for
-from engine.synchronisation.estimating import synchronise
 from engine.synchronisation.synchronisation import Synchronisation
 
 
@@ -83,6 +82,8 @@ class Synchronising(SessionPart):
         self._show(SynchronisationPage(capture.path, fps=capture.fps, target=target))
 
         def work(context: JobContext) -> Synchronisation:
+            from engine.synchronisation.estimating import synchronise  # numba, which the first picture does not need
+
             def report(progress: Progress) -> None:
                 context.report(progress.done, " - ".join(filter(None, [progress.stage, progress.message])))
 

@@ -1,4 +1,4 @@
-"""The Gaussians of a frame that a command finds. Pure; runs on a thread."""
+"""The Gaussians of a frame that a command finds. Pure; runs on a thread, which imports the compiled kernels."""
 
 from __future__ import annotations
 
@@ -28,14 +28,8 @@ from app.session.editing.selection_commands import (
     Shape,
     ShrinkSelection,
 )
-from engine.editing.selection.in_picture import under_mask
-from engine.editing.selection.neighbours import flooded, grown, shrunk
-from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import in_range
 from engine.editing.selection.set_algebra import combined
-from engine.editing.selection.shapes import brush_mask, lasso_mask, rectangle_mask
-from engine.editing.selection.visibility import seen_rows
-from engine.editing.selection.volumes import in_volume
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +57,9 @@ def found_by(command: SelectionCommand, ground: Ground) -> np.ndarray:
         ValueError: The command is not valid: an attribute that does not exist.
         TypeError: The command finds nothing.
     """
+    from engine.editing.selection.neighbours import flooded, grown, shrunk
+    from engine.editing.selection.volumes import in_volume
+
     gaussians, selected = ground.gaussians, ground.selected
     means = gaussians.means
     match command:
@@ -121,6 +118,8 @@ def _how(command: SelectionCommand) -> tuple[How, bool]:
 
 def shape_mask(shape: Shape, size: tuple[int, int]) -> np.ndarray:
     """Pixels of a shape. [H, W] bool"""
+    from engine.editing.selection.shapes import brush_mask, lasso_mask, rectangle_mask
+
     match shape:
         case Rectangle(x0=x0, y0=y0, x1=x1, y1=y1):
             return rectangle_mask(x0, y0, x1, y1, size)
@@ -131,6 +130,10 @@ def shape_mask(shape: Shape, size: tuple[int, int]) -> np.ndarray:
 
 
 def _in_picture(command: SelectInPicture, gaussians: GaussianArrays) -> np.ndarray:
+    from engine.editing.selection.in_picture import under_mask
+    from engine.editing.selection.projected import project_gaussians
+    from engine.editing.selection.visibility import seen_rows
+
     view = replace(command.view, near=max(command.view.near, gaussians.near_plane))
     projected = project_gaussians(gaussians.means, gaussians.quats, gaussians.scales, view)
     found = under_mask(projected, shape_mask(command.shape, view.size), is_by_extent=command.is_by_extent)

@@ -33,10 +33,8 @@ from app.session.editing.selection_status import SelectionStatus
 from app.session.part import SessionPart
 from engine.editing.edit import Picked
 from engine.editing.gaussian_rows import GaussianRows
-from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import ValueSpread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
-from engine.editing.selection.share import selected_share
 from engine.errors import ProjectError
 
 FIND, SPREAD, SHARE = "find", "spread", "share"
@@ -95,6 +93,9 @@ class _ShareWork:
     selected: np.ndarray = field(compare=False)
 
     def answer(self) -> np.ndarray:
+        from engine.editing.selection.projected import project_gaussians
+        from engine.editing.selection.share import selected_share
+
         gaussians = self.gaussians
         view = replace(self.view, near=max(self.view.near, gaussians.near_plane))
         projected = project_gaussians(gaussians.means, gaussians.quats, gaussians.scales, view)

@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy import ndimage
 
 from engine.metrics.clips.summary import GROUPS, mean_of
 
@@ -131,6 +130,8 @@ def seam_maps(
 
 def stands_still(truth_change: np.ndarray) -> np.ndarray:
     """Pixels that change by no more than noise does, by how much the truth changes [H, W]. [H, W] bool"""
+    from scipy import ndimage  # the window shows figures long before it blurs anything
+
     sigma_px = BLUR_PX_PER_640 * max(truth_change.shape[1] / 640.0, 0.5)
     return ndimage.gaussian_filter(truth_change, sigma_px, mode="nearest", truncate=3.0) < STATIC_THRESHOLD
 

@@ -50,7 +50,7 @@ def measure(session, monkeypatch, result):
             raise result
         return result
 
-    monkeypatch.setattr("app.session.captures.synchronising.synchronise", synchronise)
+    monkeypatch.setattr("engine.synchronisation.estimating.synchronise", synchronise)
     session.dispatch(SynchroniseCameras())
     poll_until(session, lambda: session.synchronising.page.state == "done")
     return session.synchronising.page
@@ -113,7 +113,7 @@ def test_closing_ends_the_measurement(session, monkeypatch):
             ended.set()
             raise
 
-    monkeypatch.setattr("app.session.captures.synchronising.synchronise", synchronise)
+    monkeypatch.setattr("engine.synchronisation.estimating.synchronise", synchronise)
     session.dispatch(SynchroniseCameras())
     poll_until(session, lambda: session.synchronising.progress.message == "motion - camera 3")
     session.dispatch(CloseQuestion())

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-
 from imgui_bundle import ImVec2, imgui
 
 from app.background.logs import log_path
+from engine.own_modules import program_version
 from ui.panels.actions.window import DOCUMENTS
 from ui.panels.pieces.widgets import elided_path, text_wrapped_dim
 from ui.panels.state import UiState
@@ -42,7 +41,7 @@ class AboutDialog:
 
     def _draw_inside(self, ui: UiState) -> bool:
         """Returns whether it was closed by its button."""
-        imgui.text(f"ClipGStream Studio {_version()}    MIT licence")
+        imgui.text(f"ClipGStream Studio {program_version()}    MIT licence")
         text_wrapped_dim(WORDS)
         imgui.spacing()
         for name, path in (("Documents", str(DOCUMENTS)), ("Log", str(log_path()))):
@@ -59,10 +58,3 @@ class AboutDialog:
         is_clicked = imgui.button("Close", ImVec2(120, 0))
         ui.mark("about.close")
         return is_clicked
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version("clipgstream")
-    except importlib.metadata.PackageNotFoundError:  # run from a folder without an installation
-        return ""

@@ -1,0 +1,1 @@
+"""The program as part of a desktop and of a shell."""
