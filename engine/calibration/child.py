@@ -8,12 +8,14 @@ from __future__ import annotations
 import shutil
 import threading
 import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
-from engine.calibration.calibrate import CalibrationJob
+from engine.calibration.boards.calibrating import BoardProgress, calibrate_by_board
+from engine.calibration.calibrate import CalibrationJob, least_cameras
 from engine.calibration.calibrated import Calibration
 from engine.calibration.finishing import finished
 from engine.calibration.matching.feature_processes import key_points as looked_for
@@ -42,7 +44,13 @@ N_TRIED_ON = 3
 
 def main(job: CalibrationJob, parent: Parent[Progress]) -> Calibration:
     """Runs in the child."""
-    videos = find_videos(job.folder, follow_links=job.follow_links)
+    board = job.options.board
+    videos = find_videos(job.folder, follow_links=job.follow_links, least=least_cameras(job.options))
+    if board is not None:
+        progress = StageProgress(parent.report, BOARD_STAGES)
+        looked = progress.count("Looking for the board", len(videos), "cameras")
+        told = BoardProgress(looked, lambda share: progress.reach("Adjusting", share))
+        return calibrate_by_board(videos, board, job.options, told)
     return calibrate_here(videos, job.options, job.scratch / "mapping", StageProgress(parent.report))
 
 
@@ -130,6 +138,7 @@ def _best_solution(
     return solve(rough, key_points, matches, sizes, stages=FINE, progress=finely, **chosen)
 
 
+BOARD_STAGES = {"Looking for the board": 0.7, "Adjusting": 0.3}
 STAGES = {"Key points": 0.45, "Matching": 0.15, "Mapping": 0.2, "Adjusting": 0.2}
 """Stages and their shares of the time."""
 
@@ -139,17 +148,18 @@ class StageProgress:
 
     Args:
         report: Called at every step, one at a time.
+        stages: Their shares of the time, in order.
     """
 
-    def __init__(self, report: ReportProgress) -> None:
-        self._report, self._lock, self._done = report, threading.Lock(), 0.0
+    def __init__(self, report: ReportProgress, stages: Mapping[str, float] = MappingProxyType(STAGES)) -> None:
+        self._report, self._stages, self._lock, self._done = report, stages, threading.Lock(), 0.0
 
     def reach(self, stage: str, share: float, message: str = "") -> None:
         """So much of a stage is done, 0..1."""
-        names = list(STAGES)
-        before = sum(STAGES[name] for name in names[: names.index(stage)])
+        names = list(self._stages)
+        before = sum(self._stages[name] for name in names[: names.index(stage)])
         with self._lock:
-            self._done = max(self._done, before + share * STAGES[stage])
+            self._done = max(self._done, before + share * self._stages[stage])
             self._report(Progress(stage, self._done, message))
 
     def count(self, stage: str, n: int, what: str, *, first: float = 0.0, last: float = 1.0) -> Callable[[float], None]:
