@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCamera
@@ -10,6 +12,7 @@ from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import FEW_MATCHES, PairCounts
 from engine.calibration.solving.agreement import MIN_AGREEING, MatchAgreement, agreement
 from engine.calibration.solving.cameras import Cameras
+from engine.calibration.solving.links import is_held
 from engine.calibration.solving.solving import CalibrationSolution
 from engine.calibration.solving.strain import is_strained
 from engine.calibration.solving.world import find_up, known_scale, unit_scale, upright
@@ -22,6 +25,10 @@ WEAK_SIGHTINGS = 60
 MAX_DOUBTFUL = 0.25
 """Share of the cameras that were found. Where matches contradict more, whole groups of cameras have been found in wrong
 places, and those that agree may be such a group."""
+FAR = (
+    "Neighbouring cameras are far apart; they were found from what moves, pair by pair. Directions may be off by 2 "
+    "degrees and positions by 3 % of the rig's radius; a board finds them exactly."
+)
 LENS_MODEL: dict[str, LensModel] = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
 """Names of engine.camera.lens."""
 
@@ -33,8 +40,10 @@ def finished(
     verified: dict[Pair, np.ndarray],
     sizes: np.ndarray,
     options: CalibrationOptions,
+    *,
+    is_far: bool = False,
 ) -> Calibration:
-    """The part of a solution to hand back."""
+    """The part of a solution to hand back. is_far: Whether cameras were joined pair by pair, being far apart."""
     rows, tracks, errors = solution.rows, solution.tracks, solution.errors
     names = [videos[row].name for row in rows]
     warnings: list[str] = []
@@ -45,6 +54,9 @@ def finished(
     cameras, points = upright(solution.cameras, tracks.points, up, origin, scale)
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
     agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
+    if is_far:
+        agreed = replace(agreed, held=is_held(agreed, tracks))
+        warnings.append(FAR)
     strained = is_strained(rows, solution.cameras, key_points, verified, sizes, agreed.is_firm)
     doubts = _doubts(names, n_sightings, agreed, strained)
     native = np.array([videos[row].size for row in rows], dtype=np.int64)

@@ -31,9 +31,9 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     width_mm, height_mm = write_board(board, options.out, is_replacing=options.replace)
     print(
         printable(
-            f"{options.out}: a page of {width_mm:.0f} x {height_mm:.0f} mm. Print it at 100 %, glue it onto a flat, stiff "
-            f"plate, and measure a square: {1000 * board.square_m:g} mm. Then: clipgstream calibrate VIDEOS --board "
-            f"{board.text}"
+            f"{options.out}: a page of {width_mm:.0f} x {height_mm:.0f} mm. Print it at 100 %, glue it onto a flat, "
+            f"stiff plate, and measure a square: {1000 * board.square_m:g} mm. Then: clipgstream calibrate VIDEOS "
+            f"--board {board.text}"
         )
     )
     return EXIT_OK

@@ -72,7 +72,12 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     board = None if options.board is None else read_board(options.board)
     chosen = CalibrationOptions(options.lens, options.shared_lens, _distance(options.distance), options.up, board)
     request = CalibrationRequest(
-        options.videos, options.out, chosen, options.replace, options.keep_doubtful, options.follow_links,
+        options.videos,
+        options.out,
+        chosen,
+        options.replace,
+        options.keep_doubtful,
+        options.follow_links,
         options.recording,
     )
     line, left, seen = ProgressLine(is_quiet=options.quiet), TimeLeft(), Progress("Starting", 0.0)

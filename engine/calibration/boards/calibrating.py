@@ -57,12 +57,18 @@ def calibrate_by_board(
         names = {f"{{{row}}}": video.name for row, video in enumerate(videos)}
         for key, name in names.items():
             solution = solution.replace(key, name)
-        raise PreparationError(f"No two cameras could be placed. {solution[:1].upper()}{solution[1:]}.", hint=WHAT_TO_FILM)
+        raise PreparationError(
+            f"No two cameras could be placed. {solution[:1].upper()}{solution[1:]}.", hint=WHAT_TO_FILM
+        )
     return _finished(solution, videos, np.array(frames), sizes, options)
 
 
 def _finished(
-    solution: BoardSolution, videos: list[PlainVideo], frames: np.ndarray, sizes: np.ndarray, options: CalibrationOptions
+    solution: BoardSolution,
+    videos: list[PlainVideo],
+    frames: np.ndarray,
+    sizes: np.ndarray,
+    options: CalibrationOptions,
 ) -> Calibration:
     rows, names = solution.rows, [videos[row].name for row in solution.rows]
     n = len(rows)

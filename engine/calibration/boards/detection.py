@@ -77,15 +77,13 @@ def find_style(board: Board, pictures: Sequence[np.ndarray]) -> BoardStyle | Non
 def other_markers(board: Board, pictures: Sequence[np.ndarray]) -> str:
     """What is seen in pictures that do not show the board, in a sentence; empty where there are no markers at all.
 
-    A marker of a small dictionary is one of the larger ones with as many fields, too, so these are looked for, and the
-    smallest that has all numbers is named.
+    The markers of a small dictionary are those that larger ones with as many fields begin with: the smallest is named.
     """
     best, best_numbers = "", np.zeros(0, np.int64)
-    known = dictionaries()
-    for name in [board.dictionary, *(other for other in known if other != board.dictionary)]:
-        if not name:
-            continue
-        detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(known[name]))
+    known = {name: cv2.aruco.getPredefinedDictionary(number) for name, number in dictionaries().items()}
+    others = sorted(known, key=lambda name: (name != board.dictionary, len(known[name].bytesList)))
+    for name in others:
+        detector = cv2.aruco.ArucoDetector(known[name])
         found: list[np.ndarray] = []
         for picture in pictures:
             for is_inverted in (False, True):
@@ -103,7 +101,7 @@ def other_markers(board: Board, pictures: Sequence[np.ndarray]) -> str:
     if highest >= n_own:
         return f"markers up to number {highest} are seen, but {board.columns} x {board.rows} squares have {n_own}"
     return (
-        f"markers of {best} are seen, but not in the order of {board.columns} x {board.rows} squares; columns come first"
+        f"markers of {best} are seen, but not as {board.columns} x {board.rows} squares have them; columns come first"
     )
 
 

@@ -69,7 +69,9 @@ def refined(
     return _judged(camera, views, corners)
 
 
-def pose_of(view: BoardView, corners: np.ndarray, cameras: Cameras, row: int = 0) -> tuple[np.ndarray, np.ndarray] | None:
+def pose_of(
+    view: BoardView, corners: np.ndarray, cameras: Cameras, row: int = 0
+) -> tuple[np.ndarray, np.ndarray] | None:
     """From the board to a camera: rotation [3, 3] and translation [3], by the plane of the board."""
     plane = cameras.plane(row, view.pixels)
     if not np.isfinite(plane).all() or np.abs(plane).max() > 50:
@@ -104,9 +106,7 @@ def _adjusted(views, corners, camera: Cameras, size) -> Cameras:
     shape = RigidPlaces(corners, *(np.array([place[part] for _, place in held]) for part in (0, 1)))
     seen = sightings([(0, number, view) for number, (view, _) in enumerate(held)], len(corners))
     middles, widths = np.array([size]) / 2.0, np.array([float(size[0])])
-    found, _ = adjust(
-        camera, shape, seen, middles=middles, widths=widths, expect=EXPECTED, n_iterations=N_ITERATIONS
-    )
+    found, _ = adjust(camera, shape, seen, middles=middles, widths=widths, expect=EXPECTED, n_iterations=N_ITERATIONS)
     return replace(found, rotations=camera.rotations, translations=camera.translations)
 
 

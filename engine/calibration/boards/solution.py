@@ -96,8 +96,7 @@ def solve_boards(
     progress(0.7)
     if len(singles) < 2:
         return "; ".join(f"{{{row}}}: {why}" for row, why in unusable.items())
-    held = [{row: pose for row in moment if row in singles and (pose := pose_of(moment[row], corners, singles[row].camera))}
-            for moment in views]  # fmt: skip
+    held = [_held(moment, singles, corners) for moment in views]
     group = joined(n_cameras, held)
     if group is None:
         return "no two cameras saw the board at the same moment in enough places"
@@ -118,6 +117,12 @@ def solve_boards(
     return BoardSolution(
         rows, cameras, places, np.array(moments), seen, errors, own_errors, n_views, group.n_common, unusable,
     )  # fmt: skip
+
+
+def _held(moment: Mapping[int, BoardView], singles: Mapping[int, SingleCamera], corners: np.ndarray) -> dict[int, Pose]:
+    """From the board to each camera that sees it."""
+    poses = {row: pose_of(view, corners, singles[row].camera) for row, view in moment.items() if row in singles}
+    return {row: pose for row, pose in poses.items() if pose is not None}
 
 
 def _first_lens(lens: str) -> str:

@@ -245,9 +245,7 @@ def _expected(cameras: Cameras, start_focals: np.ndarray, middles: np.ndarray, n
     return off
 
 
-def _sharing(
-    n_cameras: int, n_params: int, groups: tuple[int, ...] | None, *, is_lens_kept: bool
-) -> sparse.csr_matrix:
+def _sharing(n_cameras: int, n_params: int, groups: tuple[int, ...] | None, *, is_lens_kept: bool) -> sparse.csr_matrix:
     """Maps the numbers that are sought to all numbers of all cameras. [C P, Q]"""
     if is_lens_kept:
         is_pose = np.tile(np.arange(n_params) < 6, n_cameras)

@@ -38,23 +38,25 @@ def ring(n_cameras: int, *, lens: Sequence[float] = (-0.12, 0.03, 0.001, -0.0005
     )
 
 
-def held_boards(n_moments: int, *, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """A board that somebody carries around and shows to all sides, also flat: rotations and translations to the world.
+def held_boards(n_moments: int, *, late: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A board that somebody carries around and shows to all sides: rotations and translations to the world.
 
-    [B, 3, 3], [B, 3]
+    Args:
+        n_moments: In which it is turned around two times and a half.
+        late: In moments.
+    Returns:
+        [B, 3, 3], [B, 3]
     """
-    generator = np.random.default_rng(seed)
-    time = np.linspace(0, 1, n_moments)
-    turn = 2 * np.pi * 2.5 * time
-    outward = np.stack([np.cos(turn), np.sin(turn), 0.35 + 0.5 * np.sin(9 * turn)], axis=-1)
+    turn = 2 * np.pi * 2.5 * (np.arange(n_moments) - late) / (n_moments - 1)
+    outward = np.stack([np.cos(turn), np.sin(turn), 0.35 + 0.5 * np.sin(1.7 * turn)], axis=-1)
     outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
     rotations = []
     for face in outward:
         x = np.cross([0, 0, 1.0], face)
         x /= np.linalg.norm(x)
         rotations.append(np.stack([x, -np.cross(face, x), -face], axis=-1))
-    tilts = rotation_of(generator.normal(0, 0.25, (n_moments, 3)))
-    middles = np.stack([0.35 * np.cos(3 * turn), 0.35 * np.sin(2 * turn), 0.9 + 0.35 * np.sin(5 * turn)], axis=-1)
+    tilts = rotation_of(0.4 * np.sin(turn[:, None] * [1.9, 1.3, 2.3] + np.arange(3.0)))
+    middles = np.stack([0.35 * np.cos(1.3 * turn), 0.35 * np.sin(0.7 * turn), 0.9 + 0.35 * np.sin(1.1 * turn)], axis=-1)
     turned = tilts @ np.array(rotations)
     middle = BOARD.corners.mean(0)
     return turned, middles - turned @ middle
