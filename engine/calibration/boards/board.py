@@ -111,7 +111,9 @@ def read_board(text: str) -> Board:
         raise CaptureError(
             f"Markers of {lengths[1]:g} m do not fit into squares of {lengths[0]:g} m.", hint="Give the square first."
         )
-    return _with_markers(Board(columns, rows, *lengths, parts[3] if len(parts) == 4 else DEFAULT_DICTIONARY))
+    return _with_markers(
+        Board(columns, rows, lengths[0], lengths[1], parts[3] if len(parts) == 4 else DEFAULT_DICTIONARY)
+    )
 
 
 def _with_markers(board: Board) -> Board:

@@ -24,8 +24,8 @@ CONTRADICTS = 3.0
 """A camera whose corners miss by so many times what they miss alone, and by CONTRADICTS_PX, does not fit the others."""
 CONTRADICTS_PX = 1.0
 """At a width of 1,000 pixels."""
-MIN_OFFSET, MIN_MOTION_PX = 0.15, 0.5
-"""In frames, and in pixels per frame: of a board that moves less, nothing about time is said."""
+MIN_OFFSET, MIN_MOTION_PX = 0.1, 0.5
+"""In frames, and in pixels per frame: where a board moves less unevenly, nothing about time is said."""
 MAX_DOUBTFUL = 0.5
 FLAT_DEG, STILL_SHARE, MIN_STILL = 20.0, 0.02, 3
 """A board lies on the floor if it is level within FLAT_DEG, and lies in one place, within a share of how far cameras
@@ -116,7 +116,7 @@ def _doubts(solution: BoardSolution, frames: np.ndarray, sizes: np.ndarray, erro
             continue
         late = _frames_late(solution, frames, row)
         said = (
-            f"its pictures are about {abs(late):.1f} frames {'late' if late > 0 else 'early'}; synchronise the videos"
+            f"its pictures seem to come {'late' if late > 0 else 'early'}; synchronise the videos"
             if abs(late) >= MIN_OFFSET
             else "it moved, or its frames were not taken at the same time as those of the others"
         )
@@ -127,7 +127,9 @@ def _doubts(solution: BoardSolution, frames: np.ndarray, sizes: np.ndarray, erro
 def _frames_late(solution: BoardSolution, frames: np.ndarray, row: int) -> float:
     """Frames by which a camera shows the board later than others do, by boards that move; 0 where none does.
 
-    A camera that is late shows where the board was: its sightings lie behind by the way it goes in that time.
+    A camera that is late shows where the board was: its sightings lie behind by the way it goes in that time. What is
+    common to all of them says nothing, since it has turned the camera. Too little by half and more, since the camera's
+    own sightings have pulled the board.
     """
     seen, n_corners = solution.seen, len(solution.places.corners)
     place_of = {int(frames[moment]): place for place, moment in enumerate(solution.moments)}
@@ -145,12 +147,12 @@ def _frames_late(solution: BoardSolution, frames: np.ndarray, row: int) -> float
     at = [solution.cameras.pixels(camera, points[place * n_corners + corner])[0] for place in (ahead, behind)]
     motion = (at[0] - at[1]) / span[:, None]
     off = seen.pixels[rows] - solution.cameras.pixels(camera, points[seen.points[rows]])[0]
-    is_moving = np.linalg.norm(motion, axis=-1) > MIN_MOTION_PX
-    squares = (motion[is_moving] ** 2).sum(-1)
-    if not len(squares):
+    is_near = np.linalg.norm(off, axis=-1) < 10 * np.median(np.linalg.norm(off, axis=-1))
+    off, motion = (values[is_near] - np.median(values[is_near], axis=0) for values in (off, motion))
+    squares = float((motion**2).sum())
+    if squares < len(motion) * MIN_MOTION_PX**2:
         return 0.0
-    lates = -(off[is_moving] * motion[is_moving]).sum(-1) / squares
-    return float(np.median(np.repeat(lates, np.minimum(np.ceil(squares), 20).astype(int))))
+    return -float((off * motion).sum()) / squares
 
 
 def _up(cameras: Cameras, places: RigidPlaces, way: str) -> tuple[np.ndarray, np.ndarray, str]:

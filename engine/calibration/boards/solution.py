@@ -157,6 +157,7 @@ def _adjusted(cameras: Cameras, places: RigidPlaces, seen: Observations, sizes: 
     """Twice, the second time without what is far off."""
     reach_px = REACH_PX * sizes.max(1)[seen.cameras] / 1000
     middles, widths = sizes / 2.0, sizes[:, 0].astype(np.float64)
+    errors = errors_px(cameras, places.points, seen)
     kept, expect = seen, replace(EXPECTED, is_lens_kept=is_lens_kept)
     for _ in range(2):
         cameras, places = adjust(

@@ -249,7 +249,7 @@ def _sharing(n_cameras: int, n_params: int, groups: tuple[int, ...] | None, *, i
     """Maps the numbers that are sought to all numbers of all cameras. [C P, Q]"""
     if is_lens_kept:
         is_pose = np.tile(np.arange(n_params) < 6, n_cameras)
-        return sparse.csr_matrix(sparse.identity(n_cameras * n_params, format="csc")[:, is_pose])
+        return sparse.csr_matrix(np.eye(n_cameras * n_params)[:, is_pose])
     if groups is None:
         return sparse.csr_matrix(sparse.identity(n_cameras * n_params))
     n_lens = n_params - 6

@@ -1,8 +1,8 @@
 """First estimates of cameras that only see what their neighbours see: pair joined to pair, all around a ring.
 
 Mapping one camera after the other needs points that three cameras see, which are few where neighbours are 30 to 45
-degrees apart. Here each pair gives turn and direction; how far apart a pair is follows from how far away that is what it
-and the next pair see, also where that is not the same point but one next to it at the same moment.
+degrees apart. Here each pair gives turn and direction; how far apart a pair is follows from how far away that is what
+it and the next pair see, also where that is not the same point but one next to it at the same moment.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from engine.calibration.matching.matching import KeyPoints, Pair, homogeneous
 from engine.calibration.matching.motions import AgreedMotion, on_planes
@@ -204,7 +204,7 @@ def _ratios(
         places.append(np.concatenate([key_points[camera].pixels[rows], moments], axis=1))
         depths.append(geometries[one].depths[:, end])
     reach_px = NEAR_PX * float(sizes[camera].max()) / 640
-    off, nearest = cKDTree(places[0]).query(places[1], distance_upper_bound=reach_px)
+    off, nearest = KDTree(places[0]).query(places[1], distance_upper_bound=reach_px)
     is_near = np.isfinite(off)
     return np.log(depths[0][nearest[is_near]] / depths[1][is_near])
 

@@ -100,7 +100,7 @@ class BoardPictures:
         size = (board.columns * PX_PER_SQUARE, board.rows * PX_PER_SQUARE)
         printed = charuco_board(board).generateImage(size)
         margin = round(MARGIN * PX_PER_SQUARE)
-        self._printed = cv2.copyMakeBorder(printed, *(margin,) * 4, cv2.BORDER_CONSTANT, value=255)
+        self._printed = np.pad(printed, margin, constant_values=255)
 
     def picture(self, rotation: np.ndarray, translation: np.ndarray, *, seed: int = 0) -> np.ndarray:
         """The board in front of grey, blurred a little, with noise. [H, W, 3] uint8"""
@@ -112,7 +112,14 @@ class BoardPictures:
         places = np.where(is_front[:, None], on_board[:, :2] / on_board[:, 2:] * scale + MARGIN * PX_PER_SQUARE, -1e4)
         width, height = SIZE
         grid = np.clip(places - 0.5, -1e4, 1e4).astype(np.float32).reshape(2 * height, 2 * width, 2)
-        fine = cv2.remap(self._printed, grid, None, cv2.INTER_AREA, borderMode=cv2.BORDER_CONSTANT, borderValue=110)
+        fine = cv2.remap(
+            self._printed,
+            grid[..., 0],
+            grid[..., 1],
+            cv2.INTER_AREA,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(110,),
+        )
         coarse = cv2.GaussianBlur(fine.reshape(height, 2, width, 2).mean((1, 3)), (0, 0), 0.7)
         noisy = 20 + 0.8 * coarse + np.random.default_rng(seed).normal(0, 3, coarse.shape)
         return np.repeat(np.clip(noisy, 0, 255).astype(np.uint8)[..., None], 3, axis=-1)
