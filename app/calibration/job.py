@@ -18,7 +18,7 @@ from pathlib import Path
 
 from app.background.jobs import JobCancelled, JobContext
 from app.calibration.report import report_lines
-from engine.calibration.calibrate import calibrate
+from engine.calibration.calibrate import calibrate, least_cameras
 from engine.calibration.calibrated import Calibration
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.videos import common_length, common_rate, find_videos
@@ -39,7 +39,8 @@ class CalibrationRequest:
 
     Attributes:
         videos: Folder with one video, or one folder of images, per camera.
-        out: Folder that becomes the capture; None for the folder of the videos. Only capture.json is written.
+        out: Folder that becomes the capture; None for the folder of its videos. Only capture.json is written.
+        recording: Folder of other videos of the same cameras, those of the capture, where `videos` show a board only.
         options: Lens, scale, up.
         is_replacing: Whether a capture.json that is there may be replaced.
         keeps_doubtful: Write it also where the calibration has failed, and leave doubtful cameras in use.
@@ -52,6 +53,12 @@ class CalibrationRequest:
     is_replacing: bool = False
     keeps_doubtful: bool = False
     follow_links: bool = False
+    recording: Path | None = None
+
+    @property
+    def filmed(self) -> Path:
+        """Folder of the videos that the capture consists of."""
+        return self.recording or self.videos
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +92,9 @@ def run_calibration(
     Raises:
         CaptureError: Bad input. PreparationError: No cameras could be found. DiskError: It could not be written.
     """
-    out = request.out or request.videos
-    check_target(out, is_replacing=request.is_replacing)
+    check_target(request.out or request.filmed, is_replacing=request.is_replacing)
+    if request.recording is not None:
+        check_recording(request)
     calibration = calibrate(
         request.videos, request.options, follow_links=request.follow_links, report=report, alive=alive
     )
@@ -99,10 +107,10 @@ def written(calibration: Calibration, request: CalibrationRequest) -> Calibratio
     Raises:
         DiskError: It could not be written.
     """
-    out, keeps = request.out or request.videos, request.keeps_doubtful
+    out, keeps = request.out or request.filmed, request.keeps_doubtful
     is_written = keeps or not calibration.failure
     needs_links = is_written and write_calibrated(
-        calibration, request.videos, out, keeps_doubtful=keeps, follow_links=request.follow_links
+        calibration, request.filmed, out, keeps_doubtful=keeps, follow_links=request.follow_links
     )
     lines = tuple(report_lines(calibration, keeps_doubtful=keeps))
     return CalibrationOutcome(out, needs_links, calibration, lines, is_written)
@@ -155,6 +163,36 @@ def check_target(out: Path, *, is_replacing: bool) -> None:
         raise CaptureError(f"There is a {FILE} already.", hint="Name another folder, or allow replacing it.", path=out)
 
 
+def check_recording(request: CalibrationRequest) -> None:
+    """Refuse a recording that was not made by the cameras that are calibrated.
+
+    Raises:
+        CaptureError: Cameras are missing in it, or have pictures of another size; lists them.
+    """
+    assert request.recording is not None
+    least = least_cameras(request.options)
+    sizes = [
+        {video.name: video.size for video in find_videos(folder, follow_links=request.follow_links, least=least)}
+        for folder in (request.videos, request.recording)
+    ]
+    missing = [name for name in sizes[0] if name not in sizes[1]]
+    if missing:
+        raise CaptureError(
+            f"{', '.join(missing)} of the videos to calibrate by {'are' if len(missing) > 1 else 'is'} not in the "
+            "recording.",
+            hint="Name the videos of each camera alike in both folders.",
+            path=request.recording,
+        )
+    other = [name for name in sizes[0] if sizes[0][name] != sizes[1][name]]
+    if other:
+        (width, height), (wide, high) = sizes[1][other[0]], sizes[0][other[0]]
+        raise CaptureError(
+            f"{other[0]} has pictures of {width}x{height}, and of {wide}x{high} where it is calibrated.",
+            hint="Film both at one size.",
+            path=request.recording,
+        )
+
+
 def write_calibrated(
     calibration: Calibration, videos: Path, out: Path, *, keeps_doubtful: bool = False, follow_links: bool = False
 ) -> bool:
@@ -162,7 +200,7 @@ def write_calibrated(
 
     Args:
         calibration: Cameras whose places cannot be trusted are written as excluded.
-        videos: The calibrated videos.
+        videos: Of the calibrated cameras.
         out: Folder that becomes the capture.
         keeps_doubtful: Leave those in use.
         follow_links: Whether links in the folder of the videos may lead out of it.
@@ -170,7 +208,7 @@ def write_calibrated(
         DiskError: The folder cannot be written.
     """
     found = calibration.found
-    sources = {video.name: video for video in find_videos(videos, follow_links=follow_links)}
+    sources = {video.name: video for video in find_videos(videos, follow_links=follow_links, least=1)}
     rig = found.rig
     used = [sources[name] for name in rig.names]
     entries = [

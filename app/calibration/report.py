@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.calibration.calibrated import CalibratedRig, Calibration
+from engine.calibration.options import WHAT_TO_FILM
 from engine.calibration.pair_lines import WHAT_TO_DO, pair_lines
 from engine.text import printable
 
@@ -28,17 +29,20 @@ def report_lines(calibration: Calibration, *, keeps_doubtful: bool = False) -> l
     rig = found.rig
     n_all = len(rig) + len(calibration.missing)
     error = float(np.median(found.camera_errors_px))
+    what = "points" if found.board_frames is None else "corners of the board"
     lines = [
-        f"{len(rig)} of {n_all} cameras were found, from {len(found.points):,} points; sightings lie {error:.2f} px "
+        f"{len(rig)} of {n_all} cameras were found, from {len(found.points):,} {what}; sightings lie {error:.2f} px "
         f"from where their points land (median)."
     ]
     lines += [_camera_line(found, row) for row in range(len(rig))]
     lines += [_missing_line(missing.name, missing.reason) for missing in calibration.missing]
     if calibration.missing:
-        lines.append(WHAT_HELPS)
+        lines.append(WHAT_HELPS if found.board_frames is None else WHAT_TO_FILM)
     lines += [_scale_line(found), _up_line(found)]
     lines += [f"Note: {warning}" for warning in calibration.warnings]
-    if calibration.failure:
+    if calibration.failure and found.board_frames is not None:
+        lines.append(calibration.failure)
+    elif calibration.failure:
         lines += [calibration.failure, *map(printable, pair_lines(calibration.pairs)), WHAT_TO_DO]
     elif any(found.doubts):
         lines.append(_doubtful_line(found, keeps_doubtful=keeps_doubtful))
@@ -61,9 +65,11 @@ def _camera_line(found: CalibratedRig, row: int) -> str:
     ]
     lens = found.lenses[row]
     bend = f"{lens.model} {' '.join(f'{value:+.3f}' for value in lens.params)}"
+    seen = f"{n} points" if found.board_frames is None else f"board in {found.board_frames[row]} frames"
+    matches = "matches" if found.board_frames is None else "corners"
     text = (
-        f"{width}x{height}, focal length {K[0, 0]:.1f} px ({view:.0f} degrees), {bend}, {n} points, {error:.2f} px, "
-        f"{100 * found.explained_shares[row]:.0f} % of its matches explained"
+        f"{width}x{height}, focal length {K[0, 0]:.1f} px ({view:.0f} degrees), {bend}, {seen}, {error:.2f} px, "
+        f"{100 * found.explained_shares[row]:.0f} % of its {matches} explained"
     )
     return f"  {printable(found.rig.names[row])}: {text}" + (f" - {' and '.join(doubts)}" if doubts else "")
 
@@ -73,6 +79,8 @@ def _missing_line(name: str, reason: str) -> str:
 
 
 def _scale_line(found: CalibratedRig) -> str:
+    if found.board_frames is not None:
+        return "Size: in metres, by the board."
     if found.is_metric:
         return "Size: in metres, by the known distance."
     return "Size: unknown; one unit is not one metre. Give the distance between two cameras to get metres."
@@ -81,4 +89,6 @@ def _scale_line(found: CalibratedRig) -> str:
 def _up_line(found: CalibratedRig) -> str:
     if found.up == "floor":
         return "Up: away from the floor, the largest level surface found below the cameras."
+    if found.up == "board":
+        return "Up: away from the floor, on which the board lay for a while."
     return "Up: the upper edge of most cameras' pictures."

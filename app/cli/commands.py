@@ -107,6 +107,11 @@ COMMANDS = {
         "app.cli.captures.calibrate_command",
         "Nothing was written.",
     ),
+    "board": Command(
+        "write a calibration board to print, which `calibrate --board` looks for",
+        "app.cli.captures.board_command",
+        "Nothing was written.",
+    ),
     "synchronise": Command(
         "measure how far each camera is ahead of the others, and optionally correct it",
         "app.cli.captures.synchronise_command",

@@ -13,13 +13,14 @@ import numpy as np
 
 from engine.calibration.calibrated import Calibration
 from engine.calibration.options import CalibrationOptions
-from engine.calibration.videos import find_videos
+from engine.calibration.videos import MIN_CAMERAS, find_videos
 from engine.children.folder import child_folder
 from engine.children.kind import STALL_S, ChildFailed, ChildKind
 from engine.children.process import run_child
 from engine.errors import CaptureError, EngineError, PreparationError
 from engine.progress import Progress, ReportProgress
 
+MIN_BOARD_CAMERAS = 2
 FOLDER_PREFIX = "clipgstream-calibration-"
 
 
@@ -66,7 +67,7 @@ def calibrate(
         PreparationError: The cameras could not be found from these videos; says what helps.
         DiskError: There is no room for temporary files.
     """
-    names = [video.name for video in find_videos(folder, follow_links=follow_links)]
+    names = [video.name for video in find_videos(folder, follow_links=follow_links, least=least_cameras(options))]
     check_distance(options, names, folder)
     with child_folder(FOLDER_PREFIX, what="Temporary files of the calibration") as scratch:
         job = CalibrationJob(folder.absolute(), options, follow_links, scratch)
@@ -78,6 +79,11 @@ def calibrate(
         except EngineError as error:
             error.path = folder
             raise
+
+
+def least_cameras(options: CalibrationOptions) -> int:
+    """Cameras that are needed: a board says for two what pictures alone say for three."""
+    return MIN_CAMERAS if options.board is None else MIN_BOARD_CAMERAS
 
 
 def check_distance(options: CalibrationOptions, names: list[str], folder: Path) -> None:

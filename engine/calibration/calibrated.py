@@ -26,8 +26,9 @@ class CalibratedRig:
         explained_shares: Of the matches each camera has with others, found before there were cameras, those that the
             cameras explain; low where patterns repeat or a camera is misplaced. [C]
         doubts: Why the place of each camera cannot be trusted; empty for one that nothing speaks against.
-        is_metric: Whether units are metres, by a known distance.
-        up: The source of the up axis: "floor" or "cameras".
+        is_metric: Whether units are metres, by a known distance or a board.
+        up: The source of the up axis: "floor", "board", one that lay on the floor, or "cameras".
+        board_frames: Frames, of those looked at, in which each camera sees the board; None where there is none. [C]
     """
 
     rig: CameraRig
@@ -40,6 +41,7 @@ class CalibratedRig:
     doubts: tuple[str, ...]
     is_metric: bool
     up: str
+    board_frames: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True)

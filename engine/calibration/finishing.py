@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCamera
@@ -10,6 +12,7 @@ from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import FEW_MATCHES, PairCounts
 from engine.calibration.solving.agreement import MIN_AGREEING, MatchAgreement, agreement
 from engine.calibration.solving.cameras import Cameras
+from engine.calibration.solving.links import is_held
 from engine.calibration.solving.solving import CalibrationSolution
 from engine.calibration.solving.strain import is_strained
 from engine.calibration.solving.world import find_up, known_scale, unit_scale, upright
@@ -22,6 +25,10 @@ WEAK_SIGHTINGS = 60
 MAX_DOUBTFUL = 0.25
 """Share of the cameras that were found. Where matches contradict more, whole groups of cameras have been found in wrong
 places, and those that agree may be such a group."""
+FAR = (
+    "Neighbouring cameras are far apart; they were found from what moves, pair by pair. Directions may be off by 2 "
+    "degrees and positions by 3 % of the rig's radius; a board finds them exactly."
+)
 LENS_MODEL: dict[str, LensModel] = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
 """Names of engine.camera.lens."""
 
@@ -33,8 +40,10 @@ def finished(
     verified: dict[Pair, np.ndarray],
     sizes: np.ndarray,
     options: CalibrationOptions,
+    *,
+    is_far: bool = False,
 ) -> Calibration:
-    """The part of a solution to hand back."""
+    """The part of a solution to hand back. is_far: Whether cameras were joined pair by pair, being far apart."""
     rows, tracks, errors = solution.rows, solution.tracks, solution.errors
     names = [videos[row].name for row in rows]
     warnings: list[str] = []
@@ -45,16 +54,18 @@ def finished(
     cameras, points = upright(solution.cameras, tracks.points, up, origin, scale)
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
     agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
+    if is_far:
+        agreed = replace(agreed, held=is_held(agreed, tracks))
+        warnings.append(FAR)
     strained = is_strained(rows, solution.cameras, key_points, verified, sizes, agreed.is_firm)
     doubts = _doubts(names, n_sightings, agreed, strained)
     native = np.array([videos[row].size for row in rows], dtype=np.int64)
-    poses, Ks = _poses(cameras), _matrices(cameras, native / sizes[rows])
     found = CalibratedRig(
-        rig=CameraRig(tuple(names), poses, Ks, native),
-        lenses=tuple(Lens(LENS_MODEL[options.lens], tuple(row)) for row in cameras.lens_params.tolist()),
+        rig=CameraRig(tuple(names), poses(cameras), matrices(cameras, native / sizes[rows]), native),
+        lenses=lenses(cameras),
         points=points,
         point_errors_px=_means(errors, tracks.seen.points, len(points)),
-        camera_errors_px=_medians(errors, tracks.seen.cameras, len(rows)) * (native / sizes[rows])[:, 0],
+        camera_errors_px=medians(errors, tracks.seen.cameras, len(rows)) * (native / sizes[rows])[:, 0],
         n_sightings=n_sightings,
         explained_shares=agreed.shares,
         doubts=tuple(doubts),
@@ -117,13 +128,19 @@ def _scale(cameras: Cameras, points, names: list[str], options: CalibrationOptio
     return known_scale(cameras, names.index(known.first), names.index(known.second), known.metres), True
 
 
-def _poses(cameras: Cameras) -> np.ndarray:
+def lenses(cameras: Cameras) -> tuple[Lens, ...]:
+    """Their lenses as captures have them."""
+    return tuple(Lens(LENS_MODEL[cameras.lens], tuple(row)) for row in cameras.lens_params.tolist())
+
+
+def poses(cameras: Cameras) -> np.ndarray:
+    """World to camera. [C, 4, 4]"""
     poses = np.tile(np.eye(4), (len(cameras), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = cameras.rotations, cameras.translations
     return poses
 
 
-def _matrices(cameras: Cameras, ratios: np.ndarray) -> np.ndarray:
+def matrices(cameras: Cameras, ratios: np.ndarray) -> np.ndarray:
     """Intrinsics at the size of the videos; pixel centres lie at +0.5, so everything scales. [C, 3, 3]"""
     Ks = np.tile(np.eye(3), (len(cameras), 1, 1))
     focals, principal = cameras.focals_xy * ratios, cameras.principal * ratios
@@ -136,7 +153,8 @@ def _means(values: np.ndarray, groups: np.ndarray, n: int) -> np.ndarray:
     return np.bincount(groups, values, minlength=n) / np.maximum(np.bincount(groups, minlength=n), 1)
 
 
-def _medians(values: np.ndarray, groups: np.ndarray, n: int) -> np.ndarray:
+def medians(values: np.ndarray, groups: np.ndarray, n: int) -> np.ndarray:
+    """Of the values [N] of each of n groups [N]; infinite where one has none. [n]"""
     return np.array([np.median(values[groups == i]) if (groups == i).any() else np.inf for i in range(n)])
 
 

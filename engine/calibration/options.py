@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from engine.calibration.boards.board import Board
+
 Lens = Literal["simple", "opencv", "fisheye"]
 Up = Literal["floor", "cameras"]
 LENSES: dict[str, str] = {
@@ -18,6 +20,10 @@ UPS: dict[str, str] = {
     "cameras": "the upper edge of most cameras' pictures",
 }
 """Ways to find out which way is up."""
+WHAT_TO_FILM = (
+    "Carry the board slowly through the whole scene, hold it still here and there, and turn it to every two "
+    "neighbouring cameras, so that both see it at the same time."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +50,11 @@ class CalibrationOptions:
         distance: A measured distance that gives the scene its size in metres; without one the cameras stand about 3
             units from the middle of what they see.
         up: How the up axis is found, see UPS.
+        board: A board that all cameras film, and whose size is known; everything is found by it.
     """
 
     lens: Lens = "simple"
     is_lens_shared: bool = False
     distance: KnownDistance | None = None
     up: Up = "floor"
+    board: Board | None = None

@@ -11,9 +11,9 @@ FEW_MATCHES = 30
 """Fewer than so many do not join two cameras."""
 WHAT_TO_DO = (
     "Put neighbouring cameras closer together, less than about 20 degrees apart, so that they see the same finely "
-    "patterned things; docs/calibration.md explains what to film. Or calibrate with a board in "
-    "another program and open its files: TOML of Caliscope, Pose2Sim or anipose, intri.yml and extri.yml of EasyMocap, "
-    "COLMAP, transforms.json (docs/capture_formats.md)."
+    "patterned things, and let somebody walk through the whole scene while all film; docs/calibration.md explains what "
+    "to film. Or film a board and use --board. Or calibrate in another program and open its files: TOML of Caliscope, "
+    "Pose2Sim or anipose, intri.yml and extri.yml of EasyMocap, COLMAP, transforms.json (docs/capture_formats.md)."
 )
 
 

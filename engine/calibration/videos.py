@@ -36,14 +36,15 @@ class PlainVideo:
     fps: float
 
 
-def find_videos(folder: Path, *, follow_links: bool = False) -> list[PlainVideo]:
+def find_videos(folder: Path, *, follow_links: bool = False, least: int = MIN_CAMERAS) -> list[PlainVideo]:
     """The cameras of a folder in natural order: its video files, or folders of images where it has no videos.
 
     Args:
         folder: Of the videos.
         follow_links: Whether links in it may lead out of it.
+        least: Cameras that are needed.
     Raises:
-        CaptureError: The folder cannot be read, or has fewer than MIN_CAMERAS cameras, or files are damaged, or lie
+        CaptureError: The folder cannot be read, or has fewer cameras, or files are damaged, or lie
             elsewhere; lists every problem found.
     """
     if not folder.is_dir():
@@ -71,10 +72,10 @@ def find_videos(folder: Path, *, follow_links: bool = False) -> list[PlainVideo]
         text = f"Several files are called {', '.join(twice)}, apart from their suffix."
         problems.append(CaptureError(text, hint="Keep one file per camera.", path=folder))
     raise_problems(problems, folder)
-    if len(found) < MIN_CAMERAS:
+    if len(found) < least:
         words = "1 camera was" if len(found) == 1 else f"{len(found)} cameras were"
         raise CaptureError(
-            f"{words} found; at least {MIN_CAMERAS} are needed. In it: {folder_contents(folder)}.",
+            f"{words} found; at least {least} are needed. In it: {folder_contents(folder)}.",
             hint="Put one video file per camera into one folder, or one folder of images per camera.",
             path=folder,
         )

@@ -8,6 +8,7 @@ from app.calibration.job import CalibrationRequest, TimeLeft, run_calibration
 from app.cli.arguments import EXIT_FAILED, EXIT_OK, add_follow_links, path_argument
 from app.cli.terminal.progress import ProgressLine
 from app.training.service import Launch
+from engine.calibration.boards.board import read_board
 from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance
 from engine.errors import CaptureError
 from engine.progress import Progress
@@ -24,6 +25,18 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         type=path_argument,
         metavar="CAPTURE",
         help="folder that becomes the capture (default: the folder of the videos); only capture.json is written",
+    )
+    command.add_argument(
+        "--board",
+        metavar="BOARD",
+        help="calibrate by a board that all cameras film, such as charuco:7x5:0.04:0.03:4X4_50 (squares, side of a "
+        "square and of a marker in metres, markers) or chessboard:9x6:0.03 (inner corners); see `clipgstream board`",
+    )
+    command.add_argument(
+        "--recording",
+        type=path_argument,
+        metavar="VIDEOS",
+        help="folder of what the same cameras filmed before or after: it becomes the capture",
     )
     command.add_argument(
         "--lens",
@@ -56,9 +69,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream calibrate: find the cameras and write capture.json. Returns the exit code: 1 if places contradict."""
-    chosen = CalibrationOptions(options.lens, options.shared_lens, _distance(options.distance), options.up)
+    board = None if options.board is None else read_board(options.board)
+    chosen = CalibrationOptions(options.lens, options.shared_lens, _distance(options.distance), options.up, board)
     request = CalibrationRequest(
-        options.videos, options.out, chosen, options.replace, options.keep_doubtful, options.follow_links
+        options.videos,
+        options.out,
+        chosen,
+        options.replace,
+        options.keep_doubtful,
+        options.follow_links,
+        options.recording,
     )
     line, left, seen = ProgressLine(is_quiet=options.quiet), TimeLeft(), Progress("Starting", 0.0)
 

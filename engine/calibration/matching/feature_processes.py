@@ -26,18 +26,21 @@ LOOKING = arrays_kind(
 _may_begin = Semaphore(MAX_PROCESSES)
 
 
-def key_points(pictures: CameraPictures, name: str, advance: Callable[[float], None] = lambda _: None) -> KeyPoints:
+def key_points(
+    pictures: CameraPictures, name: str, advance: Callable[[float], None] = lambda _: None, *, is_thorough: bool = False
+) -> KeyPoints:
     """Key points of background and moving parts; see engine.calibration.matching.features. Called by several threads.
 
     Args:
         pictures: Of one camera.
         name: Of the camera, for messages.
         advance: Called several times a second with the share done since its last call, which is a guess.
+        is_thorough: See `extract`.
     Raises:
         PreparationError: The process gave no result.
         DiskError: There is no room for what it reads.
     """
-    arrays = {"background": pictures.background}
+    arrays = {"background": pictures.background, "is_thorough": np.array(is_thorough)}
     arrays["moments"] = np.array([part.moment for part in pictures.moving], dtype=np.int64)
     arrays["corners"] = np.array([part.corner for part in pictures.moving], dtype=np.int64).reshape(-1, 2)
     for row, part in enumerate(pictures.moving):

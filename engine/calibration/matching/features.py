@@ -18,7 +18,7 @@ PEAK = 0.004
 """Least contrast of a key point: below pycolmap's own, since rooms have plain walls."""
 
 
-def extract(pictures: CameraPictures) -> KeyPoints:
+def extract(pictures: CameraPictures, *, is_thorough: bool = False) -> KeyPoints:
     """Key points of background and moving parts, moment after moment.
 
     Backgrounds get affine shapes and descriptors pooled over sizes, which find three times as many right matches
@@ -26,12 +26,13 @@ def extract(pictures: CameraPictures) -> KeyPoints:
 
     Args:
         pictures: Of one camera.
+        is_thorough: Whether moving parts get careful ones, too: for cameras far apart.
     """
     found = [_key_points(_extractor(MAX_KEY_POINTS, is_careful=True), pictures.background)]
     moments = [np.zeros(len(found[0][0]), dtype=np.int64)]
-    plain = _extractor(MAX_MOVING_KEY_POINTS, is_careful=False) if pictures.moving else None
+    of_parts = _extractor(MAX_MOVING_KEY_POINTS, is_careful=is_thorough) if pictures.moving else None
     for part in pictures.moving:
-        pixels, descriptors = _key_points(plain, part.picture)
+        pixels, descriptors = _key_points(of_parts, part.picture)
         columns, rows = pixels.astype(np.int64).T if len(pixels) else np.zeros((2, 0), np.int64)
         height, width = part.is_moving.shape
         is_kept = part.is_moving[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]

@@ -23,7 +23,8 @@ def look(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.ndarray]:
         MovingPart(int(moment), arrays[f"picture{row}"], (int(corner[0]), int(corner[1])), arrays[f"is_moving{row}"])
         for row, (moment, corner) in enumerate(zip(arrays["moments"], arrays["corners"], strict=True))
     ]
-    found = extract(CameraPictures(arrays["background"], tuple(parts)))
+    is_thorough = bool(arrays["is_thorough"])
+    found = extract(CameraPictures(arrays["background"], tuple(parts)), is_thorough=is_thorough)
     return {"pixels": found.pixels, "moments": found.moments, "descriptors": found.descriptors}
 
 

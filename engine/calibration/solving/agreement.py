@@ -39,10 +39,13 @@ class MatchAgreement:
     Attributes:
         n_matches: Of every two cameras. [C, C]
         n_explained: Those the cameras explain. [C, C]
+        held: Cameras that hold together by another rule, see engine.calibration.solving.links; None for that of
+            `is_placed`. [C]
     """
 
     n_matches: np.ndarray
     n_explained: np.ndarray
+    held: np.ndarray | None = None
 
     @property
     def shares(self) -> np.ndarray:
@@ -69,6 +72,8 @@ class MatchAgreement:
 
         In a chain of pairs each can be as far from the next as it likes; three cameras that all agree cannot.
         """
+        if self.held is not None:
+            return self.held
         firm = self.is_firm.astype(np.int64)
         links = (firm > 0) & (firm @ firm > 0)
         _, groups = connected_components(links, directed=False)

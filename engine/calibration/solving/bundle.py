@@ -1,12 +1,14 @@
-"""Bundle adjustment: cameras and points together, so that points land where they were seen.
+"""Bundle adjustment: cameras and what they see together, so that points land where they were seen.
 
 Robust (Cauchy) residuals in pixels, expectations for what pictures say little about (principal point, lens numbers),
-lens numbers shared among cameras or not. Levenberg-Marquardt with the points eliminated; deterministic.
+lens numbers shared among cameras or not. Levenberg-Marquardt with points, or places of a rigid thing, eliminated;
+deterministic.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from scipy import sparse
@@ -36,6 +38,7 @@ class Expectations:
         lens: Of each number of the lens from 0.
         groups: A number per camera; those with the same number have one focal length, principal point and lens. None
             gives every camera its own.
+        is_lens_kept: Whether focal lengths, principal points and lenses stay as they are at the start.
     """
 
     principal: float = 0.01
@@ -43,6 +46,7 @@ class Expectations:
     aspect: float = 0.003
     lens: float = 0.2
     groups: tuple[int, ...] | None = None
+    is_lens_kept: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +77,86 @@ def errors_px(cameras: Cameras, points: np.ndarray, seen: Observations) -> np.nd
     return np.where(depths > 1e-9, np.linalg.norm(pixels - seen.pixels, axis=-1), np.inf)
 
 
+class Shape(Protocol):
+    """What cameras see, as blocks of numbers that are sought."""
+
+    @property
+    def points(self) -> np.ndarray:
+        """Points in the world. [M, 3]"""
+        ...
+
+    def owners(self, rows: np.ndarray) -> np.ndarray:
+        """The block that each of these points belongs to. [N]"""
+        ...
+
+    def derivatives(self, by_points: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Derivatives of pixels [N, 2, 3] by these points as derivatives by the numbers of their block. [N, 2, D]"""
+        ...
+
+    def moved(self, step: np.ndarray) -> Self:
+        """With a step [blocks, D] subtracted from the numbers."""
+        ...
+
+
+AnyShape = TypeVar("AnyShape", bound=Shape)
+
+
+@dataclass(frozen=True, slots=True)
+class FreePoints:
+    """Points that may lie anywhere, each for itself. points: [M, 3]"""
+
+    points: np.ndarray
+
+    def owners(self, rows: np.ndarray) -> np.ndarray:
+        """Each is its own block."""
+        return rows
+
+    def derivatives(self, by_points: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """As they are."""
+        return by_points
+
+    def moved(self, step: np.ndarray) -> FreePoints:
+        """step: [M, 3]"""
+        return FreePoints(self.points - step)
+
+
+@dataclass(frozen=True, slots=True)
+class RigidPlaces:
+    """One thing of known shape in several places.
+
+    Attributes:
+        corners: Its points. [K, 3]
+        rotations, translations: From it to the world. [B, 3, 3], [B, 3]
+    """
+
+    corners: np.ndarray
+    rotations: np.ndarray
+    translations: np.ndarray
+
+    @property
+    def points(self) -> np.ndarray:
+        """Its points in all places, place after place. [B K, 3]"""
+        return (self.corners @ self.rotations.transpose(0, 2, 1) + self.translations[:, None]).reshape(-1, 3)
+
+    def owners(self, rows: np.ndarray) -> np.ndarray:
+        """The place of each point."""
+        return rows // len(self.corners)
+
+    def derivatives(self, by_points: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """By turning it about its own origin, and by moving it. [N, 2, 6]"""
+        turned = np.einsum("nij,nj->ni", self.rotations[self.owners(rows)], self.corners[rows % len(self.corners)])
+        return np.concatenate([by_points @ -skew(turned), by_points], axis=-1)
+
+    def moved(self, step: np.ndarray) -> RigidPlaces:
+        """step: [B, 6]"""
+        return replace(
+            self, rotations=rotation_of(-step[:, :3]) @ self.rotations, translations=self.translations - step[:, 3:]
+        )
+
+
 def adjust(
     cameras: Cameras,
-    points: np.ndarray,
+    shape: AnyShape,
     seen: Observations,
     *,
     middles: np.ndarray,
@@ -83,52 +164,54 @@ def adjust(
     expect: Expectations,
     focals: np.ndarray | None = None,
     n_iterations: int = 30,
-) -> tuple[Cameras, np.ndarray]:
-    """Cameras and points with the least robust error.
+) -> tuple[Cameras, AnyShape]:
+    """Cameras and what they see with the least robust error.
 
     Args:
         cameras: The start.
-        points: The start. [M, 3]
-        seen: Every point is seen at least twice.
+        shape: The start of what they see.
+        seen: Every free point is seen at least twice, every place at least once.
         middles, widths: Of the pictures, px. [C, 2], [C]
         expect: Expectations about the lenses.
         focals: Focal lengths that are expected, px; None expects those of the start. [C]
     Returns:
-        Cameras and points [M, 3].
+        Cameras and shape.
     """
     n_cameras, n_params = len(cameras), 10 + cameras.lens_params.shape[1]
-    share = _sharing(n_cameras, n_params, expect.groups)
+    share = _sharing(n_cameras, n_params, expect.groups, is_lens_kept=expect.is_lens_kept)
     start_focals = np.log(cameras.focals if focals is None else focals)
     stiffness = _stiffness(n_params, widths, expect)
+    owners = shape.owners(seen.points)
     damping = 1e-4
-    residuals, scale = _residuals(cameras, points, seen), 0.0
+    residuals, scale = _residuals(cameras, shape.points, seen), 0.0
     for _ in range(n_iterations):
         lengths = np.linalg.norm(residuals, axis=-1)
         scale = max(1.5 * float(np.median(lengths)), MIN_SCALE_PX)
         weights = 1.0 / (1.0 + (lengths / scale) ** 2)
-        J_cameras, J_points = _jacobians(cameras, points, seen)
+        J_cameras, J_points = _jacobians(cameras, shape.points, seen)
+        J_shape = shape.derivatives(J_points, seen.points)
         root = np.sqrt(weights)[:, None]
-        A, B, target = J_cameras * root[..., None], J_points * root[..., None], residuals * root
+        A, B, target = J_cameras * root[..., None], J_shape * root[..., None], residuals * root
         expected = _expected(cameras, start_focals, middles, n_params)
-        system = _System(A, B, target, seen, n_cameras, len(points), share)
+        system = _System(A, B, target, seen.cameras, owners, n_cameras, share)
         system.expect(scale**2 * stiffness, expected)
         before = _cost(residuals, expected, stiffness, scale)
         for _ in range(6):
             step = system.step(damping)
             moved = _moved(cameras, step[0].reshape(n_cameras, n_params))
-            moved_points = points - step[1]
-            new_residuals = _residuals(moved, moved_points, seen)
+            moved_shape = shape.moved(step[1])
+            new_residuals = _residuals(moved, moved_shape.points, seen)
             after = _cost(new_residuals, _expected(moved, start_focals, middles, n_params), stiffness, scale)
             if after < before:
                 break
             damping = min(damping * 10, 1e6)
         else:
             break
-        cameras, points, residuals = moved, moved_points, new_residuals
+        cameras, shape, residuals = moved, moved_shape, new_residuals
         damping = max(damping / 5, 1e-9)
         if before - after < 1e-6 * before:
             break
-    return cameras, points
+    return cameras, shape
 
 
 def _residuals(cameras: Cameras, points: np.ndarray, seen: Observations) -> np.ndarray:
@@ -162,8 +245,11 @@ def _expected(cameras: Cameras, start_focals: np.ndarray, middles: np.ndarray, n
     return off
 
 
-def _sharing(n_cameras: int, n_params: int, groups: tuple[int, ...] | None) -> sparse.csr_matrix:
+def _sharing(n_cameras: int, n_params: int, groups: tuple[int, ...] | None, *, is_lens_kept: bool) -> sparse.csr_matrix:
     """Maps the numbers that are sought to all numbers of all cameras. [C P, Q]"""
+    if is_lens_kept:
+        is_pose = np.tile(np.arange(n_params) < 6, n_cameras)
+        return sparse.csr_matrix(np.eye(n_cameras * n_params)[:, is_pose])
     if groups is None:
         return sparse.csr_matrix(sparse.identity(n_cameras * n_params))
     n_lens = n_params - 6
@@ -204,32 +290,36 @@ def _sums(values: np.ndarray, groups: np.ndarray, n_groups: int) -> np.ndarray:
 
 
 class _System:
-    """The normal equations of one iteration, by blocks: cameras [C P], points [M, 3], and what joins them.
+    """The normal equations of one iteration, by blocks: cameras [C P], what they see [M, D], and what joins them.
 
     Args:
-        A, B: Derivatives of weighted residuals by cameras and points. [N, 2, P], [N, 2, 3]
+        A, B: Derivatives of weighted residuals by cameras and by blocks of what they see. [N, 2, P], [N, 2, D]
         target: Weighted residuals. [N, 2]
-        seen: Of which each camera sees a point at most once.
+        cameras, owners: Camera and block of each. [N]
+        n_cameras: C
         share: Maps what is sought to all numbers of all cameras.
     """
 
-    def __init__(self, A, B, target, seen: Observations, n_cameras: int, n_points: int, share) -> None:
-        n_params = A.shape[2]
+    def __init__(self, A, B, target, cameras: np.ndarray, owners: np.ndarray, n_cameras: int, share) -> None:
+        n_params, n_block = A.shape[2], B.shape[2]
+        n_blocks = int(owners.max()) + 1
         self._share, self._size = share, n_cameras * n_params
         self._H, self._g = np.zeros((self._size, self._size)), np.zeros(self._size)
         for camera in range(n_cameras):
-            rows = np.flatnonzero(seen.cameras == camera)
+            rows = np.flatnonzero(cameras == camera)
             place = slice(camera * n_params, (camera + 1) * n_params)
             of_camera = A[rows].reshape(-1, n_params)
             self._H[place, place] = of_camera.T @ of_camera
             self._g[place] = of_camera.T @ target[rows].reshape(-1)
-        self._V = _sums(np.einsum("nki,nkj->nij", B, B).reshape(-1, 9), seen.points, n_points).reshape(-1, 3, 3)
-        self._g_points = _sums(np.einsum("nki,nk->ni", B, target), seen.points, n_points)
-        rows = seen.cameras[:, None, None] * n_params + np.arange(n_params)[:, None]
-        columns = seen.points[:, None, None] * 3 + np.arange(3)
+        squares = np.einsum("nki,nkj->nij", B, B).reshape(-1, n_block**2)
+        self._V = _sums(squares, owners, n_blocks).reshape(-1, n_block, n_block)
+        self._g_blocks = _sums(np.einsum("nki,nk->ni", B, target), owners, n_blocks)
+        rows = cameras[:, None, None] * n_params + np.arange(n_params)[:, None]
+        columns = owners[:, None, None] * n_block + np.arange(n_block)
         joints = np.einsum("nki,nkj->nij", A, B)
         places = (np.broadcast_to(place, joints.shape).reshape(-1) for place in (rows, columns))
-        self._joints = sparse.csr_matrix((joints.reshape(-1), tuple(places)), shape=(self._size, 3 * n_points))
+        shape = (self._size, n_block * n_blocks)
+        self._joints = sparse.csr_matrix((joints.reshape(-1), tuple(places)), shape=shape)
 
     def expect(self, stiffness: np.ndarray, expected: np.ndarray) -> None:
         """Add what is expected of cameras: both [C, P]."""
@@ -237,20 +327,21 @@ class _System:
         self._g += (stiffness * expected).reshape(-1)
 
     def step(self, damping: float) -> tuple[np.ndarray, np.ndarray]:
-        """The step to subtract from the numbers of the cameras [C P] and from the points [M, 3]."""
+        """The step to subtract from the numbers of the cameras [C P] and from the blocks [M, D]."""
+        n_blocks, n_block = self._g_blocks.shape
         diagonal = np.maximum(np.einsum("mii->mi", self._V), 1e-9)
-        inverse = np.linalg.inv(self._V + damping * diagonal[:, :, None] * np.eye(3))
-        blocks = (inverse, np.arange(len(inverse)), np.arange(len(inverse) + 1))
-        weighted = self._joints @ sparse.bsr_matrix(blocks, shape=(3 * len(inverse), 3 * len(inverse)))
+        inverse = np.linalg.inv(self._V + damping * diagonal[:, :, None] * np.eye(n_block))
+        blocks = (inverse, np.arange(n_blocks), np.arange(n_blocks + 1))
+        weighted = self._joints @ sparse.bsr_matrix(blocks, shape=(n_block * n_blocks, n_block * n_blocks))
         H = self._H - (weighted @ self._joints.T).toarray()
-        g = self._g - weighted @ self._g_points.reshape(-1)
+        g = self._g - weighted @ self._g_blocks.reshape(-1)
         reduced = self._share.T @ (self._share.T @ H.T).T
         size = 1 / np.sqrt(np.maximum((self._share.T @ (self._share.T @ self._H).T).diagonal(), 1e-12))
         scaled = reduced * size[:, None] * size + max(damping, 1e-9) * np.eye(len(size))
         sought = size * np.linalg.solve(scaled, size * (self._share.T @ g))
         cameras_step = self._share @ sought
-        points_right = self._g_points - (self._joints.T @ cameras_step).reshape(-1, 3)
-        return cameras_step, np.einsum("mij,mj->mi", inverse, points_right)
+        blocks_right = self._g_blocks - (self._joints.T @ cameras_step).reshape(n_blocks, n_block)
+        return cameras_step, np.einsum("mij,mj->mi", inverse, blocks_right)
 
 
 def _moved(cameras: Cameras, step: np.ndarray) -> Cameras:

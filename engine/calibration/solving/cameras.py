@@ -65,6 +65,16 @@ class Cameras:
         return undistort(self.lens, seen, np.broadcast_to(self.lens_params[row], (len(seen), N_LENS[self.lens])))
 
 
+def with_lens(cameras: Cameras, lens: str) -> Cameras:
+    """The same cameras with the numbers of another lens model, those that both have taken over."""
+    if cameras.lens == lens:
+        return cameras
+    params = np.zeros((len(cameras), N_LENS[lens]))
+    n_both = min(params.shape[1], cameras.lens_params.shape[1])
+    params[:, :n_both] = cameras.lens_params[:, :n_both]
+    return replace(cameras, lens=lens, lens_params=params)
+
+
 def safe_depth(depths: np.ndarray) -> np.ndarray:
     """Depths kept away from 0, with their sign."""
     return np.where(np.abs(depths) > 1e-9, depths, 1e-9)

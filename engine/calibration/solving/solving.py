@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.calibration.matching.matching import KeyPoints, Pair, all_pairs
-from engine.calibration.solving.bundle import Expectations, adjust, errors_px
-from engine.calibration.solving.cameras import N_LENS, Cameras
+from engine.calibration.solving.bundle import Expectations, FreePoints, adjust, errors_px
+from engine.calibration.solving.cameras import Cameras, with_lens
 from engine.calibration.solving.mapping import FirstEstimate
 from engine.calibration.solving.tracks import Tracks, build_tracks, cleaned, fitting_matches
 
@@ -97,7 +97,7 @@ def solve(
     for number, stage in enumerate(stages):
         reach_px = max(stage.reach_px * per_640, MIN_REACH_PX)
         if stage.is_last:
-            cameras = _with_lens(cameras, lens)
+            cameras = with_lens(cameras, lens)
         tracks = build_tracks(fitting_matches(known, chosen, cameras, reach_px), chosen, cameras, reach_px)
         if len(tracks.points) < len(rows):
             break
@@ -107,9 +107,9 @@ def solve(
             expect = replace(expect, focal=0.5 if is_common else ALIKE)
         if is_common:
             expect = replace(expect, principal=0.0, aspect=1e-6)
-        cameras, points = adjust(
+        cameras, shape = adjust(
             cameras,
-            tracks.points,
+            FreePoints(tracks.points),
             tracks.seen,
             middles=middles,
             widths=widths,
@@ -117,19 +117,9 @@ def solve(
             focals=_medians(cameras.focals, groups) if estimate.are_alike else None,
             n_iterations=N_ITERATIONS,
         )
-        tracks = cleaned(cameras, points, tracks.seen, reach_px)
+        tracks = cleaned(cameras, shape.points, tracks.seen, reach_px)
         progress((number + 1) / len(stages))
     return CalibrationSolution(rows, cameras, tracks, estimate.are_alike)
-
-
-def _with_lens(cameras: Cameras, lens: str) -> Cameras:
-    """The same cameras with the numbers of another lens model, those that both have taken over."""
-    if cameras.lens == lens:
-        return cameras
-    params = np.zeros((len(cameras), N_LENS[lens]))
-    n_both = min(params.shape[1], cameras.lens_params.shape[1])
-    params[:, :n_both] = cameras.lens_params[:, :n_both]
-    return replace(cameras, lens=lens, lens_params=params)
 
 
 def _with_one_lens(cameras: Cameras, groups: np.ndarray) -> Cameras:

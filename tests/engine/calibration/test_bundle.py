@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.calibration.solving.bundle import Expectations, Observations, _jacobians, adjust, errors_px
+from engine.calibration.solving.bundle import Expectations, FreePoints, Observations, _jacobians, adjust, errors_px
 from engine.calibration.solving.cameras import Cameras, rotation_of
 from tests.engine.calibration.made_rigs import SIZE, Seen, make_seen, off_truth, rough
 
@@ -14,15 +14,16 @@ def adjusted(seen: Seen, lens: str, **expect) -> tuple[Cameras, np.ndarray]:
     start = rough(seen.truth, lens)
     points = seen.points + np.random.default_rng(3).normal(0, 0.05, seen.points.shape)
     n = len(start)
-    return adjust(
+    cameras, shape = adjust(
         start,
-        points,
+        FreePoints(points),
         seen.sightings,
         middles=np.tile(np.array(SIZE) / 2.0, (n, 1)),
         widths=np.full(n, float(SIZE[0])),
         expect=Expectations(**expect),
         n_iterations=20,
     )
+    return cameras, shape.points
 
 
 @pytest.mark.slow

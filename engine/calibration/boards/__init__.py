@@ -1,0 +1,1 @@
+"""Calibration by a board of known size that all cameras film."""

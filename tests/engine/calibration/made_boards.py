@@ -1,0 +1,125 @@
+"""Boards that move in front of known cameras: what the cameras see of them, as sightings and as pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from app.lab.synthetic.rigs import looking_at
+from engine.calibration.boards.board import Board, charuco_board
+from engine.calibration.boards.detection import BoardView
+from engine.calibration.solving.cameras import Cameras, rotation_of
+
+SIZE = (960, 720)
+BOARD = Board(7, 5, 0.06, 0.045, "4X4_50")
+PX_PER_SQUARE = 96
+MARGIN = 0.5
+"""Of white around a printed board, in squares."""
+MAX_TILT = 0.3
+"""Least cosine between a board and a ray at which its markers are read."""
+
+
+def ring(n_cameras: int, *, lens: Sequence[float] = (-0.12, 0.03, 0.001, -0.0005), seed: int = 0) -> Cameras:
+    """Cameras around a place of 1.6 m radius, each with another lens; half of them face the other half."""
+    generator = np.random.default_rng(seed)
+    angles = 2 * np.pi * np.arange(n_cameras) / n_cameras
+    centers = np.stack([1.6 * np.cos(angles), 1.6 * np.sin(angles), 1.3 + 0.4 * (np.arange(n_cameras) % 2)], axis=-1)
+    poses = np.array([looking_at(center, np.array([0, 0, 0.9])) for center in centers])
+    return Cameras(
+        "opencv",
+        poses[:, :3, :3],
+        poses[:, :3, 3],
+        760 * generator.uniform(0.95, 1.05, n_cameras),
+        np.exp(generator.normal(0, 0.002, n_cameras)),
+        np.array(SIZE) / 2 + generator.normal(0, 6, (n_cameras, 2)),
+        np.tile(lens, (n_cameras, 1)) * generator.uniform(0.8, 1.2, (n_cameras, 1)),
+    )
+
+
+def held_boards(n_moments: int, *, late: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A board that somebody carries around and shows to all sides: rotations and translations to the world.
+
+    Args:
+        n_moments: In which it is turned around two times and a half.
+        late: In moments.
+    Returns:
+        [B, 3, 3], [B, 3]
+    """
+    turn = 2 * np.pi * 2.5 * (np.arange(n_moments) - late) / (n_moments - 1)
+    outward = np.stack([np.cos(turn), np.sin(turn), 0.35 + 0.5 * np.sin(1.7 * turn)], axis=-1)
+    outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
+    rotations = []
+    for face in outward:
+        x = np.cross([0, 0, 1.0], face)
+        x /= np.linalg.norm(x)
+        rotations.append(np.stack([x, -np.cross(face, x), -face], axis=-1))
+    tilts = rotation_of(0.4 * np.sin(turn[:, None] * [1.9, 1.3, 2.3] + np.arange(3.0)))
+    middles = np.stack([0.35 * np.cos(1.3 * turn), 0.35 * np.sin(0.7 * turn), 0.9 + 0.35 * np.sin(1.1 * turn)], axis=-1)
+    turned = tilts @ np.array(rotations)
+    middle = BOARD.corners.mean(0)
+    return turned, middles - turned @ middle
+
+
+def views_of(
+    cameras: Cameras, rotations: np.ndarray, translations: np.ndarray, *, noise_px: float = 0.08, seed: int = 2
+) -> list[dict[int, BoardView]]:
+    """What cameras see of the front of a board, with noise; views that are cut off by the picture's edge in part."""
+    generator = np.random.default_rng(seed)
+    moments: list[dict[int, BoardView]] = []
+    for rotation, translation in zip(rotations, translations, strict=True):
+        points, moment = BOARD.corners @ rotation.T + translation, {}
+        for row in range(len(cameras)):
+            pixels, depths = cameras.pixels(np.full(len(points), row), points)
+            to_camera = cameras.centers[row] - points.mean(0)
+            is_front = -rotation[:, 2] @ to_camera > MAX_TILT * np.linalg.norm(to_camera)
+            is_seen = (depths > 0.1) & (pixels > 4).all(1) & (pixels < np.array(SIZE) - 4).all(1)
+            if is_front and is_seen.sum() >= 8:
+                rows = np.flatnonzero(is_seen)
+                moment[row] = BoardView(rows, pixels[rows] + generator.normal(0, noise_px, (len(rows), 2)))
+        moments.append(moment)
+    return moments
+
+
+class BoardPictures:
+    """Pictures of one camera.
+
+    Args:
+        cameras: Known ones.
+        row: Which of them.
+        board: The printed board.
+    """
+
+    def __init__(self, cameras: Cameras, row: int, board: Board = BOARD) -> None:
+        self._cameras, self._row, self._board = cameras, row, board
+        width, height = SIZE
+        x, y = np.meshgrid((np.arange(2 * width) + 0.5) / 2, (np.arange(2 * height) + 0.5) / 2)
+        plane = cameras.plane(row, np.stack([x.reshape(-1), y.reshape(-1)], axis=-1))
+        self._rays = np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
+        size = (board.columns * PX_PER_SQUARE, board.rows * PX_PER_SQUARE)
+        printed = charuco_board(board).generateImage(size)
+        margin = round(MARGIN * PX_PER_SQUARE)
+        self._printed = np.pad(printed, margin, constant_values=255)
+
+    def picture(self, rotation: np.ndarray, translation: np.ndarray, *, seed: int = 0) -> np.ndarray:
+        """The board in front of grey, blurred a little, with noise. [H, W, 3] uint8"""
+        turn = self._cameras.rotations[self._row] @ rotation
+        shift = self._cameras.rotations[self._row] @ translation + self._cameras.translations[self._row]
+        on_board = self._rays @ np.linalg.inv(np.column_stack([turn[:, 0], turn[:, 1], shift])).T
+        is_front = (on_board[:, 2] > 0) & (turn[:, 2] @ shift > 0)
+        scale = PX_PER_SQUARE / self._board.square_m
+        places = np.where(is_front[:, None], on_board[:, :2] / on_board[:, 2:] * scale + MARGIN * PX_PER_SQUARE, -1e4)
+        width, height = SIZE
+        grid = np.clip(places - 0.5, -1e4, 1e4).astype(np.float32).reshape(2 * height, 2 * width, 2)
+        fine = cv2.remap(
+            self._printed,
+            grid[..., 0],
+            grid[..., 1],
+            cv2.INTER_AREA,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(110,),
+        )
+        coarse = cv2.GaussianBlur(fine.reshape(height, 2, width, 2).mean((1, 3)), (0, 0), 0.7)
+        noisy = 20 + 0.8 * coarse + np.random.default_rng(seed).normal(0, 3, coarse.shape)
+        return np.repeat(np.clip(noisy, 0, 255).astype(np.uint8)[..., None], 3, axis=-1)
