@@ -19,6 +19,8 @@ LENGTHS = (3, 4, 3, 2)
 """Frames of the clips: the first one as it is; one with hidden and further rows, and light that changes evenly; one
 with light that flickers; one in which what stands still does not."""
 N_FRAMES = sum(LENGTHS)
+FLOOR, METERS_PER_UNIT = -1.5, 0.7
+"""How far up the ground is, scene units, and the length of one."""
 SIZE = (160, 120)
 
 
@@ -98,6 +100,7 @@ def header(*, title: str = "A scene", names: Sequence[str] = ("a", "b", "c", "d"
         "background": list(BACKGROUND),
         "up": [0.0, -1.0, 0.0],
         "radius": 4.0,
+        "stage": {"floor": FLOOR, "meters_per_unit": METERS_PER_UNIT},
         "home": home,
         "cameras": cameras,
         "clips": [],

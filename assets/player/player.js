@@ -27,6 +27,7 @@ class Player {
       onPicture: (answer) => this.take(answer),
       onNotice: (text) => notify(text),
     });
+    this.headset = new Headset(this, document.getElementById("headset"));
     this.fillControls();
     followPointer(this.canvas, this.view, () => this.moved());
     const table = keyTable(this);
@@ -78,11 +79,16 @@ class Player {
     this.changed();
   }
 
-  tick(nowMs) {
-    this.scheduled = 0;
+  passTime(nowMs) {
     this.clock.tell(nowMs, this.pictures.isWaitingFor(this.stored(this.clock.frame)));
     for (const name of ["shown", "onScreen"]) // the same picture may come several times
       if (this[name] !== null && this.stored(this[name]) === this.stored(this.clock.frame)) this[name] = this.clock.frame;
+  }
+
+  tick(nowMs) {
+    this.scheduled = 0;
+    if (this.headset.session) return; // which has its own pace
+    this.passTime(nowMs);
     const isReady = this.renderer.isDone();
     if (isReady) {
       const isMoving = this.clock.isPlaying || performance.now() - this.movedMs < REST_MS;

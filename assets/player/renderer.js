@@ -24,6 +24,7 @@ class Renderer {
     this.targetFormat = hasFloats ? gl.RGBA16F : gl.RGBA8; // many faint layers drift in 8 bits
     this.splats = this.program("splat.vert", "splat.frag");
     this.present = this.program("resolve.vert", "present.frag");
+    this.marks = this.program("mark.vert", "mark.frag");
     this.geometry = this.texture(gl.RGBA32F, TEXELS_PER_ROW * ROWS_PER_LINE, this.nLines);
     this.colors = this.texture(gl.RGBA32F, ROWS_PER_LINE, this.nLines);
     this.target = this.fence = null;
@@ -40,6 +41,13 @@ class Renderer {
     this.corners = gl.createBuffer(); // two triangles for each Gaussian, in plain triangles: instances are slow in software
     this.nCorners = 0;
     this.nothing = gl.createVertexArray();
+    this.strip = gl.createVertexArray();
+    this.stripPlaces = gl.createBuffer();
+    gl.bindVertexArray(this.strip);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.stripPlaces);
+    const place = gl.getAttribLocation(this.marks.program, "place");
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 0, 0);
     gl.disable(gl.DEPTH_TEST);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
   }
@@ -105,16 +113,18 @@ class Renderer {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, firstLine, width, height, gl.RGBA, gl.FLOAT, values);
   }
 
-  /** Fit the picture to the canvas. */
-  resize() {
-    const { gl, canvas } = this;
-    if (this.size[0] === canvas.width && this.size[1] === canvas.height) return;
-    this.size = [canvas.width, canvas.height];
+  /** Have a picture so wide and high to draw into. */
+  resize(width, height) {
+    const { gl } = this;
+    if (this.size[0] === width && this.size[1] === height) return;
+    this.size = [width, height];
     if (this.target) {
       gl.deleteTexture(this.target.texture);
       gl.deleteFramebuffer(this.target.framebuffer);
     }
-    const texture = this.texture(this.targetFormat, ...this.size), framebuffer = gl.createFramebuffer();
+    const texture = this.texture(this.targetFormat, width, height), framebuffer = gl.createFramebuffer();
+    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.LINEAR);
+    for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, axis, gl.CLAMP_TO_EDGE);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
     this.target = { texture, framebuffer };
@@ -133,46 +143,74 @@ class Renderer {
   }
 
   /**
-   * lens: {worldToCamera: 16 numbers by rows, focal: [2], center: [2]} in pixels of the canvas; near: scene units;
-   * isFull: whether the canvas has all pixels of the screen, so that fullMs is how long such a picture takes. */
+   * Draw onto the canvas. lens: {worldToCamera: 16 numbers by rows, focal: [2], center: [2]} in pixels of the canvas; near:
+   * scene units; isFull: whether the canvas has all pixels of the screen, so that fullMs is how long such a picture takes. */
   draw(lens, near, isFull = true) {
-    const { gl, splats, present } = this;
-    this.resize();
-    const [width, height] = this.size;
+    const { gl, canvas } = this;
+    this.paint(lens, near, [canvas.width, canvas.height]);
+    this.put(null, { x: 0, y: 0, width: canvas.width, height: canvas.height });
+    this.isFull = isFull;
+    this.begunMs = performance.now();
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+  }
+
+  /** Draw a picture so wide and high, which is then put somewhere. */
+  paint(lens, near, [width, height]) {
+    const { gl, splats } = this;
+    this.resize(width, height);
     gl.viewport(0, 0, width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.framebuffer);
     gl.clearColor(...this.background, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    if (this.nDrawn) {
-      gl.useProgram(splats.program);
-      gl.enable(gl.BLEND);
-      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      gl.activeTexture(gl.TEXTURE1);
-      gl.bindTexture(gl.TEXTURE_2D, this.colors);
-      gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, this.geometry);
-      gl.uniform1i(splats.at("geometry"), 0);
-      gl.uniform1i(splats.at("colors"), 1);
-      gl.uniformMatrix4fv(splats.at("world_to_camera"), true, lens.worldToCamera);
-      gl.uniform2fv(splats.at("focal_px"), lens.focal);
-      gl.uniform2fv(splats.at("center_px"), lens.center);
-      gl.uniform2f(splats.at("size_px"), width, height);
-      gl.uniform1f(splats.at("near"), near);
-      gl.bindVertexArray(this.quads);
-      gl.drawElements(gl.TRIANGLES, 6 * this.nDrawn, gl.UNSIGNED_INT, 0);
-    }
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    if (!this.nDrawn) return;
+    gl.useProgram(splats.program);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, this.colors);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.geometry);
+    gl.uniform1i(splats.at("geometry"), 0);
+    gl.uniform1i(splats.at("colors"), 1);
+    gl.uniformMatrix4fv(splats.at("world_to_camera"), true, lens.worldToCamera);
+    gl.uniform2fv(splats.at("focal_px"), lens.focal);
+    gl.uniform2fv(splats.at("center_px"), lens.center);
+    gl.uniform2f(splats.at("size_px"), width, height);
+    gl.uniform1f(splats.at("near"), near);
+    gl.bindVertexArray(this.quads);
+    gl.drawElements(gl.TRIANGLES, 6 * this.nDrawn, gl.UNSIGNED_INT, 0);
+  }
+
+  /** Draw a strip of triangles over the picture. places: x, y, z of each corner; toCamera: by rows, OpenCV axes; lens: as of paint. */
+  mark(places, toCamera, lens, color) {
+    const { gl, marks } = this;
+    gl.useProgram(marks.program);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.uniformMatrix4fv(marks.at("to_camera"), true, toCamera);
+    gl.uniform2fv(marks.at("focal_px"), lens.focal);
+    gl.uniform2fv(marks.at("center_px"), lens.center);
+    gl.uniform2f(marks.at("size_px"), ...this.size);
+    gl.uniform4fv(marks.at("shade"), color);
+    gl.bindVertexArray(this.strip);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.stripPlaces);
+    gl.bufferData(gl.ARRAY_BUFFER, places, gl.DYNAMIC_DRAW);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, places.length / 3);
+  }
+
+  /** Put the picture onto a rectangle of a framebuffer, null for the canvas. */
+  put(framebuffer, { x, y, width, height }) {
+    const { gl, present } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(x, y, width, height);
     gl.disable(gl.BLEND);
     gl.useProgram(present.program);
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.target.texture);
     gl.uniform1i(present.at("picture"), 0);
-    gl.uniform1i(present.at("height"), height);
+    gl.uniform4f(present.at("place"), x, y, width, height);
     gl.bindVertexArray(this.nothing);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
-    this.isFull = isFull;
-    this.begunMs = performance.now();
-    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    gl.flush();
   }
 }

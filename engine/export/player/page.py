@@ -30,12 +30,16 @@ SCRIPTS = (
     "pictures.js",
     "timeline.js",
     "keys.js",
+    "stage.js",
+    "headset.js",
     "player.js",
 )
 """In the order in which they are joined."""
 WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_main.js")
 SHADERS = ("splat.vert", "splat.frag", "resolve.vert")
 """The shaders of the window, in assets/shaders."""
+OWN_SHADERS = ("present.frag", "mark.vert", "mark.frag")
+"""Those of the page alone, in assets/player."""
 CONSTANTS = ("ALPHA_MIN", "ALPHA_MAX", "EPS2D_PX2", "FRUSTUM_MARGIN")
 """Names of engine.conventions, which shaders see as #define."""
 FORMAT, VERSION = "clipgstream-player", 1
@@ -77,7 +81,7 @@ def page_writer(stream: TextIO, header: dict[str, Any], *, folder: Path | None =
         "style": style,
         "script": script,
         "worker": "'use strict';\n" + "\n".join(map(_asset, WORKER_SCRIPTS)),
-        "shaders": json_for_html({name: web_shader(name) for name in (*SHADERS, "present.frag")}),
+        "shaders": json_for_html({name: web_shader(name) for name in (*SHADERS, *OWN_SHADERS)}),
     }
     stream.write(_filled(before, parts))
     yield PageWriter(stream, folder)
@@ -102,7 +106,7 @@ def web_shader(name: str) -> str:
 
     Only the first line and the precision differ, so that page and window draw alike.
     """
-    source = asset_path("player" if name == "present.frag" else "shaders", name).read_text(encoding="utf-8")
+    source = asset_path("player" if name in OWN_SHADERS else "shaders", name).read_text(encoding="utf-8")
     version, _, rest = source.partition("\n")
     if version != "#version 330 core":
         raise ValueError(f"{name} is not in the version that can be translated: {version!r}")
