@@ -125,7 +125,7 @@ class Headset {
       const lens = projectedLens(view.projectionMatrix, ...size), { inverse } = view.transform;
       renderer.paint({ worldToCamera: this.stage.worldToCamera(inverse.matrix), ...lens }, header.near_plane, size);
       for (const mark of marks) renderer.mark(mark, cameraRows(inverse.matrix), lens, MARK_COLOR);
-      renderer.put(layer.framebuffer, viewport);
+      renderer.put(renderer.target.texture, layer.framebuffer, viewport);
     }
     player.onScreen = player.shown;
   }

@@ -31,9 +31,9 @@ class Pictures {
     return !this.loaded.has(index) && !this.failed.has(index);
   }
 
-  /** A frame seen from where depths are `row`, the third row of world_to_camera. */
-  want(frame, row) {
-    this.wish = { frame, row, key: `${frame} ${row}` };
+  /** A frame seen from where depths are `row`, the third row of world_to_camera; view: to have it painted, as of Painter.paint. */
+  want(frame, row, view = null) {
+    this.wish = { frame, row, view, key: `${frame} ${row} ${view ? JSON.stringify(view) : ""}` };
     this.go();
   }
 
@@ -47,8 +47,8 @@ class Pictures {
     if (this.header.clips.length > 1) this.load((clipIndex + 1) % this.header.clips.length);
     this.isBusy = true;
     this.asked = wish.key;
-    const { frame, row } = wish, near = this.header.near_plane;
-    this.worker.postMessage({ kind: "picture", frame, clipIndex, row, near, epoch: this.epoch });
+    const { frame, row, view } = wish, near = this.header.near_plane;
+    this.worker.postMessage({ kind: "picture", frame, clipIndex, row, near, view, epoch: this.epoch });
   }
 
   async load(index) {

@@ -96,7 +96,8 @@ class Player {
       this.fit();
     }
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
-    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12));
+    const { width, height } = this.canvas, view = { ...lens, size: [width, height], isFull: this.share === 1 };
+    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12), this.renderer.isSoftware ? view : null);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);

@@ -1,5 +1,6 @@
 // Draws Gaussians with the shaders of the window: assets/shaders/splat.vert and splat.frag, translated for WebGL 2.
 
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|swrast|microsoft basic render/i; // graphics cards that are none
 const HIDDEN_MS = 5000; // nobody looked meanwhile, as in a tab in the background
 
 class Renderer {
@@ -21,13 +22,16 @@ class Renderer {
       throw new Error("There are more Gaussians than this graphics card can hold.");
     }
     const hasFloats = gl.getExtension("EXT_color_buffer_float") || gl.getExtension("EXT_color_buffer_half_float");
+    const info = gl.getExtension("WEBGL_debug_renderer_info");
+    /** Whether pictures are better painted by the worker than drawn here. */
+    this.isSoftware = SOFTWARE.test(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
     this.targetFormat = hasFloats ? gl.RGBA16F : gl.RGBA8; // many faint layers drift in 8 bits
     this.splats = this.program("splat.vert", "splat.frag");
     this.present = this.program("resolve.vert", "present.frag");
     this.marks = this.program("mark.vert", "mark.frag");
     this.geometry = this.texture(gl.RGBA32F, TEXELS_PER_ROW * ROWS_PER_LINE, this.nLines);
     this.colors = this.texture(gl.RGBA32F, ROWS_PER_LINE, this.nLines);
-    this.target = this.fence = null;
+    this.target = this.fence = this.painted = null;
     this.fullMs = 0;
     this.nDrawn = 0;
     this.size = [0, 0];
@@ -74,6 +78,12 @@ class Renderer {
 
   /** Take up what the worker answered; what it leaves out stays as it is. */
   take(answer) {
+    if (answer.pixels) {
+      this.takePainted(answer);
+      return;
+    }
+    if (this.painted) this.gl.deleteTexture(this.painted);
+    this.painted = null;
     if (answer.movingGeometry) {
       const first = lines(answer.nStill);
       if (answer.stillGeometry) this.write(this.geometry, TEXELS_PER_ROW, 0, answer.stillGeometry);
@@ -86,6 +96,15 @@ class Renderer {
     gl.bufferData(gl.ARRAY_BUFFER, answer.order, gl.DYNAMIC_DRAW);
     this.nDrawn = answer.order.length / 4;
     this.holdCorners(this.nDrawn);
+  }
+
+  /** Take up a picture that the worker painted. */
+  takePainted({ pixels, size, isFull, tookMs }) {
+    const { gl } = this;
+    if (!this.painted) this.painted = this.smooth(gl.createTexture());
+    gl.bindTexture(gl.TEXTURE_2D, this.painted);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, ...size, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
+    if (isFull) this.fullMs = tookMs;
   }
 
   holdCorners(n) {
@@ -106,6 +125,15 @@ class Renderer {
     return texture;
   }
 
+  /** Between its pixels a texture is linear. */
+  smooth(texture) {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.LINEAR);
+    for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, axis, gl.CLAMP_TO_EDGE);
+    return texture;
+  }
+
   write(texture, texels, firstLine, values) {
     const { gl } = this, width = texels * ROWS_PER_LINE, height = values.length / (4 * width);
     if (!height) return;
@@ -123,8 +151,7 @@ class Renderer {
       gl.deleteFramebuffer(this.target.framebuffer);
     }
     const texture = this.texture(this.targetFormat, width, height), framebuffer = gl.createFramebuffer();
-    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.LINEAR);
-    for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, axis, gl.CLAMP_TO_EDGE);
+    this.smooth(texture);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
     this.target = { texture, framebuffer };
@@ -147,9 +174,10 @@ class Renderer {
    * scene units; isFull: whether the canvas has all pixels of the screen, so that fullMs is how long such a picture takes. */
   draw(lens, near, isFull = true) {
     const { gl, canvas } = this;
-    this.paint(lens, near, [canvas.width, canvas.height]);
-    this.put(null, { x: 0, y: 0, width: canvas.width, height: canvas.height });
-    this.isFull = isFull;
+    if (!this.painted) this.paint(lens, near, [canvas.width, canvas.height]);
+    const picture = this.painted || this.target.texture;
+    this.put(picture, null, { x: 0, y: 0, width: canvas.width, height: canvas.height });
+    this.isFull = isFull && !this.painted;
     this.begunMs = performance.now();
     this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
@@ -199,15 +227,15 @@ class Renderer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, places.length / 3);
   }
 
-  /** Put the picture onto a rectangle of a framebuffer, null for the canvas. */
-  put(framebuffer, { x, y, width, height }) {
+  /** Put a picture onto a rectangle of a framebuffer, null for the canvas. */
+  put(picture, framebuffer, { x, y, width, height }) {
     const { gl, present } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.viewport(x, y, width, height);
     gl.disable(gl.BLEND);
     gl.useProgram(present.program);
     gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.target.texture);
+    gl.bindTexture(gl.TEXTURE_2D, picture);
     gl.uniform1i(present.at("picture"), 0);
     gl.uniform4f(present.at("place"), x, y, width, height);
     gl.bindVertexArray(this.nothing);

@@ -1,8 +1,10 @@
 // In the worker: takes blocks in, and answers with what has to be drawn of a frame in a view. An answer says which frame
 // it is of; it holds only what differs from the answer before it.
 
-const sorter = new DepthSorter();
-const NOTHING = { frame: null, clip: null, still: null, moving: null };
+const CORNERS = 4; // every Gaussian is drawn as four, each of which has its number
+
+const sorter = new DepthSorter(), painter = new Painter();
+const NOTHING = { frame: null, clip: null, still: null, moving: null, kept: null };
 let scene = null, built = NOTHING;
 
 const answers = {
@@ -23,31 +25,43 @@ const answers = {
     return { kind: "forgotten" };
   },
 
-  picture({ epoch, frame, clipIndex, row, near }) {
-    const clip = scene.clip(clipIndex);
+  /** view: where the picture itself is painted here, as of Painter.paint. */
+  picture({ epoch, frame, clipIndex, row, near, view }) {
+    const clip = scene.clip(clipIndex), begunMs = performance.now();
     if (!clip) return { kind: "missing", index: clipIndex };
     const answer = { kind: "picture", epoch, frame, gifts: [] };
-    if (built.frame !== frame) build(clip, frame, frame - scene.header.clips[clipIndex].first, answer);
-    const { still, moving } = built;
+    if (Boolean(view) !== Boolean(built.kept)) built = NOTHING; // what was given away is not here
+    if (built.frame !== frame) build(clip, frame, frame - scene.header.clips[clipIndex].first, answer, Boolean(view));
+    const { still, moving, kept } = built;
     const parts = [{ means: still.means, n: still.n, first: 0 }];
     parts.push({ means: moving.means, n: moving.n, first: lines(still.n) * ROWS_PER_LINE });
-    answer.order = sorter.order(parts, row, near);
-    answer.gifts.push(answer.order.buffer);
-    return answer;
+    const order = sorter.order(parts, row, near, view ? 1 : CORNERS);
+    if (!view) {
+      give(answer, "order", order);
+      return answer;
+    }
+    const shapes = [{ geometry: kept.stillGeometry, colors: kept.stillColors }];
+    shapes.push({ geometry: kept.movingGeometry, colors: kept.movingColors, first: parts[1].first });
+    give(answer, "pixels", painter.paint(shapes, order, { ...view, near, background: scene.header.background }));
+    return { ...answer, size: view.size, isFull: view.isFull, tookMs: performance.now() - begunMs };
   },
 };
 
-/** Make a frame, and put what is new of it into the answer. */
-function build(clip, frame, inClip, answer) {
+/** Make a frame, and put what is new of it into the answer, or keep it. */
+function build(clip, frame, inClip, answer, isKept) {
   const before = built, isStillNew = !before.clip || !hasSameStill(before.clip, clip);
   const { shapes, colors } = scene.moving(clip, inClip);
-  built = { frame, clip, still: isStillNew ? scene.still(clip) : before.still, moving: shapes };
+  built = { frame, clip, still: isStillNew ? scene.still(clip) : before.still, moving: shapes, kept: null };
+  const made = { movingGeometry: shapes.geometry, movingColors: colors };
+  if (isStillNew) made.stillGeometry = built.still.geometry;
+  if (before.clip !== clip || clip.light) made.stillColors = scene.stillColors(clip, inClip);
+  if (isKept) {
+    built.kept = { ...before.kept, ...made };
+    return;
+  }
   answer.nStill = built.still.n;
   answer.nMoving = shapes.n;
-  if (isStillNew) give(answer, "stillGeometry", built.still.geometry);
-  if (before.clip !== clip || clip.light) give(answer, "stillColors", scene.stillColors(clip, inClip));
-  give(answer, "movingGeometry", shapes.geometry);
-  give(answer, "movingColors", colors);
+  for (const [name, array] of Object.entries(made)) give(answer, name, array);
 }
 
 function hasSameStill(some, other) {

@@ -35,13 +35,13 @@ SCRIPTS = (
     "player.js",
 )
 """In the order in which they are joined."""
-WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_main.js")
+WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_painting.js", "worker_main.js")
 SHADERS = ("splat.vert", "splat.frag", "resolve.vert")
 """The shaders of the window, in assets/shaders."""
 OWN_SHADERS = ("present.frag", "mark.vert", "mark.frag")
 """Those of the page alone, in assets/player."""
 CONSTANTS = ("ALPHA_MIN", "ALPHA_MAX", "EPS2D_PX2", "FRUSTUM_MARGIN")
-"""Names of engine.conventions, which shaders see as #define."""
+"""Names of engine.conventions, which shaders see as #define, and the worker as const."""
 FORMAT, VERSION = "clipgstream-player", 1
 
 _PRECISION = "".join(f"precision highp {kind};\n" for kind in ("float", "int", "sampler2D"))
@@ -80,7 +80,7 @@ def page_writer(stream: TextIO, header: dict[str, Any], *, folder: Path | None =
         "policy": _policy(script, style, has_folder=folder is not None),
         "style": style,
         "script": script,
-        "worker": "'use strict';\n" + "\n".join(map(_asset, WORKER_SCRIPTS)),
+        "worker": "'use strict';\n" + _constants("const {} = {};\n") + "\n".join(map(_asset, WORKER_SCRIPTS)),
         "shaders": json_for_html({name: web_shader(name) for name in (*SHADERS, *OWN_SHADERS)}),
     }
     stream.write(_filled(before, parts))
@@ -110,8 +110,12 @@ def web_shader(name: str) -> str:
     version, _, rest = source.partition("\n")
     if version != "#version 330 core":
         raise ValueError(f"{name} is not in the version that can be translated: {version!r}")
-    defines = "".join(f"#define {constant} {float(getattr(conventions, constant))!r}\n" for constant in CONSTANTS)
+    defines = _constants("#define {} {}\n")
     return f"#version 300 es\n{_PRECISION}{defines}#line 2\n{rest}"
+
+
+def _constants(line: str) -> str:
+    return "".join(line.format(name, repr(float(getattr(conventions, name)))) for name in CONSTANTS)
 
 
 def _policy(script: str, style: str, *, has_folder: bool) -> str:

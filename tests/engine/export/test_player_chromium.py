@@ -44,6 +44,11 @@ SETTLED = (
     "(p => p && p.isDrawn && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
     " && p.pictures.answered === p.pictures.wish.key)(window.clipgstreamPlayer)"
 )
+AS_A_CARD = """(() => {
+  const type = WebGL2RenderingContext.prototype, ask = type.getParameter;
+  type.getParameter = function (name) { return name === 0x9246 ? "A card" : ask.call(this, name); };
+})()"""
+"""So that the page takes the browser's software for a graphics card."""
 EVIL = "</script><img src=x onerror=\"document.title='pwned'\">"
 
 
@@ -52,9 +57,12 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(tmp_path_factory.mktemp("player") / "scene.html", header())
 
 
-@pytest.fixture(scope="module")
-def shared_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+@pytest.fixture(scope="module", params=["processor", "card"])
+def shared_browser(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Where the worker paints pictures, as it does without a graphics card, and where WebGL draws them."""
     with Browser(tmp_path_factory.mktemp("browser")) as browser:
+        if request.param == "card":
+            browser.call("Page.addScriptToEvaluateOnNewDocument", source=AS_A_CARD)
         yield browser
 
 
@@ -126,6 +134,7 @@ def test_pictures_are_those_of_the_rasterizer(browser: Browser):
     for frame, view in ((0, 0), (4, 1), (6, 2), (8, 3), (N_FRAMES - 1, 4)):
         browser.value(f"void clipgstreamPlayer.go({frame}); void clipgstreamPlayer.look({view})")
         found = drawn(browser)
+        assert state(browser, "renderer.painted !== null") == state(browser, "renderer.isSoftware")
         assert label(browser).startswith(f"Frame {frame} of {N_FRAMES - 1} ")
         assert psnr(found, expected(frame, view)) > LEAST_PSNR
         for other in {(frame + 1) % N_FRAMES, (frame + 3) % N_FRAMES}:
