@@ -14,6 +14,7 @@ import select
 import shutil
 import signal
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,23 @@ FLAGS = (
     "--hide-scrollbars",
     "--remote-debugging-pipe",
 )
+WEBGPU_FLAGS = (
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+)
+"""Further flags, with which there is WebGPU in software."""
+AS_A_CARD = """(() => {
+  const type = WebGL2RenderingContext.prototype, ask = type.getParameter;
+  type.getParameter = function (name) { return name === 0x9246 ? "A card" : ask.call(this, name); };
+})();"""
+"""A script before the page's own, so that it takes the browser's software for a graphics card."""
+WITHOUT_WEBGPU = "Object.defineProperty(Navigator.prototype, 'gpu', {value: undefined});"
+AS_A_CARD_WITH_WEBGPU = (
+    f"{AS_A_CARD} Object.defineProperty(GPUAdapterInfo.prototype, 'isFallbackAdapter', {{get: () => false}});"
+)
+"""The same with `WEBGPU_FLAGS`."""
 _FIRST_FREE_FD = 10
 
 
@@ -51,7 +69,7 @@ class Browser:
         requests: URLs that were asked for.
     """
 
-    def __init__(self, folder: Path, *, width: int = 800, height: int = 600) -> None:
+    def __init__(self, folder: Path, *, width: int = 800, height: int = 600, flags: Sequence[str] = ()) -> None:
         program = chromium()
         assert program is not None
         self.console: list[str] = []
@@ -60,7 +78,7 @@ class Browser:
         from_us, self._to = _pipe()
         self._from, to_us = _pipe()
         log = os.open(folder / "chromium.log", os.O_CREAT | os.O_WRONLY)
-        arguments = [program, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--window-size={width},{height}"]
+        arguments = [program, *FLAGS, *flags, f"--user-data-dir={folder / 'profile'}", f"--window-size={width},{height}"]
         self._pid = os.posix_spawn(
             program,
             [*arguments, "about:blank"],
@@ -143,6 +161,10 @@ class Browser:
     def open(self, page: Path) -> None:
         """Go to a page on the disk."""
         self.call("Page.navigate", url=page.resolve().as_uri())
+
+    def before_pages(self, script: str) -> None:
+        """Run a script in every page before its own."""
+        self.call("Page.addScriptToEvaluateOnNewDocument", source=script)
 
     def resize(self, width: int, height: int, *, ratio: float = 1.0, is_phone: bool = False) -> None:
         """Size of the page in its own pixels, and how many of the screen's make one of them."""

@@ -44,7 +44,13 @@ class Headset {
   }
 
   async start() {
-    const { session, player } = this, { gl } = player.renderer;
+    const { session, player } = this;
+    this.pageRenderer = player.renderer;
+    if (!(player.renderer instanceof Renderer)) { // sessions draw with WebGL
+      player.renderer = new Renderer(document.createElement("canvas"), player.shaders, player.header.background, player.nLines);
+    }
+    player.pictures.forget(); // the page may have been painted, or sorted elsewhere
+    const { gl } = player.renderer;
     session.addEventListener("end", () => this.end());
     session.addEventListener("select", (event) => this.select(event));
     session.addEventListener("squeeze", () => this.play());
@@ -71,6 +77,8 @@ class Headset {
   end() {
     this.session = null;
     this.isPlaced = false;
+    this.player.renderer = this.pageRenderer;
+    this.player.pictures.forget();
     this.player.changed();
   }
 

@@ -31,7 +31,9 @@ class Pictures {
     return !this.loaded.has(index) && !this.failed.has(index);
   }
 
-  /** A frame seen from where depths are `row`, the third row of world_to_camera; view: to have it painted, as of Painter.paint. */
+  /**
+   * A frame seen from where depths are `row`, the third row of world_to_camera; null where nothing has to be sorted; view: to have it painted, as of
+   * Painter.paint. */
   want(frame, row, view = null) {
     this.wish = { frame, row, view, key: `${frame} ${row} ${view ? JSON.stringify(view) : ""}` };
     this.go();

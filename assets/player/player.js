@@ -6,7 +6,7 @@ const REST_MS = 250; // after so long without a move a picture is drawn in full
 const GOOD_PIXELS = 3 << 20; // more of them are not drawn on screens with very small ones
 
 class Player {
-  constructor(header, shaders, workerSource) {
+  constructor(header, shaders, workerSource, device) {
     this.header = header;
     this.canvas = document.getElementById("picture");
     const nFrames = header.take ? header.take.length : header.clips.reduce((n, clip) => n + clip.moving.n.length, 0);
@@ -15,7 +15,11 @@ class Player {
     const nMoving = most(header.clips.flatMap((clip) => clip.moving.n));
     this.view = new View(header);
     this.clock = new Clock(nFrames, header.fps / header.step);
-    this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
+    this.shaders = shaders;
+    this.nLines = lines(nStill) + lines(nMoving);
+    this.renderer = device
+      ? new GpuRenderer(device, this.canvas, shaders["splats.wgsl"], header.background, this.nLines, (text) => this.pictures.stop(text))
+      : new Renderer(this.canvas, shaders, header.background, this.nLines);
     this.timeline = new Timeline(header, nFrames, (frame) => this.stored(frame), (frame) => this.go(frame));
     this.shown = null; // frame that the renderer holds, of the take where there is one
     this.onScreen = null; // frame of the picture on the screen
@@ -96,8 +100,9 @@ class Player {
       this.fit();
     }
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
-    const { width, height } = this.canvas, view = { ...lens, size: [width, height], isFull: this.share === 1 };
-    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12), this.renderer.isSoftware ? view : null);
+    const { isSoftware, sortsItself } = this.renderer, row = sortsItself ? null : lens.worldToCamera.slice(8, 12);
+    const view = { ...lens, size: [this.canvas.width, this.canvas.height], isFull: this.share === 1 };
+    this.pictures.want(this.stored(this.clock.frame), row, isSoftware ? view : null);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
@@ -251,12 +256,13 @@ function missing() {
   return "";
 }
 
-function begin() {
+async function begin() {
   const part = (id) => document.getElementById(id).textContent;
   const lacks = missing();
   try {
     if (lacks) throw new Error(`This browser cannot ${lacks}. A version of 2023 or later can.`);
-    window.clipgstreamPlayer = new Player(JSON.parse(part("header")), JSON.parse(part("shaders")), part("worker"));
+    const header = JSON.parse(part("header")), shaders = JSON.parse(part("shaders"));
+    window.clipgstreamPlayer = new Player(header, shaders, part("worker"), await graphicsDevice());
   } catch (error) {
     notify(error.message);
   }

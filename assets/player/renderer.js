@@ -3,6 +3,12 @@
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|swrast|microsoft basic render/i; // graphics cards that are none
 const HIDDEN_MS = 5000; // nobody looked meanwhile, as in a tab in the background
 
+/** Does the processor play the graphics card? */
+function isSoftware(gl) {
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  return SOFTWARE.test(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+}
+
 class Renderer {
   /** shaders: sources by name; nLines: of the textures, for the largest frame. Throws where the browser cannot do it; begin() again after the context was restored. */
   constructor(canvas, shaders, background, nLines) {
@@ -22,9 +28,7 @@ class Renderer {
       throw new Error("There are more Gaussians than this graphics card can hold.");
     }
     const hasFloats = gl.getExtension("EXT_color_buffer_float") || gl.getExtension("EXT_color_buffer_half_float");
-    const info = gl.getExtension("WEBGL_debug_renderer_info");
-    /** Whether pictures are better painted by the worker than drawn here. */
-    this.isSoftware = SOFTWARE.test(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+    this.isSoftware = isSoftware(gl); // then pictures are better painted by the worker than drawn here
     this.targetFormat = hasFloats ? gl.RGBA16F : gl.RGBA8; // many faint layers drift in 8 bits
     this.splats = this.program("splat.vert", "splat.frag");
     this.present = this.program("resolve.vert", "present.frag");

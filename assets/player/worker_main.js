@@ -32,6 +32,7 @@ const answers = {
     const answer = { kind: "picture", epoch, frame, gifts: [] };
     if (Boolean(view) !== Boolean(built.kept)) built = NOTHING; // what was given away is not here
     if (built.frame !== frame) build(clip, frame, frame - scene.header.clips[clipIndex].first, answer, Boolean(view));
+    if (!row) return answer;
     const { still, moving, kept } = built;
     const parts = [{ means: still.means, n: still.n, first: 0 }];
     parts.push({ means: moving.means, n: moving.n, first: lines(still.n) * ROWS_PER_LINE });

@@ -23,6 +23,7 @@ from engine.export.player.blocks import Block
 SCRIPTS = (
     "textures.js",
     "renderer.js",
+    "webgpu.js",
     "view.js",
     "pointer.js",
     "clock.js",
@@ -38,7 +39,7 @@ SCRIPTS = (
 WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_painting.js", "worker_main.js")
 SHADERS = ("splat.vert", "splat.frag", "resolve.vert")
 """The shaders of the window, in assets/shaders."""
-OWN_SHADERS = ("present.frag", "mark.vert", "mark.frag")
+OWN_SHADERS = ("present.frag", "mark.vert", "mark.frag", "splats.wgsl")
 """Those of the page alone, in assets/player."""
 CONSTANTS = ("ALPHA_MIN", "ALPHA_MAX", "EPS2D_PX2", "FRUSTUM_MARGIN")
 """Names of engine.conventions, which shaders see as #define, and the worker as const."""
@@ -102,11 +103,14 @@ def json_for_html(value: Any) -> str:
 
 
 def web_shader(name: str) -> str:
-    """A shader of desktop OpenGL in the language of WebGL 2, with the rasterizer's constants.
+    """A shader of desktop OpenGL in the language of WebGL 2, with the rasterizer's constants; one of WebGPU as it is, with
+    these.
 
     Only the first line and the precision differ, so that page and window draw alike.
     """
     source = asset_path("player" if name in OWN_SHADERS else "shaders", name).read_text(encoding="utf-8")
+    if name.endswith(".wgsl"):
+        return _constants("const {} = {};\n") + source
     version, _, rest = source.partition("\n")
     if version != "#version 330 core":
         raise ValueError(f"{name} is not in the version that can be translated: {version!r}")

@@ -14,7 +14,7 @@ import torch
 from engine.backends.table import backend_called
 from engine.export.player.blocks import joined
 from engine.raster.rasterize import rasterize
-from tests.browser import Browser, chromium
+from tests.browser import AS_A_CARD, AS_A_CARD_WITH_WEBGPU, WEBGPU_FLAGS, WITHOUT_WEBGPU, Browser, chromium
 from tests.player_scenes import (
     BACKGROUND,
     LENGTHS,
@@ -37,6 +37,8 @@ pytestmark = [
 
 SHIFT, CTRL = 8, 2
 LEAST_PSNR = 35.0
+LEAST_PSNR_OF_WEBGPU = 45.0
+"""Against WebGL."""
 SCALE = 3
 """Pictures are drawn so many times as large as the cameras' own."""
 PICTURE = (SCALE * SIZE[0], SCALE * SIZE[1])
@@ -44,11 +46,6 @@ SETTLED = (
     "(p => p && p.isDrawn && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
     " && p.pictures.answered === p.pictures.wish.key)(window.clipgstreamPlayer)"
 )
-AS_A_CARD = """(() => {
-  const type = WebGL2RenderingContext.prototype, ask = type.getParameter;
-  type.getParameter = function (name) { return name === 0x9246 ? "A card" : ask.call(this, name); };
-})()"""
-"""So that the page takes the browser's software for a graphics card."""
 EVIL = "</script><img src=x onerror=\"document.title='pwned'\">"
 
 
@@ -62,7 +59,7 @@ def shared_browser(request: pytest.FixtureRequest, tmp_path_factory: pytest.Temp
     """Where the worker paints pictures, as it does without a graphics card, and where WebGL draws them."""
     with Browser(tmp_path_factory.mktemp("browser")) as browser:
         if request.param == "card":
-            browser.call("Page.addScriptToEvaluateOnNewDocument", source=AS_A_CARD)
+            browser.before_pages(AS_A_CARD + WITHOUT_WEBGPU)
         yield browser
 
 
@@ -139,6 +136,24 @@ def test_pictures_are_those_of_the_rasterizer(browser: Browser):
         assert psnr(found, expected(frame, view)) > LEAST_PSNR
         for other in {(frame + 1) % N_FRAMES, (frame + 3) % N_FRAMES}:
             assert psnr(found, expected(other, view)) < LEAST_PSNR - 5.0  # so the figure can tell frames apart
+
+
+def test_webgpu_draws_the_same_picture(page: Path, tmp_path: Path):
+    pictures = {}
+    for kind, script in (("Renderer", AS_A_CARD + WITHOUT_WEBGPU), ("GpuRenderer", AS_A_CARD_WITH_WEBGPU)):
+        (tmp_path / kind).mkdir()
+        with Browser(tmp_path / kind, flags=WEBGPU_FLAGS) as browser:
+            browser.before_pages(script)
+            show(browser, page)
+            if kind == "GpuRenderer" and not browser.value("navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
+                pytest.skip("this browser has no WebGPU")
+            assert state(browser, "renderer.constructor.name") == kind
+            for view in range(3):
+                browser.value(f"void clipgstreamPlayer.go({3 * view}); void clipgstreamPlayer.look({view})")
+                pictures[kind, view] = drawn(browser)
+            assert browser.console == []
+    for view in range(3):
+        assert psnr(pictures["Renderer", view], pictures["GpuRenderer", view]) > LEAST_PSNR_OF_WEBGPU
 
 
 def test_a_screen_with_small_pixels_is_used_in_full(browser: Browser):
@@ -325,7 +340,7 @@ def test_a_damaged_clip_is_said(shared_browser: Browser, tmp_path: Path):
 )
 def test_an_old_browser_is_told_what_it_lacks(tmp_path: Path, page: Path, without: str, said: str):
     with Browser(tmp_path) as browser:
-        browser.call("Page.addScriptToEvaluateOnNewDocument", source=without)
+        browser.before_pages(without)
         browser.open(page)
         browser.wait(f"document.getElementById('notice')?.textContent.includes('{said}')")
         assert browser.console == []

@@ -65,7 +65,7 @@ def browser(tmp_path: Path) -> Iterator[Browser]:
     page = write_page(tmp_path / "scene.html", header())
     with Browser(tmp_path) as browser:
         browser.resize(2 * EYE[0], EYE[1])
-        browser.call("Page.addScriptToEvaluateOnNewDocument", source=EMULATOR.read_text("utf-8") + DEVICE)
+        browser.before_pages(EMULATOR.read_text("utf-8") + DEVICE)
         browser.open(page)
         browser.wait("window.clipgstreamPlayer && clipgstreamPlayer.isDrawn")
         browser.wait("!document.getElementById('headset').hidden")
