@@ -67,6 +67,7 @@ class Browser:
     Attributes:
         console: What the page and the browser said about it: warnings, errors, exceptions.
         requests: URLs that were asked for.
+        pid: Of the browser, and of its group of processes.
     """
 
     def __init__(self, folder: Path, *, width: int = 800, height: int = 600, flags: Sequence[str] = ()) -> None:
@@ -78,8 +79,14 @@ class Browser:
         from_us, self._to = _pipe()
         self._from, to_us = _pipe()
         log = os.open(folder / "chromium.log", os.O_CREAT | os.O_WRONLY)
-        arguments = [program, *FLAGS, *flags, f"--user-data-dir={folder / 'profile'}", f"--window-size={width},{height}"]
-        self._pid = os.posix_spawn(
+        arguments = [
+            program,
+            *FLAGS,
+            *flags,
+            f"--user-data-dir={folder / 'profile'}",
+            f"--window-size={width},{height}",
+        ]
+        self.pid = os.posix_spawn(
             program,
             [*arguments, "about:blank"],
             os.environ,
@@ -108,11 +115,11 @@ class Browser:
         os.close(self._from)
         for sent in (signal.SIGTERM, signal.SIGKILL):
             try:
-                os.killpg(self._pid, sent)
+                os.killpg(self.pid, sent)
             except ProcessLookupError:
                 break
             time.sleep(0.1)
-        os.waitpid(self._pid, 0)
+        os.waitpid(self.pid, 0)
 
     # ---------------------------------------------------------------- the protocol
 
@@ -212,12 +219,13 @@ class Browser:
         """Press and release the left button."""
         self.drag((x, y), (x, y))
 
-    def touch(self, *fingers: list[tuple[float, float]]) -> None:
-        """Fingers along their paths, all of the same number of points."""
+    def touch(self, *fingers: list[tuple[float, float]], at_s: float | None = None) -> None:
+        """Fingers along their paths, all of the same number of points. at_s: when, of time.time()"""
+        when = {} if at_s is None else {"timestamp": at_s}
         for step, points in enumerate(zip(*fingers, strict=True)):
             kind = "touchMove" if step else "touchStart"
-            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y} for x, y in points])
-        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y} for x, y in points], **when)
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[], **when)
 
 
 def _pipe() -> tuple[int, int]:

@@ -21,6 +21,7 @@ from engine.capture.clip import Clip
 from engine.errors import ProjectError
 from engine.export.player.blocks import Block, Packer
 from engine.export.player.page import page_bytes, page_writer
+from engine.export.player.stage import Stage, stage_of
 from engine.export.splats import Splats
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     scene.check(moment.frame for _, wanted in clips for one in wanted for moment in one.moments)
     n_frames = sum(len(wanted) for _, wanted in clips)
     header: dict[str, Any] = scene_header(scene, clips[0][1][0].frame, step=job.frames.step if job.frames else 1)
+    header["stage"] = _stage(scene, clips[0][1][0], header["radius"])
     header["take"] = played
     header["folder"] = _relative_url(job.folder.name) if has_folder else None
     packer, n_done, n_bytes = Packer(), 0, 0
@@ -100,6 +102,13 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
         n_bytes = writer.n_bytes_of_blocks * has_folder + page.stat().st_size
         report(ExportProgress(n_frames, n_frames))
     return ExportResult(job.out, len(header["clips"]) + 2 if has_folder else 1, n_bytes)
+
+
+def _stage(scene: SceneFrames, one: TakeFrame, radius: float) -> Stage:
+    still, moving = (Splats.of(scene.at_moments(one.moments, part)) for part in ("static", "moving"))
+    opened = scene.opened
+    known = opened.project.document.world.meters_per_unit
+    return stage_of(still, moving, up=opened.up, focus=opened.rig.focus_point(), radius=radius, meters_per_unit=known)
 
 
 def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[TakeFrame]]]) -> int:

@@ -36,7 +36,14 @@ SCRIPTS = (
     "player.js",
 )
 """In the order in which they are joined."""
-WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_painting.js", "worker_main.js")
+WORKER_SCRIPTS = (
+    "textures.js",
+    "worker_decoding.js",
+    "worker_scene.js",
+    "worker_sorting.js",
+    "worker_painting.js",
+    "worker_main.js",
+)
 SHADERS = ("splat.vert", "splat.frag", "resolve.vert")
 """The shaders of the window, in assets/shaders."""
 OWN_SHADERS = ("present.frag", "mark.vert", "mark.frag", "splats.wgsl")
@@ -103,8 +110,8 @@ def json_for_html(value: Any) -> str:
 
 
 def web_shader(name: str) -> str:
-    """A shader of desktop OpenGL in the language of WebGL 2, with the rasterizer's constants; one of WebGPU as it is, with
-    these.
+    """A shader of desktop OpenGL in the language of WebGL 2, with the rasterizer's constants; one of WebGPU as it is,
+    with these.
 
     Only the first line and the precision differ, so that page and window draw alike.
     """

@@ -3,6 +3,7 @@ where something is missing. Pages lie on the disk, and the browser has no networ
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -37,13 +38,13 @@ pytestmark = [
 
 SHIFT, CTRL = 8, 2
 LEAST_PSNR = 35.0
-LEAST_PSNR_OF_WEBGPU = 45.0
-"""Against WebGL."""
+LEAST_PSNR_OF_WAYS = 45.0
+"""Of pictures that are drawn otherwise than by WebGL, against it."""
 SCALE = 3
 """Pictures are drawn so many times as large as the cameras' own."""
 PICTURE = (SCALE * SIZE[0], SCALE * SIZE[1])
 SETTLED = (
-    "(p => p && p.isDrawn && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
+    "(p => p && p.isDrawn && p.renderer.isDone() && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
     " && p.pictures.answered === p.pictures.wish.key)(window.clipgstreamPlayer)"
 )
 EVIL = "</script><img src=x onerror=\"document.title='pwned'\">"
@@ -138,22 +139,26 @@ def test_pictures_are_those_of_the_rasterizer(browser: Browser):
             assert psnr(found, expected(other, view)) < LEAST_PSNR - 5.0  # so the figure can tell frames apart
 
 
-def test_webgpu_draws_the_same_picture(page: Path, tmp_path: Path):
+def test_all_ways_of_drawing_make_the_same_picture(page: Path, tmp_path: Path):
     pictures = {}
-    for kind, script in (("Renderer", AS_A_CARD + WITHOUT_WEBGPU), ("GpuRenderer", AS_A_CARD_WITH_WEBGPU)):
-        (tmp_path / kind).mkdir()
-        with Browser(tmp_path / kind, flags=WEBGPU_FLAGS) as browser:
+    ways = {"WebGL": AS_A_CARD + WITHOUT_WEBGPU, "WebGPU": AS_A_CARD_WITH_WEBGPU, "painted": ""}
+    for way, script in ways.items():
+        (tmp_path / way).mkdir()
+        with Browser(tmp_path / way, flags=WEBGPU_FLAGS) as browser:
             browser.before_pages(script)
             show(browser, page)
-            if kind == "GpuRenderer" and not browser.value("navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
-                pytest.skip("this browser has no WebGPU")
-            assert state(browser, "renderer.constructor.name") == kind
+            if way == "WebGPU" and not browser.value("navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
+                continue  # an older browser
+            drawer = "GpuRenderer" if way == "WebGPU" else "Renderer"
+            assert state(browser, "renderer.constructor.name") == drawer
             for view in range(3):
                 browser.value(f"void clipgstreamPlayer.go({3 * view}); void clipgstreamPlayer.look({view})")
-                pictures[kind, view] = drawn(browser)
+                pictures[way, view] = drawn(browser)
+            assert bool(state(browser, "renderer.painted instanceof WebGLTexture")) == (way == "painted")
             assert browser.console == []
-    for view in range(3):
-        assert psnr(pictures["Renderer", view], pictures["GpuRenderer", view]) > LEAST_PSNR_OF_WEBGPU
+    assert ("painted", 2) in pictures
+    for (way, view), picture in pictures.items():
+        assert psnr(picture, pictures["WebGL", view]) > LEAST_PSNR_OF_WAYS, way
 
 
 def test_a_screen_with_small_pixels_is_used_in_full(browser: Browser):
@@ -274,6 +279,19 @@ def test_pointer_and_fingers_move_the_view(browser: Browser):
     assert state(browser, "view.yaw") == pytest.approx(yaw + 0.3)
     browser.touch([(x - 40, y), (x - 60, y), (x - 80, y)], [(x + 40, y), (x + 60, y), (x + 80, y)])
     assert state(browser, "view.distance") == pytest.approx(distance / 2.0)
+    pivot, (width, height) = (
+        state(browser, "view.pivot"),
+        browser.value("(({width, height}) => [width, height])(clipgstreamPlayer.canvas.getBoundingClientRect())"),
+    )
+    now_s = time.time()
+    for at_s in (now_s, now_s + 0.2):
+        browser.touch([(x + 90, y - 30)], at_s=at_s)
+    moved = np.linalg.norm(np.subtract(state(browser, "view.pivot"), pivot))
+    unit = state(browser, f"view.distance / clipgstreamPlayer.view.focal({width}, {height})")
+    assert moved == pytest.approx(unit * np.hypot(x + 90 - width / 2, y - 30 - height / 2), rel=1e-3)
+    pivot = state(browser, "view.pivot")
+    browser.touch([(x, y - 80)])  # a third tap is a first one again
+    assert state(browser, "view.pivot") == pivot
     browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
     browser.key("f")
     assert psnr(drawn(browser), before) > 60.0

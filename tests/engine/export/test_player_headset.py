@@ -41,12 +41,13 @@ EYE = (240, 240)
 HEAD = np.array([0.2, 1.5, -0.1])
 """Where the head is to begin with, m: x right, y up from the floor, z backward."""
 EYES_APART = 0.064
+FOV_Y = 1.4
 LEAST_PSNR = 35.0
-DEVICE = """
-window.device = new IWER.XRDevice(IWER.metaQuest3, {ipd: 0.064, fovy: 1.4, stereoEnabled: true});
-device.installRuntime({forceInstall: true});
-device.position.set(%s);
-""" % ", ".join(map(str, HEAD))
+DEVICE = f"""
+window.device = new IWER.XRDevice(IWER.metaQuest3, {{ipd: {EYES_APART}, fovy: {FOV_Y}, stereoEnabled: true}});
+device.installRuntime({{forceInstall: true}});
+device.position.set({", ".join(map(str, HEAD))});
+"""
 NO_FLOOR = """void (() => {
   const type = Object.getPrototypeOf(clipgstreamPlayer.headset.session), ask = type.requestReferenceSpace;
   type.requestReferenceSpace = async function (kind) {
@@ -105,7 +106,7 @@ def expected(eye_m: np.ndarray, *, facing: np.ndarray, frame: int = 0) -> np.nda
     rotation = np.stack([right, -up, facing])
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation, -rotation @ eye_m
-    focal = EYE[1] / 2.0 / np.tan(0.7)
+    focal = EYE[1] / 2.0 / np.tan(FOV_Y / 2.0)
     K = np.array([[focal, 0.0, EYE[0] / 2], [0.0, focal, EYE[1] / 2], [0.0, 0.0, 1.0]])
     clip, in_clip = places()[frame]
     rendering = rasterize(
