@@ -23,9 +23,10 @@ class Player {
     this.share = 1; // of the screen's pixels, along a side
     this.movedMs = -REST_MS;
     this.scheduled = 0;
-    this.pictures = new Pictures(header, new Blocks(header.folder), workerSource, {
+    this.pictures = new Pictures(header, new Blocks(header), workerSource, {
+      upcoming: () => this.upcoming(),
       onPicture: (answer) => this.take(answer),
-      onNotice: (text) => notify(text),
+      onNotice: (text, canRetry) => notify(text, canRetry),
     });
     this.fillControls();
     followPointer(this.canvas, this.view, () => this.moved());
@@ -34,6 +35,8 @@ class Player {
     followKeys(table);
     this.followContext();
     this.followSize();
+    followAddress(this);
+    followEmbedder(this);
     notify("Loading \u2026");
     this.changed();
   }
@@ -90,11 +93,13 @@ class Player {
       this.fit();
     }
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
-    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12));
+    this.pictures.isPlaying = this.clock.isPlaying;
+    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12), this.share < 1);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
       this.isDrawn = true;
+      if (this.onScreen === null) document.getElementById("poster")?.remove();
       this.onScreen = this.shown;
     }
     this.tell();
@@ -109,6 +114,13 @@ class Player {
     const { take } = this.header, now = this.clock.frame;
     this.shown = take ? (take[now] === answer.frame ? now : take.indexOf(answer.frame)) : answer.frame;
     this.changed();
+  }
+
+  /** Clips that are played next, in their order. */
+  upcoming() {
+    const { starts } = this.timeline, { frame, isLooping } = this.clock;
+    const later = starts.filter((start) => start > frame), around = isLooping ? starts.filter((start) => start <= frame) : [];
+    return [...new Set([...later, ...around].map((start) => this.pictures.clipOf(this.stored(start))))];
   }
 
   /** The stored frame that one of the take shows. */
@@ -131,6 +143,7 @@ class Player {
     document.getElementById("play").setAttribute("aria-label", clock.isPlaying ? "Pause" : "Play");
     document.getElementById("loop").setAttribute("aria-pressed", clock.isLooping);
     document.getElementById("speed").value = clock.speed;
+    document.getElementById("quality").value = this.pictures.quality;
     document.getElementById("camera").value = this.view.camera === null ? "" : this.view.camera;
   }
 
@@ -139,6 +152,10 @@ class Player {
   go(frame) {
     this.clock.go(frame);
     this.moved();
+  }
+
+  goToSecond(seconds) {
+    this.go(Math.floor(seconds * this.clock.fps + 1e-6));
   }
 
   goToClip(steps) {
@@ -204,7 +221,14 @@ class Player {
       this.clock.speed = Number(event.target.value);
       this.changed();
     };
-    for (const id of ["speed", "camera"]) leaveWhenChosen(by(id), this.canvas);
+    by("quality").append(...["auto", "low", "full"].map((name) => option(name, name[0].toUpperCase() + name.slice(1))));
+    by("quality").onchange = ({ target }) => {
+      this.pictures.quality = target.value;
+      this.changed();
+    };
+    by("again").onclick = () => this.pictures.loader.again();
+    addEventListener("online", () => this.pictures.loader.again());
+    for (const id of ["speed", "camera", "quality"]) leaveWhenChosen(by(id), this.canvas);
     by("camera").onchange = ({ target }) => this.look(target.value === "" ? null : Number(target.value));
   }
 
@@ -232,10 +256,14 @@ function leaveWhenChosen(list, canvas) {
   list.addEventListener("change", () => isPointed && canvas.focus());
 }
 
-function notify(text) {
-  const notice = document.getElementById("notice");
-  if (notice.textContent !== text) notice.textContent = text;
-  notice.hidden = !text;
+/** Words over the picture, which screen readers are told too; canRetry: with a button to try again. */
+function notify(text, canRetry = false) {
+  const by = (id) => document.getElementById(id);
+  for (const [id, said] of [["words", text], ["status", text || "The scene is shown."]]) {
+    if (by(id).textContent !== said) by(id).textContent = said;
+  }
+  by("again").hidden = !canRetry;
+  by("notice").hidden = !text;
 }
 
 function missing() {
