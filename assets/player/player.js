@@ -15,7 +15,6 @@ class Player {
     const nMoving = most(header.clips.flatMap((clip) => clip.moving.n));
     this.view = new View(header);
     this.clock = new Clock(nFrames, header.fps / header.step);
-    this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
     this.timeline = new Timeline(header, nFrames, (frame) => this.stored(frame), (frame) => this.go(frame));
     this.shown = null; // frame that the renderer holds, of the take where there is one
     this.onScreen = null; // frame of the picture on the screen
@@ -28,6 +27,10 @@ class Player {
       onPicture: (answer) => this.take(answer),
       onNotice: (text, canRetry) => notify(text, canRetry),
     });
+    followAddress(this);
+    followEmbedder(this);
+    this.pictures.want(this.stored(this.clock.frame), [0, 0, 1, 0]); // loads while shaders are compiled
+    this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
     this.fillControls();
     followPointer(this.canvas, this.view, () => this.moved());
     const table = keyTable(this);
@@ -35,8 +38,6 @@ class Player {
     followKeys(table);
     this.followContext();
     this.followSize();
-    followAddress(this);
-    followEmbedder(this);
     notify("Loading \u2026");
     this.changed();
   }

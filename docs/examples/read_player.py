@@ -36,7 +36,7 @@ class Part:
         return np.frombuffer(self.data[self.at - n_planes * n : self.at], np.uint8).reshape(n_planes, n).T
 
     def changes(self, n: int) -> np.ndarray:
-        """How far whole numbers differ from others: x, y, z, largest, three, scales, opacity, colours. [n, 14] uint16"""
+        """How far whole numbers differ from others: x, y, z, largest, three, scales, opacity, RGB. [n, 14] uint16"""
         words = self.take(3, n).astype(np.uint16)
         words |= self.take(3, n).astype(np.uint16) << 8
         return np.concatenate([unfolded(words), unfolded(self.take(11, n)).astype(np.uint16)], axis=1)

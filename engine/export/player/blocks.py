@@ -28,8 +28,8 @@ from engine.export.player.seen_weights import Weigh, weight_by_size
 from engine.export.player.still_part import PlayerStillPart, shared_rows, still_part
 from engine.export.splats import Splats
 
-LEVEL_SHARES = (0.2, 0.3, 0.5)
-"""Of the rows, in each level."""
+LEVEL_SHARES = (0.1, 0.35, 0.55)
+"""Of the rows, in each level: with the first tenth one recognises people, with the second level most details."""
 N_LEVELS = len(LEVEL_SHARES)
 
 
@@ -55,9 +55,7 @@ class Packer:
         unseen: Moving rows that weigh no more than this in any frame of a clip are left out; below 0 none.
     """
 
-    def __init__(
-        self, moving: RowPrecision = FINE, *, weigh: Weigh = weight_by_size, unseen: float = -1.0
-    ) -> None:
+    def __init__(self, moving: RowPrecision = FINE, *, weigh: Weigh = weight_by_size, unseen: float = -1.0) -> None:
         self._precision, self._weigh, self._unseen = moving, weigh, unseen
         self._shared: Splats | None = None
         self._shared_colors = np.zeros((0, 3), np.uint8)
@@ -180,7 +178,9 @@ def _light(
     """
     brightest = color_max(list(colors.values()))
     levels = {frame: rounded_colors(values, brightest) for frame, values in colors.items()}
-    is_as_before = [np.array_equal(next(iter(levels.values()))[rows], old) for rows, old in zip(orders, before, strict=True)]
+    is_as_before = [
+        np.array_equal(next(iter(levels.values()))[rows], old) for rows, old in zip(orders, before, strict=True)
+    ]
     if len(levels) == 1 and all(is_as_before):
         return None
     for rows, old, found in zip(orders, before, pieces, strict=True):
