@@ -106,13 +106,16 @@ def header(*, title: str = "A scene", names: Sequence[str] = ("a", "b", "c", "d"
     }
 
 
-def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None) -> Path:
+def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None, poster: bytes | None = None) -> Path:
     """The page of the made scene. folder: Where clips go instead."""
     if folder is not None:
         folder.mkdir()
         about["folder"] = folder.as_uri().rpartition("/")[2]
     packer, first = Packer(), 0
-    with path.open("w", encoding="utf-8", newline="\n") as stream, page_writer(stream, about, folder=folder) as writer:
+    with (
+        path.open("w", encoding="utf-8", newline="\n") as stream,
+        page_writer(stream, about, folder=folder, poster=poster) as writer,
+    ):
         for index, length in enumerate(LENGTHS):
             block = packer.clip(
                 length,

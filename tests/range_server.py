@@ -1,4 +1,4 @@
-"""A server of a folder, for pages that fetch ranges: it can lack ranges, fail, wait, and remember what was asked for."""
+"""A server of a folder, for pages that fetch ranges: it can lack them, fail, wait, and remember what was asked for."""
 
 from __future__ import annotations
 
@@ -85,5 +85,5 @@ class _Handler(BaseHTTPRequestHandler):
         except (BrokenPipeError, ConnectionResetError):
             self.close_connection = True
 
-    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+    def log_message(self, format: str, *args: object) -> None:
         """Nobody reads it."""

@@ -38,9 +38,12 @@ LARGEST_PAGE_BYTES = 150_000_000
 PAGE_SUFFIXES = (".html", ".htm")
 _DESCRIBED_BYTES = 400
 """Bytes of a page's description of a clip, about."""
-_SHARED_ROW_BYTES, _LIGHT_ROW_BYTES, _MOVING_ROW_BYTES = 9.5, 0.5, 8.8
-"""Of a Gaussian that stands still, once; of the light on it, per clip; and per frame of those that move in the frame
-with most of them. As measured on trained captures, where many are too faint to be written."""
+_POSTER_BYTES = 12_000
+_SHARED_ROW_BYTES, _LIGHT_ROW_BYTES = 10.5, 0.5
+"""Of a Gaussian that stands still, once, and of the light on it, per clip."""
+_FINE_ROW_BYTES, _COMPACT_ROW_BYTES = 7.0, 3.8
+"""Per frame, of those that move in the frame with most of them. As measured on trained captures, where many are too
+faint to be written."""
 
 
 def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
@@ -55,8 +58,10 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
     scene = _scene(opened, job)
     clips, played = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
-    n_bytes = _expected_bytes(scene, clips)
+    n_bytes = _expected_bytes(scene, clips, has_folder=False)
     has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
+    if has_folder:
+        n_bytes = _expected_bytes(scene, clips, has_folder=True)
     lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames if played is None else len(played)} frames."]
     if has_folder:
         lines.append(f"The clips go into the folder {job.folder.name}, which must stay next to the page.")
@@ -132,16 +137,17 @@ def _at(clips: Sequence[tuple[Clip, list[TakeFrame]]], number: int) -> TakeFrame
     return [one for _, wanted in clips for one in wanted][number]
 
 
-def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[TakeFrame]]]) -> int:
+def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[TakeFrame]]], *, has_folder: bool) -> int:
     """Of page and blocks together, from the headers of the clips."""
-    n_packed = 0.0
+    n_packed, row_bytes = 0.0, _COMPACT_ROW_BYTES if has_folder else _FINE_ROW_BYTES
     for number, (clip, wanted) in enumerate(clips):
         n_still, n_moving = expected_rows(scene.opened.header(clip.clip_index))
-        n_packed += _LIGHT_ROW_BYTES * n_still + _MOVING_ROW_BYTES * n_moving * len(wanted)
+        n_packed += _LIGHT_ROW_BYTES * n_still + row_bytes * n_moving * len(wanted)
         if number == 0:
             n_packed += _SHARED_ROW_BYTES * n_still
-    n_bytes = round(n_packed * 4 / 3)  # as base64
-    return n_bytes + page_bytes(scene_header(scene, clips[0][1][0].frame, step=1)) + _DESCRIBED_BYTES * len(clips)
+    n_bytes = round(n_packed * (4 / 3 + has_folder))  # as base64, and once more as it is
+    about = scene_header(scene, clips[0][1][0].frame, step=1)
+    return n_bytes + page_bytes(about) + _POSTER_BYTES + _DESCRIBED_BYTES * len(clips)
 
 
 def _check_folder(folder: Path) -> None:

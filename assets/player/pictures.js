@@ -66,7 +66,7 @@ class Pictures {
     this.worker.postMessage({ kind: "picture", frame, clipIndex, row, near, nLevels, epoch: this.epoch });
   }
 
-  /** A coarse picture first, then all of it, then what comes next. */
+  /** A coarse picture first, then all of it, then what comes next as far as the line brings it in time, then the rest. */
   needs(clipIndex) {
     const all = this.quality === "low" ? Math.min(COARSE, this.nLevels) : this.nLevels;
     const { clips, fps, step } = this.header, seconds = (index) => (clips[index].moving.n.length * step) / fps;
@@ -77,14 +77,14 @@ class Pictures {
     for (const index of this.upcoming()) {
       if (index === clipIndex || (held > 0 && (ahead > AHEAD_S || !this.blocks.isStreamed))) continue;
       if (held > 0 && held + nBytes(index) > AHEAD_BYTES) break;
-      needs.push([index, Math.min(all, this.affordable(index, seconds(index))), 2]);
+      needs.push([index, Math.min(all, this.affordable(index, seconds(index))), 2], [index, all, 3]);
       ahead += seconds(index);
       held += nBytes(index);
     }
     return needs.map(([key, upTo, rank]) => ({ key, upTo, rank }));
   }
 
-  /** Levels of a clip that the line brings in the time that it plays; once it stands still, the others follow. */
+  /** Levels of a clip that the line brings in the time that it plays. */
   affordable(index, seconds) {
     const { bytesPerS } = this.loader, { parts } = this.header.clips[index];
     if (this.quality !== "auto" || bytesPerS === null) return parts.length;

@@ -30,7 +30,12 @@ class Player {
     followAddress(this);
     followEmbedder(this);
     this.pictures.want(this.stored(this.clock.frame), [0, 0, 1, 0]); // loads while shaders are compiled
-    this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
+    try {
+      this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
+    } catch (error) {
+      this.pictures.stop(error.message);
+      throw error;
+    }
     this.fillControls();
     followPointer(this.canvas, this.view, () => this.moved());
     const table = keyTable(this);
