@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from engine.export.player.blocks import Packer, joined
+from engine.export.player.moving_rows import NamedRows
 from engine.export.player.page import page_writer
 from engine.export.splats import Splats
 
@@ -108,16 +109,21 @@ def header(*, title: str = "A scene", names: Sequence[str] = ("a", "b", "c", "d"
     }
 
 
-def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None) -> Path:
+def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None, poster: bytes | None = None) -> Path:
     """The page of the made scene. folder: Where clips go instead."""
     if folder is not None:
         folder.mkdir()
         about["folder"] = folder.as_uri().rpartition("/")[2]
     packer, first = Packer(), 0
-    with path.open("w", encoding="utf-8", newline="\n") as stream, page_writer(stream, about, folder=folder) as writer:
+    with (
+        path.open("w", encoding="utf-8", newline="\n") as stream,
+        page_writer(stream, about, folder=folder, poster=poster) as writer,
+    ):
         for index, length in enumerate(LENGTHS):
             block = packer.clip(
-                length, still=lambda frame, c=index: still(c, frame), moving=lambda frame, c=index: moving(c, frame)
+                length,
+                still=lambda frame, c=index: still(c, frame),
+                moving=lambda frame, c=index: NamedRows(moving(c, frame), np.arange(len(moving(c, frame)))),
             )
             place = {"clip_index": index, "name": f"clip{index}", "first": first, "frame_index": first}
             about["clips"].append({**place, **block.description})

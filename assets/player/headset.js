@@ -112,7 +112,8 @@ class Headset {
     const { player } = this, way = SORT_WAY * player.header.radius;
     const differs = (a, b, i) => Math.abs(a - b) > (i < 3 ? SORT_TURN : way);
     if (!this.row || row.some((value, i) => differs(value, this.row[i], i))) this.row = row;
-    player.pictures.want(player.stored(player.clock.frame), this.row);
+    player.pictures.isPlaying = player.clock.isPlaying;
+    player.pictures.want(player.stored(player.clock.frame), this.row, this.share < 1);
   }
 
   keepPace(nowMs) {

@@ -15,11 +15,6 @@ class Player {
     const nMoving = most(header.clips.flatMap((clip) => clip.moving.n));
     this.view = new View(header);
     this.clock = new Clock(nFrames, header.fps / header.step);
-    this.shaders = shaders;
-    this.nLines = lines(nStill) + lines(nMoving);
-    this.renderer = device
-      ? new GpuRenderer(device, this.canvas, shaders["splats.wgsl"], header.background, this.nLines, (text) => this.pictures.stop(text))
-      : new Renderer(this.canvas, shaders, header.background, this.nLines);
     this.timeline = new Timeline(header, nFrames, (frame) => this.stored(frame), (frame) => this.go(frame));
     this.shown = null; // frame that the renderer holds, of the take where there is one
     this.onScreen = null; // frame of the picture on the screen
@@ -27,10 +22,25 @@ class Player {
     this.share = 1; // of the screen's pixels, along a side
     this.movedMs = -REST_MS;
     this.scheduled = 0;
-    this.pictures = new Pictures(header, new Blocks(header.folder), workerSource, {
+    this.pictures = new Pictures(header, new Blocks(header), workerSource, {
+      upcoming: () => this.upcoming(),
       onPicture: (answer) => this.take(answer),
-      onNotice: (text) => notify(text),
+      onNotice: (text, canRetry) => notify(text, canRetry),
     });
+    followAddress(this);
+    followEmbedder(this);
+    this.pictures.want(this.stored(this.clock.frame), [0, 0, 1, 0]); // loads while shaders are compiled
+    this.shaders = shaders;
+    this.nLines = lines(nStill) + lines(nMoving);
+    try {
+      this.renderer = device
+        ? new GpuRenderer(device, this.canvas, shaders["splats.wgsl"], header.background, this.nLines, (text) => this.pictures.stop(text))
+        : new Renderer(this.canvas, shaders, header.background, this.nLines);
+    } catch (error) {
+      this.pictures.stop(error.message);
+      throw error;
+    }
+    this.pictures.wish = null; // until the next tick says how it is drawn
     this.headset = new Headset(this, document.getElementById("headset"));
     this.fillControls();
     followPointer(this.canvas, this.view, () => this.moved());
@@ -102,11 +112,13 @@ class Player {
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
     const { isSoftware, sortsItself } = this.renderer, row = sortsItself ? null : lens.worldToCamera.slice(8, 12);
     const view = { ...lens, size: [this.canvas.width, this.canvas.height], isFull: this.share === 1 };
-    this.pictures.want(this.stored(this.clock.frame), row, isSoftware ? view : null);
+    this.pictures.isPlaying = this.clock.isPlaying;
+    this.pictures.want(this.stored(this.clock.frame), row, this.share < 1, isSoftware ? view : null);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
       this.isDrawn = true;
+      if (this.onScreen === null) document.getElementById("poster")?.remove();
       this.onScreen = this.shown;
     }
     this.tell();
@@ -121,6 +133,13 @@ class Player {
     const { take } = this.header, now = this.clock.frame;
     this.shown = take ? (take[now] === answer.frame ? now : take.indexOf(answer.frame)) : answer.frame;
     this.changed();
+  }
+
+  /** Clips that are played next, in their order. */
+  upcoming() {
+    const { starts } = this.timeline, { frame, isLooping } = this.clock;
+    const later = starts.filter((start) => start > frame), around = isLooping ? starts.filter((start) => start <= frame) : [];
+    return [...new Set([...later, ...around].map((start) => this.pictures.clipOf(this.stored(start))))];
   }
 
   /** The stored frame that one of the take shows. */
@@ -143,6 +162,7 @@ class Player {
     document.getElementById("play").setAttribute("aria-label", clock.isPlaying ? "Pause" : "Play");
     document.getElementById("loop").setAttribute("aria-pressed", clock.isLooping);
     document.getElementById("speed").value = clock.speed;
+    document.getElementById("quality").value = this.pictures.quality;
     document.getElementById("camera").value = this.view.camera === null ? "" : this.view.camera;
   }
 
@@ -151,6 +171,10 @@ class Player {
   go(frame) {
     this.clock.go(frame);
     this.moved();
+  }
+
+  goToSecond(seconds) {
+    this.go(Math.floor(seconds * this.clock.fps + 1e-6));
   }
 
   goToClip(steps) {
@@ -216,7 +240,14 @@ class Player {
       this.clock.speed = Number(event.target.value);
       this.changed();
     };
-    for (const id of ["speed", "camera"]) leaveWhenChosen(by(id), this.canvas);
+    by("quality").append(...["auto", "low", "full"].map((name) => option(name, name[0].toUpperCase() + name.slice(1))));
+    by("quality").onchange = ({ target }) => {
+      this.pictures.quality = target.value;
+      this.changed();
+    };
+    by("again").onclick = () => this.pictures.loader.again();
+    addEventListener("online", () => this.pictures.loader.again());
+    for (const id of ["speed", "camera", "quality"]) leaveWhenChosen(by(id), this.canvas);
     by("camera").onchange = ({ target }) => this.look(target.value === "" ? null : Number(target.value));
   }
 
@@ -244,10 +275,14 @@ function leaveWhenChosen(list, canvas) {
   list.addEventListener("change", () => isPointed && canvas.focus());
 }
 
-function notify(text) {
-  const notice = document.getElementById("notice");
-  if (notice.textContent !== text) notice.textContent = text;
-  notice.hidden = !text;
+/** Words over the picture, which screen readers are told too; canRetry: with a button to try again. */
+function notify(text, canRetry = false) {
+  const by = (id) => document.getElementById(id);
+  for (const [id, said] of [["words", text], ["status", text || "The scene is shown."]]) {
+    if (by(id).textContent !== said) by(id).textContent = said;
+  }
+  by("again").hidden = !canRetry;
+  by("notice").hidden = !text;
 }
 
 function missing() {
