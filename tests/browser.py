@@ -49,6 +49,7 @@ class Browser:
     Attributes:
         console: What the page and the browser said about it: warnings, errors, exceptions.
         requests: URLs that were asked for.
+        pid: Of the browser, which leads its processes.
     """
 
     def __init__(self, folder: Path, *, width: int = 800, height: int = 600) -> None:
@@ -61,7 +62,7 @@ class Browser:
         self._from, to_us = _pipe()
         log = os.open(folder / "chromium.log", os.O_CREAT | os.O_WRONLY)
         arguments = [program, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--window-size={width},{height}"]
-        self._pid = os.posix_spawn(
+        self.pid = os.posix_spawn(
             program,
             [*arguments, "about:blank"],
             os.environ,
@@ -90,11 +91,11 @@ class Browser:
         os.close(self._from)
         for sent in (signal.SIGTERM, signal.SIGKILL):
             try:
-                os.killpg(self._pid, sent)
+                os.killpg(self.pid, sent)
             except ProcessLookupError:
                 break
             time.sleep(0.1)
-        os.waitpid(self._pid, 0)
+        os.waitpid(self.pid, 0)
 
     # ---------------------------------------------------------------- the protocol
 
