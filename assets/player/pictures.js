@@ -39,10 +39,10 @@ class Pictures {
     return !this.loaded.has(index) && !loader.failure("shared")?.isFinal && !loader.failure(index)?.isFinal;
   }
 
-  /** A frame seen from where depths are `row`, the third row of world_to_camera; isCoarse: fewer Gaussians are enough. */
-  want(frame, row, isCoarse = false) {
-    const isFew = this.quality === "low" || (this.quality === "auto" && isCoarse);
-    this.wish = { frame, row, clipIndex: this.clipOf(frame), nLevels: isFew ? Math.min(COARSE, this.nLevels) : this.nLevels };
+  /** A frame seen from where depths are `row`, the third row of world_to_camera; atMost: so many levels are enough. */
+  want(frame, row, atMost = Infinity) {
+    const { quality } = this, few = { auto: atMost, low: Math.min(COARSE, atMost), full: Infinity }[quality];
+    this.wish = { frame, row, clipIndex: this.clipOf(frame), nLevels: Math.min(few, this.nLevels) };
     this.go();
   }
 

@@ -2,6 +2,7 @@
 // shown, never to the playhead.
 
 const SLOW_MS = 60; // where a picture takes longer, as in software, half as many lines are drawn while something moves
+const VERY_SLOW_MS = 300; // then fewer Gaussians still
 const REST_MS = 250; // after so long without a move a picture is drawn in full
 const GOOD_PIXELS = 3 << 20; // more of them are not drawn on screens with very small ones
 
@@ -100,7 +101,8 @@ class Player {
     }
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
     this.pictures.isPlaying = this.clock.isPlaying;
-    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12), this.share < 1);
+    const atMost = this.share === 1 ? Infinity : this.renderer.fullMs > VERY_SLOW_MS ? 1 : 2;
+    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12), atMost);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
