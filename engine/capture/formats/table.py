@@ -15,11 +15,13 @@ from engine.capture.formats import (
     colmap_frames,
     easyvolcap,
     immersive,
+    metashape,
     multipleview,
     n3dv,
     panoptic,
     panoptic_studio,
     qualisys,
+    realitycapture,
     sample,
     technicolor,
     toml_cameras,
@@ -46,6 +48,8 @@ FORMATS = (
     colmap,
     qualisys,
     vicon,
+    metashape,
+    realitycapture,
 )
 """Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 
