@@ -67,7 +67,7 @@ class Browser:
     Attributes:
         console: What the page and the browser said about it: warnings, errors, exceptions.
         requests: URLs that were asked for.
-        pid: Of the browser, and of its group of processes.
+        pid: Of the browser, which leads its processes.
     """
 
     def __init__(self, folder: Path, *, width: int = 800, height: int = 600, flags: Sequence[str] = ()) -> None:

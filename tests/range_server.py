@@ -30,8 +30,7 @@ class RangeServer:
         self.slow_s: dict[str, float] = {}
         self.asked: list[tuple[str, str]] = []
         self.n_sent = 0
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), partial(_Handler, self))
-        self._server.daemon_threads = True
+        self._server = _Server(("127.0.0.1", 0), partial(_Handler, self))
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True)
 
     def __enter__(self) -> RangeServer:
@@ -45,6 +44,13 @@ class RangeServer:
     def url(self, name: str) -> str:
         """Address of a file."""
         return f"http://127.0.0.1:{self._server.server_port}/{name}"
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+
+    def handle_error(self, *_: object) -> None:
+        """A browser may go away whenever it likes."""
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -113,7 +113,7 @@ class Headset {
     const differs = (a, b, i) => Math.abs(a - b) > (i < 3 ? SORT_TURN : way);
     if (!this.row || row.some((value, i) => differs(value, this.row[i], i))) this.row = row;
     player.pictures.isPlaying = player.clock.isPlaying;
-    player.pictures.want(player.stored(player.clock.frame), this.row, this.share < 1);
+    player.pictures.want(player.stored(player.clock.frame), this.row);
   }
 
   keepPace(nowMs) {

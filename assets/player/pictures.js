@@ -41,11 +41,10 @@ class Pictures {
 
   /**
    * A frame seen from where depths are `row`, the third row of world_to_camera, null where nothing has to be sorted;
-   * isCoarse: fewer Gaussians are enough; view: to have it painted, as of Painter.paint. */
-  want(frame, row, isCoarse = false, view = null) {
-    const isFew = this.quality === "low" || (this.quality === "auto" && isCoarse);
-    const nLevels = isFew ? Math.min(COARSE, this.nLevels) : this.nLevels;
-    this.wish = { frame, row, view, clipIndex: this.clipOf(frame), nLevels };
+   * atMost: so many levels are enough; view: to have it painted, as of Painter.paint. */
+  want(frame, row, atMost = Infinity, view = null) {
+    const { quality } = this, few = { auto: atMost, low: Math.min(COARSE, atMost), full: Infinity }[quality];
+    this.wish = { frame, row, view, clipIndex: this.clipOf(frame), nLevels: Math.min(few, this.nLevels) };
     this.go();
   }
 

@@ -2,6 +2,7 @@
 // shown, never to the playhead.
 
 const SLOW_MS = 60; // where a picture takes longer, as in software, half as many lines are drawn while something moves
+const VERY_SLOW_MS = 300; // then fewer Gaussians still
 const REST_MS = 250; // after so long without a move a picture is drawn in full
 const GOOD_PIXELS = 3 << 20; // more of them are not drawn on screens with very small ones
 
@@ -113,7 +114,8 @@ class Player {
     const { isSoftware, sortsItself } = this.renderer, row = sortsItself ? null : lens.worldToCamera.slice(8, 12);
     const view = { ...lens, size: [this.canvas.width, this.canvas.height], isFull: this.share === 1 };
     this.pictures.isPlaying = this.clock.isPlaying;
-    this.pictures.want(this.stored(this.clock.frame), row, this.share < 1, isSoftware ? view : null);
+    const atMost = this.share === 1 ? Infinity : this.renderer.fullMs > VERY_SLOW_MS ? 1 : 2;
+    this.pictures.want(this.stored(this.clock.frame), row, atMost, isSoftware ? view : null);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
