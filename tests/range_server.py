@@ -49,7 +49,7 @@ class RangeServer:
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
-    def handle_error(self, *_: object) -> None:
+    def handle_error(self, request: object, client_address: object) -> None:
         """A browser may go away whenever it likes."""
 
 

@@ -229,9 +229,10 @@ def _packed(
     def moving(frame: int) -> NamedRows:
         told(frame)
         moments = wanted[frame].moments
-        if len(moments) > 1:
+        only, *others = moments
+        if others:
             return NamedRows(Splats.of(scene.at_moments(moments, "moving")))
-        edited = scene.edited(moments[0].frame, "moving")
+        edited = scene.edited(only.frame, "moving")
         splats, rows = Splats.of(edited.gaussians), edited.rows
         if splats.n_dropped:
             return NamedRows(splats)

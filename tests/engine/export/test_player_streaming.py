@@ -101,7 +101,7 @@ def test_a_coarse_picture_comes_first_and_then_the_rest_of_it(browser: Browser, 
 def test_the_quality_says_how_much_is_drawn(browser: Browser, server: RangeServer):
     go_to(browser, server.url("scene.html"))
     n = state(browser, "renderer.nDrawn")
-    for quality, share in (("low", 0.45), ("full", 1.0), ("auto", 1.0)):
+    for quality, share in (("low", 0.5), ("full", 1.0), ("auto", 1.0)):
         browser.value(
             f"void (q => {{ q.value = '{quality}'; q.dispatchEvent(new Event('change')); }})"
             "(document.getElementById('quality'))"
