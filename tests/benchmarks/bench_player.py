@@ -38,7 +38,7 @@ from tests.range_server import RangeServer
 
 SIZE = (640, 480)
 LINE = {"offline": False, "latency": 40, "downloadThroughput": 10e6 / 8, "uploadThroughput": 10e6 / 8}
-N_STARTS, N_SEEKS, N_LEAPS, LONG_FRAMES = 3, 10, 80, 2000
+N_STARTS, N_SEEKS, N_LEAPS, LONG_FRAMES = 3, 10, 40, 2000
 SETTLED = (
     "(p => p && p.isDrawn && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
     " && p.pictures.answered === p.pictures.wish.key && !p.pictures.loader.running.size"
