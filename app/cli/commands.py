@@ -94,6 +94,9 @@ COMMANDS = {
         "Nothing was written.",
         has_backend=True,
     ),
+    "blender": Command(
+        "write the add-on with which Blender opens exported sequences", "app.cli.addons.blender_command"
+    ),
     "inspect": Command(
         "examine and correct a capture, or show the size of a project's trained clips",
         "app.cli.captures.inspect_command",

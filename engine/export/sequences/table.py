@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from engine.export.sequences.sequence import SequenceReader, SequenceTiming, Stretch
+from engine.export.sequences.sequence import SequenceReader, SequenceTiming, SequenceStretch
 
 
 class SequenceFormat(NamedTuple):
@@ -27,7 +27,7 @@ class SequenceFormat(NamedTuple):
     use: str
     suffix: str
     min_psnr_db: float
-    write: Callable[[Iterable[Stretch], SequenceTiming, BinaryIO], tuple[str, ...]]
+    write: Callable[[Iterable[SequenceStretch], SequenceTiming, BinaryIO], tuple[str, ...]]
     open: Callable[[Path], SequenceReader]
 
 
