@@ -14,6 +14,7 @@ import select
 import shutil
 import signal
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,23 @@ FLAGS = (
     "--hide-scrollbars",
     "--remote-debugging-pipe",
 )
+WEBGPU_FLAGS = (
+    "--enable-unsafe-webgpu",
+    "--use-webgpu-adapter=swiftshader",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+)
+"""Further flags, with which there is WebGPU in software."""
+AS_A_CARD = """(() => {
+  const type = WebGL2RenderingContext.prototype, ask = type.getParameter;
+  type.getParameter = function (name) { return name === 0x9246 ? "A card" : ask.call(this, name); };
+})();"""
+"""A script before the page's own, so that it takes the browser's software for a graphics card."""
+WITHOUT_WEBGPU = "Object.defineProperty(Navigator.prototype, 'gpu', {value: undefined});"
+AS_A_CARD_WITH_WEBGPU = (
+    f"{AS_A_CARD} Object.defineProperty(GPUAdapterInfo.prototype, 'isFallbackAdapter', {{get: () => false}});"
+)
+"""The same with `WEBGPU_FLAGS`."""
 _FIRST_FREE_FD = 10
 
 
@@ -49,9 +67,10 @@ class Browser:
     Attributes:
         console: What the page and the browser said about it: warnings, errors, exceptions.
         requests: URLs that were asked for.
+        pid: Of the browser, which leads its processes.
     """
 
-    def __init__(self, folder: Path, *, width: int = 800, height: int = 600) -> None:
+    def __init__(self, folder: Path, *, width: int = 800, height: int = 600, flags: Sequence[str] = ()) -> None:
         program = chromium()
         assert program is not None
         self.console: list[str] = []
@@ -60,8 +79,14 @@ class Browser:
         from_us, self._to = _pipe()
         self._from, to_us = _pipe()
         log = os.open(folder / "chromium.log", os.O_CREAT | os.O_WRONLY)
-        arguments = [program, *FLAGS, f"--user-data-dir={folder / 'profile'}", f"--window-size={width},{height}"]
-        self._pid = os.posix_spawn(
+        arguments = [
+            program,
+            *FLAGS,
+            *flags,
+            f"--user-data-dir={folder / 'profile'}",
+            f"--window-size={width},{height}",
+        ]
+        self.pid = os.posix_spawn(
             program,
             [*arguments, "about:blank"],
             os.environ,
@@ -90,11 +115,11 @@ class Browser:
         os.close(self._from)
         for sent in (signal.SIGTERM, signal.SIGKILL):
             try:
-                os.killpg(self._pid, sent)
+                os.killpg(self.pid, sent)
             except ProcessLookupError:
                 break
             time.sleep(0.1)
-        os.waitpid(self._pid, 0)
+        os.waitpid(self.pid, 0)
 
     # ---------------------------------------------------------------- the protocol
 
@@ -144,6 +169,10 @@ class Browser:
         """Go to a page on the disk."""
         self.call("Page.navigate", url=page.resolve().as_uri())
 
+    def before_pages(self, script: str) -> None:
+        """Run a script in every page before its own."""
+        self.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+
     def resize(self, width: int, height: int, *, ratio: float = 1.0, is_phone: bool = False) -> None:
         """Size of the page in its own pixels, and how many of the screen's make one of them."""
         self.call(
@@ -190,12 +219,13 @@ class Browser:
         """Press and release the left button."""
         self.drag((x, y), (x, y))
 
-    def touch(self, *fingers: list[tuple[float, float]]) -> None:
-        """Fingers along their paths, all of the same number of points."""
+    def touch(self, *fingers: list[tuple[float, float]], at_s: float | None = None) -> None:
+        """Fingers along their paths, all of the same number of points. at_s: when, of time.time()"""
+        when = {} if at_s is None else {"timestamp": at_s}
         for step, points in enumerate(zip(*fingers, strict=True)):
             kind = "touchMove" if step else "touchStart"
-            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y} for x, y in points])
-        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y} for x, y in points], **when)
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[], **when)
 
 
 def _pipe() -> tuple[int, int]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from engine.export.player.blocks import Packer, joined
+from engine.export.player.moving_rows import NamedRows
 from engine.export.player.page import page_writer
 from engine.export.splats import Splats
 
@@ -19,6 +20,8 @@ LENGTHS = (3, 4, 3, 2)
 """Frames of the clips: the first one as it is; one with hidden and further rows, and light that changes evenly; one
 with light that flickers; one in which what stands still does not."""
 N_FRAMES = sum(LENGTHS)
+FLOOR, METERS_PER_UNIT = -1.5, 0.7
+"""How far up the ground is, scene units, and the length of one."""
 SIZE = (160, 120)
 
 
@@ -98,6 +101,7 @@ def header(*, title: str = "A scene", names: Sequence[str] = ("a", "b", "c", "d"
         "background": list(BACKGROUND),
         "up": [0.0, -1.0, 0.0],
         "radius": 4.0,
+        "stage": {"floor": FLOOR, "meters_per_unit": METERS_PER_UNIT},
         "home": home,
         "cameras": cameras,
         "clips": [],
@@ -105,16 +109,21 @@ def header(*, title: str = "A scene", names: Sequence[str] = ("a", "b", "c", "d"
     }
 
 
-def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None) -> Path:
+def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None, poster: bytes | None = None) -> Path:
     """The page of the made scene. folder: Where clips go instead."""
     if folder is not None:
         folder.mkdir()
         about["folder"] = folder.as_uri().rpartition("/")[2]
     packer, first = Packer(), 0
-    with path.open("w", encoding="utf-8", newline="\n") as stream, page_writer(stream, about, folder=folder) as writer:
+    with (
+        path.open("w", encoding="utf-8", newline="\n") as stream,
+        page_writer(stream, about, folder=folder, poster=poster) as writer,
+    ):
         for index, length in enumerate(LENGTHS):
             block = packer.clip(
-                length, still=lambda frame, c=index: still(c, frame), moving=lambda frame, c=index: moving(c, frame)
+                length,
+                still=lambda frame, c=index: still(c, frame),
+                moving=lambda frame, c=index: NamedRows(moving(c, frame), np.arange(len(moving(c, frame)))),
             )
             place = {"clip_index": index, "name": f"clip{index}", "first": first, "frame_index": first}
             about["clips"].append({**place, **block.description})

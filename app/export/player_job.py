@@ -1,7 +1,8 @@
-"""The job that writes a player: trained frames as one HTML page, or as a page with a folder of data."""
+"""The job that writes a player: trained frames as one HTML page, or as a page that streams a folder of data."""
 
 from __future__ import annotations
 
+import html
 import math
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -9,18 +10,25 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from app.export.edits.written_edits import written_edits
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report
 from app.export.jobs.player import PlayerJob
-from app.export.player_scene import scene_header
+from app.export.player_scene import poster, scene_header
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_file, staged_folder
 from app.export.take import TakeFrame, take_frames, timing_of
 from engine.capture.clip import Clip
+from engine.editing.gaussian_rows import RowSet
 from engine.errors import ProjectError
 from engine.export.player.blocks import Block, Packer
+from engine.export.player.moving_rows import NamedRows
 from engine.export.player.page import page_bytes, page_writer
+from engine.export.player.row_coding import COMPACT
+from engine.export.player.seen_weights import UNSEEN, SeenWeights
+from engine.export.player.stage import Stage, stage_of
 from engine.export.splats import Splats
 
 if TYPE_CHECKING:
@@ -31,9 +39,12 @@ LARGEST_PAGE_BYTES = 150_000_000
 PAGE_SUFFIXES = (".html", ".htm")
 _DESCRIBED_BYTES = 400
 """Bytes of a page's description of a clip, about."""
-_SHARED_ROW_BYTES, _LIGHT_ROW_BYTES, _MOVING_ROW_BYTES = 9.5, 0.5, 8.8
-"""Of a Gaussian that stands still, once; of the light on it, per clip; and per frame of those that move in the frame
-with most of them. As measured on trained captures, where many are too faint to be written."""
+_POSTER_BYTES = 12_000
+_SHARED_ROW_BYTES, _LIGHT_ROW_BYTES = 10.5, 0.5
+"""Of a Gaussian that stands still, once, and of the light on it, per clip."""
+_FINE_ROW_BYTES, _COMPACT_ROW_BYTES = 7.0, 3.8
+"""Per frame, of those that move in the frame with most of them. As measured on trained captures, where many are too
+faint to be written."""
 
 
 def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
@@ -48,14 +59,16 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
     scene = _scene(opened, job)
     clips, played = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
-    n_bytes = _expected_bytes(scene, clips)
+    n_bytes = _expected_bytes(scene, clips, has_folder=False)
     has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
+    if has_folder:
+        n_bytes = _expected_bytes(scene, clips, has_folder=True)
     lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames if played is None else len(played)} frames."]
     if has_folder:
         lines.append(f"The clips go into the folder {job.folder.name}, which must stay next to the page.")
         _check_folder(job.folder)
     check_target(job.out, n_bytes=n_bytes)
-    return ExportEstimate(len(clips) + 2 if has_folder else 1, n_bytes, tuple(lines))
+    return ExportEstimate(2 * len(clips) + 3 if has_folder else 1, n_bytes, tuple(lines))
 
 
 def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
@@ -74,13 +87,17 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     scene.check(moment.frame for _, wanted in clips for one in wanted for moment in one.moments)
     n_frames = sum(len(wanted) for _, wanted in clips)
     header: dict[str, Any] = scene_header(scene, clips[0][1][0].frame, step=job.frames.step if job.frames else 1)
+    header["stage"] = _stage(scene, clips[0][1][0], header["radius"])
     header["take"] = played
     header["folder"] = _relative_url(job.folder.name) if has_folder else None
-    packer, n_done, n_bytes = Packer(), 0, 0
+    weigh = SeenWeights.of(opened.rig, header["near_plane"], opened.backend)
+    packer = Packer(COMPACT, weigh=weigh, unseen=UNSEEN) if has_folder else Packer(weigh=weigh)
+    n_done, n_bytes = 0, 0
+    first = clips[0][1][0] if played is None else _at(clips, played[0])
     with ExitStack() as stack:
         page, folder = stack.enter_context(_staged(job, has_folder=has_folder))
         stream = stack.enter_context(page.open("w", encoding="utf-8", newline="\n"))
-        with page_writer(stream, header, folder=folder) as writer:
+        with page_writer(stream, header, folder=folder, poster=poster(scene, first)) as writer:
             for clip, wanted in clips:
                 block = _packed(
                     packer, scene, wanted, lambda done, n=n_done: report(ExportProgress(n + done, n_frames))
@@ -99,19 +116,47 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
         stream.flush()
         n_bytes = writer.n_bytes_of_blocks * has_folder + page.stat().st_size
         report(ExportProgress(n_frames, n_frames))
-    return ExportResult(job.out, len(header["clips"]) + 2 if has_folder else 1, n_bytes)
+    n_files = 2 * len(header["clips"]) + 3 if has_folder else 1
+    return ExportResult(job.out, n_files, n_bytes, lines=(f"To embed it: {embedding(job.out.name, header['title'])}",))
 
 
-def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[TakeFrame]]]) -> int:
+def _stage(scene: SceneFrames, one: TakeFrame, radius: float) -> Stage:
+    still, moving = (Splats.of(scene.at_moments(one.moments, part)) for part in ("static", "moving"))
+    opened = scene.opened
+    known = opened.project.document.world.meters_per_unit
+    return stage_of(still, moving, up=opened.up, focus=opened.rig.focus_point(), radius=radius, meters_per_unit=known)
+
+
+def embedding(name: str, title: str) -> str:
+    """What a page next to this one writes to show it.
+
+    Args:
+        name: Of the file.
+        title: Of the scene, for screen readers.
+    """
+    allowed = 'allow="fullscreen; xr-spatial-tracking"'
+    return (
+        f'<iframe src="{html.escape(_relative_url(name))}#autoplay" title="{html.escape(title)}" width="960" '
+        f'height="600" style="border: 0" {allowed}></iframe>'
+    )
+
+
+def _at(clips: Sequence[tuple[Clip, list[TakeFrame]]], number: int) -> TakeFrame:
+    """A frame of the page by its number."""
+    return [one for _, wanted in clips for one in wanted][number]
+
+
+def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[TakeFrame]]], *, has_folder: bool) -> int:
     """Of page and blocks together, from the headers of the clips."""
-    n_packed = 0.0
+    n_packed, row_bytes = 0.0, _COMPACT_ROW_BYTES if has_folder else _FINE_ROW_BYTES
     for number, (clip, wanted) in enumerate(clips):
         n_still, n_moving = expected_rows(scene.opened.header(clip.clip_index))
-        n_packed += _LIGHT_ROW_BYTES * n_still + _MOVING_ROW_BYTES * n_moving * len(wanted)
+        n_packed += _LIGHT_ROW_BYTES * n_still + row_bytes * n_moving * len(wanted)
         if number == 0:
             n_packed += _SHARED_ROW_BYTES * n_still
-    n_bytes = round(n_packed * 4 / 3)  # as base64
-    return n_bytes + page_bytes(scene_header(scene, clips[0][1][0].frame, step=1)) + _DESCRIBED_BYTES * len(clips)
+    n_bytes = round(n_packed * (4 / 3 + has_folder))  # as base64, and once more as it is
+    about = scene_header(scene, clips[0][1][0].frame, step=1)
+    return n_bytes + page_bytes(about) + _POSTER_BYTES + _DESCRIBED_BYTES * len(clips)
 
 
 def _check_folder(folder: Path) -> None:
@@ -179,9 +224,19 @@ def _packed(
     packer: Packer, scene: SceneFrames, wanted: list[TakeFrame], told: Callable[[int], None] = lambda n_done: None
 ) -> Block:
     """A clip's block. told: Called before each frame is made, with the number of frames made."""
+    sets: dict[RowSet, int] = {}
 
-    def moving(frame: int) -> Splats:
+    def moving(frame: int) -> NamedRows:
         told(frame)
-        return Splats.of(scene.at_moments(wanted[frame].moments, "moving"))
+        moments = wanted[frame].moments
+        only, *others = moments
+        if others:
+            return NamedRows(Splats.of(scene.at_moments(moments, "moving")))
+        edited = scene.edited(only.frame, "moving")
+        splats, rows = Splats.of(edited.gaussians), edited.rows
+        if splats.n_dropped:
+            return NamedRows(splats)
+        numbers = np.array([sets.setdefault(one, len(sets)) for one in rows.sets], np.int64)
+        return NamedRows(splats, (numbers[rows.set_index] << 32) + rows.number)
 
     return packer.clip(len(wanted), lambda frame: Splats.of(scene.gaussians(wanted[frame].frame, "static")), moving)

@@ -1,10 +1,13 @@
-"""A player's facts about a scene other than its Gaussians: time, cameras, and where one looks from at first."""
+"""A player's facts about a scene other than its Gaussians: time, cameras, where one looks from at first, and what is
+seen from there."""
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
 from app.playback.modes.arrays import BACKGROUND
 from app.playback.views.orbit_view import OrbitView
@@ -12,7 +15,12 @@ from app.playback.views.rig_views import camera_pose, home_camera
 
 if TYPE_CHECKING:
     from app.export.scene_frames import SceneFrames
+    from app.export.take import TakeFrame
     from engine.camera.rig import CameraRig
+
+POSTER_SIZE = (640, 360)
+"""Pixels."""
+POSTER_QUALITY = 70
 
 
 def scene_header(scene: SceneFrames, frame: float, *, step: int) -> dict[str, Any]:
@@ -46,6 +54,24 @@ def scene_header(scene: SceneFrames, frame: float, *, step: int) -> dict[str, An
         "take": None,
         "clips": [],
     }
+
+
+def poster(scene: SceneFrames, shown: TakeFrame) -> bytes:
+    """A JPEG of POSTER_SIZE of the first view. Raises ProjectError as `SceneFrames.gaussians`."""
+    from app.export.video.drawing import draw
+    from app.export.video.views import ViewPoint
+
+    width, height = POSTER_SIZE
+    view = OrbitView(scene.opened.rig)
+    focal = height / (2.0 * np.tan(view.fov_y / 2.0))
+    K = np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
+    drawn = draw(scene, shown.moments, ViewPoint(view.world_to_camera(), K, width, height))
+    picture = drawn.color + (1.0 - drawn.alpha[..., None]) * np.array(BACKGROUND, np.float32)
+    stream = io.BytesIO()
+    Image.fromarray(np.round(255.0 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)).save(
+        stream, "JPEG", quality=POSTER_QUALITY, optimize=True, progressive=True
+    )
+    return stream.getvalue()
 
 
 def _camera(rig: CameraRig, index: int, otherwise: float) -> dict[str, Any]:

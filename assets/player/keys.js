@@ -4,6 +4,7 @@ const GESTURES = [
   ["Drag, one finger", "Orbit"],
   ["Right drag, Shift+drag, two fingers", "Pan"],
   ["Wheel, pinch", "Zoom"],
+  ["Double click, double tap", "Centre what is there"],
 ];
 
 function keyTable(player) {

@@ -2,11 +2,12 @@
 // shown, never to the playhead.
 
 const SLOW_MS = 60; // where a picture takes longer, as in software, half as many lines are drawn while something moves
+const VERY_SLOW_MS = 300; // then fewer Gaussians still
 const REST_MS = 250; // after so long without a move a picture is drawn in full
 const GOOD_PIXELS = 3 << 20; // more of them are not drawn on screens with very small ones
 
 class Player {
-  constructor(header, shaders, workerSource) {
+  constructor(header, shaders, workerSource, device) {
     this.header = header;
     this.canvas = document.getElementById("picture");
     const nFrames = header.take ? header.take.length : header.clips.reduce((n, clip) => n + clip.moving.n.length, 0);
@@ -15,7 +16,6 @@ class Player {
     const nMoving = most(header.clips.flatMap((clip) => clip.moving.n));
     this.view = new View(header);
     this.clock = new Clock(nFrames, header.fps / header.step);
-    this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
     this.timeline = new Timeline(header, nFrames, (frame) => this.stored(frame), (frame) => this.go(frame));
     this.shown = null; // frame that the renderer holds, of the take where there is one
     this.onScreen = null; // frame of the picture on the screen
@@ -23,10 +23,26 @@ class Player {
     this.share = 1; // of the screen's pixels, along a side
     this.movedMs = -REST_MS;
     this.scheduled = 0;
-    this.pictures = new Pictures(header, new Blocks(header.folder), workerSource, {
+    this.pictures = new Pictures(header, new Blocks(header), workerSource, {
+      upcoming: () => this.upcoming(),
       onPicture: (answer) => this.take(answer),
-      onNotice: (text) => notify(text),
+      onNotice: (text, canRetry) => notify(text, canRetry),
     });
+    followAddress(this);
+    followEmbedder(this);
+    this.pictures.want(this.stored(this.clock.frame), [0, 0, 1, 0]); // loads while shaders are compiled
+    this.shaders = shaders;
+    this.nLines = lines(nStill) + lines(nMoving);
+    try {
+      this.renderer = device
+        ? new GpuRenderer(device, this.canvas, shaders["splats.wgsl"], header.background, this.nLines, (text) => this.pictures.stop(text))
+        : new Renderer(this.canvas, shaders, header.background, this.nLines);
+    } catch (error) {
+      this.pictures.stop(error.message);
+      throw error;
+    }
+    this.pictures.wish = null; // until the next tick says how it is drawn
+    this.headset = new Headset(this, document.getElementById("headset"));
     this.fillControls();
     followPointer(this.canvas, this.view, () => this.moved());
     const table = keyTable(this);
@@ -78,11 +94,16 @@ class Player {
     this.changed();
   }
 
-  tick(nowMs) {
-    this.scheduled = 0;
+  passTime(nowMs) {
     this.clock.tell(nowMs, this.pictures.isWaitingFor(this.stored(this.clock.frame)));
     for (const name of ["shown", "onScreen"]) // the same picture may come several times
       if (this[name] !== null && this.stored(this[name]) === this.stored(this.clock.frame)) this[name] = this.clock.frame;
+  }
+
+  tick(nowMs) {
+    this.scheduled = 0;
+    if (this.headset.session) return; // which has its own pace
+    this.passTime(nowMs);
     const isReady = this.renderer.isDone();
     if (isReady) {
       const isMoving = this.clock.isPlaying || performance.now() - this.movedMs < REST_MS;
@@ -90,11 +111,16 @@ class Player {
       this.fit();
     }
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
-    this.pictures.want(this.stored(this.clock.frame), lens.worldToCamera.slice(8, 12));
+    const { isSoftware, sortsItself } = this.renderer, row = sortsItself ? null : lens.worldToCamera.slice(8, 12);
+    const view = { ...lens, size: [this.canvas.width, this.canvas.height], isFull: this.share === 1 };
+    this.pictures.isPlaying = this.clock.isPlaying;
+    const atMost = this.share === 1 ? Infinity : this.renderer.fullMs > VERY_SLOW_MS ? 1 : 2;
+    this.pictures.want(this.stored(this.clock.frame), row, atMost, isSoftware ? view : null);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
       this.isDrawn = true;
+      if (this.onScreen === null) document.getElementById("poster")?.remove();
       this.onScreen = this.shown;
     }
     this.tell();
@@ -109,6 +135,13 @@ class Player {
     const { take } = this.header, now = this.clock.frame;
     this.shown = take ? (take[now] === answer.frame ? now : take.indexOf(answer.frame)) : answer.frame;
     this.changed();
+  }
+
+  /** Clips that are played next, in their order. */
+  upcoming() {
+    const { starts } = this.timeline, { frame, isLooping } = this.clock;
+    const later = starts.filter((start) => start > frame), around = isLooping ? starts.filter((start) => start <= frame) : [];
+    return [...new Set([...later, ...around].map((start) => this.pictures.clipOf(this.stored(start))))];
   }
 
   /** The stored frame that one of the take shows. */
@@ -131,6 +164,7 @@ class Player {
     document.getElementById("play").setAttribute("aria-label", clock.isPlaying ? "Pause" : "Play");
     document.getElementById("loop").setAttribute("aria-pressed", clock.isLooping);
     document.getElementById("speed").value = clock.speed;
+    document.getElementById("quality").value = this.pictures.quality;
     document.getElementById("camera").value = this.view.camera === null ? "" : this.view.camera;
   }
 
@@ -139,6 +173,10 @@ class Player {
   go(frame) {
     this.clock.go(frame);
     this.moved();
+  }
+
+  goToSecond(seconds) {
+    this.go(Math.floor(seconds * this.clock.fps + 1e-6));
   }
 
   goToClip(steps) {
@@ -204,7 +242,14 @@ class Player {
       this.clock.speed = Number(event.target.value);
       this.changed();
     };
-    for (const id of ["speed", "camera"]) leaveWhenChosen(by(id), this.canvas);
+    by("quality").append(...["auto", "low", "full"].map((name) => option(name, name[0].toUpperCase() + name.slice(1))));
+    by("quality").onchange = ({ target }) => {
+      this.pictures.quality = target.value;
+      this.changed();
+    };
+    by("again").onclick = () => this.pictures.loader.again();
+    addEventListener("online", () => this.pictures.loader.again());
+    for (const id of ["speed", "camera", "quality"]) leaveWhenChosen(by(id), this.canvas);
     by("camera").onchange = ({ target }) => this.look(target.value === "" ? null : Number(target.value));
   }
 
@@ -232,10 +277,14 @@ function leaveWhenChosen(list, canvas) {
   list.addEventListener("change", () => isPointed && canvas.focus());
 }
 
-function notify(text) {
-  const notice = document.getElementById("notice");
-  if (notice.textContent !== text) notice.textContent = text;
-  notice.hidden = !text;
+/** Words over the picture, which screen readers are told too; canRetry: with a button to try again. */
+function notify(text, canRetry = false) {
+  const by = (id) => document.getElementById(id);
+  for (const [id, said] of [["words", text], ["status", text || "The scene is shown."]]) {
+    if (by(id).textContent !== said) by(id).textContent = said;
+  }
+  by("again").hidden = !canRetry;
+  by("notice").hidden = !text;
 }
 
 function missing() {
@@ -244,12 +293,13 @@ function missing() {
   return "";
 }
 
-function begin() {
+async function begin() {
   const part = (id) => document.getElementById(id).textContent;
   const lacks = missing();
   try {
     if (lacks) throw new Error(`This browser cannot ${lacks}. A version of 2023 or later can.`);
-    window.clipgstreamPlayer = new Player(JSON.parse(part("header")), JSON.parse(part("shaders")), part("worker"));
+    const header = JSON.parse(part("header")), shaders = JSON.parse(part("shaders"));
+    window.clipgstreamPlayer = new Player(header, shaders, part("worker"), await graphicsDevice());
   } catch (error) {
     notify(error.message);
   }

@@ -1,12 +1,12 @@
 #version 330 core
-// The finished picture, whose row 0 is the top row, on a canvas, whose row 0 is the bottom row.
+// The finished picture, whose row 0 is the top row, on a rectangle of a canvas, whose row 0 is the bottom row.
 
 uniform sampler2D picture;
-uniform int height;
+uniform vec4 place; // left, bottom, width and height of the rectangle, pixels
 
 out vec4 color;
 
 void main() {
-    ivec2 place = ivec2(gl_FragCoord.xy);
-    color = vec4(texelFetch(picture, ivec2(place.x, height - 1 - place.y), 0).rgb, 1.0);
+    vec2 share = (gl_FragCoord.xy - place.xy) / place.zw;
+    color = vec4(texture(picture, vec2(share.x, 1.0 - share.y)).rgb, 1.0);
 }

@@ -1,6 +1,13 @@
 // Draws Gaussians with the shaders of the window: assets/shaders/splat.vert and splat.frag, translated for WebGL 2.
 
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|swrast|microsoft basic render/i; // graphics cards that are none
 const HIDDEN_MS = 5000; // nobody looked meanwhile, as in a tab in the background
+
+/** Does the processor play the graphics card? */
+function isSoftware(gl) {
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  return SOFTWARE.test(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+}
 
 class Renderer {
   /** shaders: sources by name; nLines: of the textures, for the largest frame. Throws where the browser cannot do it; begin() again after the context was restored. */
@@ -21,12 +28,14 @@ class Renderer {
       throw new Error("There are more Gaussians than this graphics card can hold.");
     }
     const hasFloats = gl.getExtension("EXT_color_buffer_float") || gl.getExtension("EXT_color_buffer_half_float");
+    this.isSoftware = isSoftware(gl); // then pictures are better painted by the worker than drawn here
     this.targetFormat = hasFloats ? gl.RGBA16F : gl.RGBA8; // many faint layers drift in 8 bits
     this.splats = this.program("splat.vert", "splat.frag");
     this.present = this.program("resolve.vert", "present.frag");
+    this.marks = this.program("mark.vert", "mark.frag");
     this.geometry = this.texture(gl.RGBA32F, TEXELS_PER_ROW * ROWS_PER_LINE, this.nLines);
     this.colors = this.texture(gl.RGBA32F, ROWS_PER_LINE, this.nLines);
-    this.target = this.fence = null;
+    this.target = this.fence = this.painted = null;
     this.fullMs = 0;
     this.nDrawn = 0;
     this.size = [0, 0];
@@ -40,6 +49,13 @@ class Renderer {
     this.corners = gl.createBuffer(); // two triangles for each Gaussian, in plain triangles: instances are slow in software
     this.nCorners = 0;
     this.nothing = gl.createVertexArray();
+    this.strip = gl.createVertexArray();
+    this.stripPlaces = gl.createBuffer();
+    gl.bindVertexArray(this.strip);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.stripPlaces);
+    const place = gl.getAttribLocation(this.marks.program, "place");
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 0, 0);
     gl.disable(gl.DEPTH_TEST);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
   }
@@ -66,6 +82,12 @@ class Renderer {
 
   /** Take up what the worker answered; what it leaves out stays as it is. */
   take(answer) {
+    if (answer.pixels) {
+      this.takePainted(answer);
+      return;
+    }
+    if (this.painted) this.gl.deleteTexture(this.painted);
+    this.painted = null;
     if (answer.movingGeometry) {
       const first = lines(answer.nStill);
       if (answer.stillGeometry) this.write(this.geometry, TEXELS_PER_ROW, 0, answer.stillGeometry);
@@ -78,6 +100,15 @@ class Renderer {
     gl.bufferData(gl.ARRAY_BUFFER, answer.order, gl.DYNAMIC_DRAW);
     this.nDrawn = answer.order.length / 4;
     this.holdCorners(this.nDrawn);
+  }
+
+  /** Take up a picture that the worker painted. */
+  takePainted({ pixels, size, isFull, tookMs }) {
+    const { gl } = this;
+    if (!this.painted) this.painted = this.smooth(gl.createTexture());
+    gl.bindTexture(gl.TEXTURE_2D, this.painted);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, ...size, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
+    if (isFull) this.fullMs = tookMs;
   }
 
   holdCorners(n) {
@@ -98,6 +129,15 @@ class Renderer {
     return texture;
   }
 
+  /** Between its pixels a texture is linear. */
+  smooth(texture) {
+    const { gl } = this;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.LINEAR);
+    for (const axis of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, axis, gl.CLAMP_TO_EDGE);
+    return texture;
+  }
+
   write(texture, texels, firstLine, values) {
     const { gl } = this, width = texels * ROWS_PER_LINE, height = values.length / (4 * width);
     if (!height) return;
@@ -105,16 +145,17 @@ class Renderer {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, firstLine, width, height, gl.RGBA, gl.FLOAT, values);
   }
 
-  /** Fit the picture to the canvas. */
-  resize() {
-    const { gl, canvas } = this;
-    if (this.size[0] === canvas.width && this.size[1] === canvas.height) return;
-    this.size = [canvas.width, canvas.height];
+  /** Have a picture so wide and high to draw into. */
+  resize(width, height) {
+    const { gl } = this;
+    if (this.size[0] === width && this.size[1] === height) return;
+    this.size = [width, height];
     if (this.target) {
       gl.deleteTexture(this.target.texture);
       gl.deleteFramebuffer(this.target.framebuffer);
     }
-    const texture = this.texture(this.targetFormat, ...this.size), framebuffer = gl.createFramebuffer();
+    const texture = this.texture(this.targetFormat, width, height), framebuffer = gl.createFramebuffer();
+    this.smooth(texture);
     gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
     this.target = { texture, framebuffer };
@@ -133,46 +174,75 @@ class Renderer {
   }
 
   /**
-   * lens: {worldToCamera: 16 numbers by rows, focal: [2], center: [2]} in pixels of the canvas; near: scene units;
-   * isFull: whether the canvas has all pixels of the screen, so that fullMs is how long such a picture takes. */
+   * Draw onto the canvas. lens: {worldToCamera: 16 numbers by rows, focal: [2], center: [2]} in pixels of the canvas; near:
+   * scene units; isFull: whether the canvas has all pixels of the screen, so that fullMs is how long such a picture takes. */
   draw(lens, near, isFull = true) {
-    const { gl, splats, present } = this;
-    this.resize();
-    const [width, height] = this.size;
+    const { gl, canvas } = this;
+    if (!this.painted) this.paint(lens, near, [canvas.width, canvas.height]);
+    const picture = this.painted || this.target.texture;
+    this.put(picture, null, { x: 0, y: 0, width: canvas.width, height: canvas.height });
+    this.isFull = isFull && !this.painted;
+    this.begunMs = performance.now();
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+  }
+
+  /** Draw a picture so wide and high, which is then put somewhere. */
+  paint(lens, near, [width, height]) {
+    const { gl, splats } = this;
+    this.resize(width, height);
     gl.viewport(0, 0, width, height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.framebuffer);
     gl.clearColor(...this.background, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    if (this.nDrawn) {
-      gl.useProgram(splats.program);
-      gl.enable(gl.BLEND);
-      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      gl.activeTexture(gl.TEXTURE1);
-      gl.bindTexture(gl.TEXTURE_2D, this.colors);
-      gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, this.geometry);
-      gl.uniform1i(splats.at("geometry"), 0);
-      gl.uniform1i(splats.at("colors"), 1);
-      gl.uniformMatrix4fv(splats.at("world_to_camera"), true, lens.worldToCamera);
-      gl.uniform2fv(splats.at("focal_px"), lens.focal);
-      gl.uniform2fv(splats.at("center_px"), lens.center);
-      gl.uniform2f(splats.at("size_px"), width, height);
-      gl.uniform1f(splats.at("near"), near);
-      gl.bindVertexArray(this.quads);
-      gl.drawElements(gl.TRIANGLES, 6 * this.nDrawn, gl.UNSIGNED_INT, 0);
-    }
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    if (!this.nDrawn) return;
+    gl.useProgram(splats.program);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.activeTexture(gl.TEXTURE1);
+    gl.bindTexture(gl.TEXTURE_2D, this.colors);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.geometry);
+    gl.uniform1i(splats.at("geometry"), 0);
+    gl.uniform1i(splats.at("colors"), 1);
+    gl.uniformMatrix4fv(splats.at("world_to_camera"), true, lens.worldToCamera);
+    gl.uniform2fv(splats.at("focal_px"), lens.focal);
+    gl.uniform2fv(splats.at("center_px"), lens.center);
+    gl.uniform2f(splats.at("size_px"), width, height);
+    gl.uniform1f(splats.at("near"), near);
+    gl.bindVertexArray(this.quads);
+    gl.drawElements(gl.TRIANGLES, 6 * this.nDrawn, gl.UNSIGNED_INT, 0);
+  }
+
+  /** Draw a strip of triangles over the picture. places: x, y, z of each corner; toCamera: by rows, OpenCV axes; lens: as of paint. */
+  mark(places, toCamera, lens, color) {
+    const { gl, marks } = this;
+    gl.useProgram(marks.program);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.uniformMatrix4fv(marks.at("to_camera"), true, toCamera);
+    gl.uniform2fv(marks.at("focal_px"), lens.focal);
+    gl.uniform2fv(marks.at("center_px"), lens.center);
+    gl.uniform2f(marks.at("size_px"), ...this.size);
+    gl.uniform4fv(marks.at("shade"), color);
+    gl.bindVertexArray(this.strip);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.stripPlaces);
+    gl.bufferData(gl.ARRAY_BUFFER, places, gl.DYNAMIC_DRAW);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, places.length / 3);
+  }
+
+  /** Put a picture onto a rectangle of a framebuffer, null for the canvas. */
+  put(picture, framebuffer, { x, y, width, height }) {
+    const { gl, present } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(x, y, width, height);
     gl.disable(gl.BLEND);
     gl.useProgram(present.program);
     gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.target.texture);
+    gl.bindTexture(gl.TEXTURE_2D, picture);
     gl.uniform1i(present.at("picture"), 0);
-    gl.uniform1i(present.at("height"), height);
+    gl.uniform4f(present.at("place"), x, y, width, height);
     gl.bindVertexArray(this.nothing);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
-    this.isFull = isFull;
-    this.begunMs = performance.now();
-    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-    gl.flush();
   }
 }

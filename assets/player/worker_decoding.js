@@ -1,19 +1,29 @@
 // In the worker: blocks to whole numbers, and those to Gaussians. The layout is in docs/player_format.md.
 
-const QUAT_LEVELS = 127;
 const OTHERS = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 const PLANES = { largest: 0, quats: 1, scales: 4, opacity: 7, colors: 8, n: 11 }; // of bytes, after the positions
 
-async function inflated(text, nBytes) {
-  const letters = atob(text), packed = new Uint8Array(letters.length);
-  for (let i = 0; i < letters.length; i++) packed[i] = letters.charCodeAt(i);
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-  if (bytes.length !== nBytes) throw new Error(`a block has ${bytes.length} bytes instead of ${nBytes}`);
+/** Inflated bytes of a part, never more than it is said to have. */
+async function inflated(packed, nBytes) {
+  const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader();
+  const bytes = new Uint8Array(nBytes);
+  let at = 0;
+  for (let { done, value } = await reader.read(); !done; { done, value } = await reader.read()) {
+    if (at + value.length > nBytes) throw new Error(`a part has more than the ${nBytes} bytes that it is said to have`);
+    bytes.set(value, at);
+    at += value.length;
+  }
+  if (at < nBytes) throw new Error(`a part has ${at} bytes instead of ${nBytes}`);
   return bytes;
 }
 
-/** Reads a block from its beginning to its end. */
+function bytesOf(base64) {
+  const letters = atob(base64), bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
+  return bytes;
+}
+
+/** Reads a part of a block from its beginning to its end. */
 class BlockReader {
   constructor(bytes) {
     this.bytes = bytes;
@@ -27,23 +37,46 @@ class BlockReader {
 
   /** Rows as planes of whole numbers: {n, positions: Uint16Array [3 n], bytes: Uint8Array [11 n]}. */
   rows(n) {
-    const low = this.take(3 * n), high = this.take(3 * n), positions = new Uint16Array(3 * n);
-    for (let plane = 0; plane < 3; plane++) {
-      let value = 0;
-      for (let i = plane * n; i < (plane + 1) * n; i++) {
-        value += unfolded(low[i] | (high[i] << 8));
-        positions[i] = value; // modulo 65536
-      }
-    }
-    const bytes = this.take(PLANES.n * n).slice();
-    for (let plane = 0; plane < PLANES.n; plane++) {
-      let value = 0;
-      for (let i = plane * n; i < (plane + 1) * n; i++) {
-        value += unfolded(bytes[i]);
-        bytes[i] = value; // modulo 256
-      }
-    }
-    return { n, positions, bytes };
+    const rows = this.changes(n), { positions, bytes } = rows;
+    for (let i = 0; i < positions.length; i++) if (i % n) positions[i] += positions[i - 1]; // modulo 65536
+    for (let i = 0; i < bytes.length; i++) if (i % n) bytes[i] += bytes[i - 1]; // modulo 256
+    return rows;
+  }
+
+  /** The same planes as they are stored: how far numbers differ from others. */
+  changes(n) {
+    const low = this.take(3 * n), high = this.take(3 * n);
+    const positions = Uint16Array.from(low, (byte, i) => unfolded(byte | (high[i] << 8)));
+    return { n, positions, bytes: this.take(PLANES.n * n).map(unfolded) };
+  }
+
+  /** Rows of so many frames, each like those of `rows`: nRows of them appear once in full, and change from then on. */
+  frames(nRows, counts) {
+    const presence = counts.map(() => this.take((nRows + 7) >> 3)), now = this.rows(nRows);
+    const changes = this.changes(counts.reduce((sum, n) => sum + n, -nRows));
+    let known = 0, first = 0; // of the rows, and of the changes
+    return counts.map((n, frame) => {
+      const bits = presence[frame], here = new Uint32Array(n);
+      let at = 0, nOld = 0;
+      for (let row = 0; row < nRows && at < n; row++) if ((bits[row >> 3] >> (row & 7)) & 1) here[at++] = row;
+      while (nOld < n && here[nOld] < known) nOld++;
+      if (nOld < n) known = here[n - 1] + 1;
+      const update = (now, by, nPlanes, frameRows) => {
+        for (let plane = 0; plane < nPlanes; plane++) {
+          const change = plane * changes.n + first;
+          for (let i = 0; i < n; i++) {
+            const row = plane * nRows + here[i];
+            if (i < nOld) now[row] += by[change + i];
+            frameRows[plane * n + i] = now[row];
+          }
+        }
+        return frameRows;
+      };
+      const positions = update(now.positions, changes.positions, 3, new Uint16Array(3 * n));
+      const bytes = update(now.bytes, changes.bytes, PLANES.n, new Uint8Array(PLANES.n * n));
+      first += nOld;
+      return { n, positions, bytes };
+    });
   }
 
   /** Planes that say how far bytes differ from others. */
@@ -70,7 +103,7 @@ class Shapes {
     const [ox, oy, oz] = rounding.origin, step = rounding.step;
     const scales = Float32Array.from({ length: 256 }, (_, level) =>
       Math.exp(rounding.scale_low + level * rounding.scale_step));
-    const three = [0, 0, 0];
+    const { quat_levels, opacity_levels } = rounding, three = [0, 0, 0];
     let row = first;
     for (let i = 0; i < n; i++) {
       if (isHidden && (isHidden[i >> 3] >> (i & 7)) & 1) continue;
@@ -78,11 +111,11 @@ class Shapes {
       geometry[at] = means[3 * row] = ox + step * positions[i];
       geometry[at + 1] = means[3 * row + 1] = oy + step * positions[n + i];
       geometry[at + 2] = means[3 * row + 2] = oz + step * positions[2 * n + i];
-      geometry[at + 3] = bytes[PLANES.opacity * n + i] / 255;
+      geometry[at + 3] = bytes[PLANES.opacity * n + i] / opacity_levels;
       const largest = bytes[i], others = OTHERS[largest];
       let rest = 1;
       for (let k = 0; k < 3; k++) {
-        three[k] = (bytes[(PLANES.quats + k) * n + i] - QUAT_LEVELS) / (QUAT_LEVELS * Math.SQRT2);
+        three[k] = (bytes[(PLANES.quats + k) * n + i] - quat_levels) / (quat_levels * Math.SQRT2);
         rest -= three[k] * three[k];
         geometry[at + 4 + others[k]] = three[k];
         geometry[at + 8 + k] = scales[bytes[(PLANES.scales + k) * n + i]];
@@ -99,9 +132,8 @@ function emptyColors(n) {
   return new Float32Array(4 * ROWS_PER_LINE * lines(n));
 }
 
-/** Add a share of colours, given as planes of bytes, to those of n rows from a row on. */
-function addColors(colors, planes, colorMax, first, n, share = 1) {
-  const unit = (share * colorMax) / 255;
+/** Add a share of colours, given as planes of bytes whose 1 stands for `unit`, to those of n rows from a row on. */
+function addColors(colors, planes, unit, first, n) {
   for (let plane = 0; plane < 3; plane++) {
     for (let i = 0; i < n; i++) colors[4 * (first + i) + plane] += unit * planes[plane * n + i];
   }

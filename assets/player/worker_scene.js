@@ -1,34 +1,76 @@
-// In the worker: what stands still, and clips as long as there is room for them.
+// In the worker: what stands still, and clips as long as there is room for them. Each comes level by level.
 
-const CLIPS_BYTES = 512 << 20; // of inflated clips; at least two are kept
+const CLIPS_BYTES = 192 << 20; // of unpacked clips; at least two are kept
 
 class Scene {
-  constructor(header, rows) {
+  constructor(header) {
     this.header = header;
-    this.rows = rows; // what clips share
+    this.shared = []; // rows that clips share, by level
     this.clips = new Map(); // by number, the one asked for last comes last
   }
 
-  async addClip(index, text) {
-    const { own, light, moving, hides, n_bytes } = this.header.clips[index];
-    const reader = new BlockReader(await inflated(text, n_bytes));
-    const clip = { index, nBytes: n_bytes, isHidden: hides ? reader.take((this.rows.n + 7) >> 3) : null };
-    clip.own = reader.rows(own ? own.n : 0);
-    const shared = colorPlanes(this.rows);
-    const shown = shownPlanes(shared, this.rows.n, clip.isHidden);
-    clip.nStill = shown.length / 3 + clip.own.n;
-    clip.light = light ? this.light(reader, joinedPlanes(shown, colorPlanes(clip.own)), light.frames.length) : null;
-    clip.shown = shown;
-    clip.frames = moving.n.map((n) => reader.rows(n));
+  get nShared() {
+    return this.shared.length;
+  }
+
+  /** Packed bytes of levels of a block, one after the other, from level `first` on. */
+  async add(key, first, packed) {
+    const { parts } = key === "shared" ? this.header.shared : this.header.clips[key];
+    for (let level = first, at = 0; level < parts.length && at < packed.length; level++) {
+      const [nPacked, nBytes] = parts[level];
+      const bytes = await inflated(packed.subarray(at, at + nPacked), nBytes);
+      at += nPacked;
+      if (key === "shared") this.addShared(level, new BlockReader(bytes));
+      else this.clipToFill(key).waiting[level] = bytes;
+    }
+    for (const clip of this.clips.values()) this.settle(clip);
+    return this.makeRoom(key);
+  }
+
+  addShared(level, reader) {
+    this.shared[level] = reader.rows(this.header.shared.levels[level]);
+  }
+
+  clipToFill(index) {
+    const { moving } = this.header.clips[index];
+    const clip = this.clips.get(index) || { index, levels: [], waiting: [], n: moving.n.length };
     this.clips.delete(index);
     this.clips.set(index, clip);
-    let held = 0;
-    for (const other of this.clips.values()) held += other.nBytes;
-    for (const [old, other] of this.clips) {
-      if (held <= CLIPS_BYTES || this.clips.size <= 2) break;
-      this.clips.delete(old);
-      held -= other.nBytes;
+    return clip;
+  }
+
+  /** Unpack what a clip has, as far as what clips share is there. */
+  settle(clip) {
+    while (clip.levels.length < this.nShared && clip.waiting[clip.levels.length]) {
+      const level = clip.levels.length;
+      clip.levels.push(this.unpacked(clip.index, level, new BlockReader(clip.waiting[level])));
+      clip.waiting[level] = null;
     }
+  }
+
+  unpacked(index, level, reader) {
+    const { own, light, moving, hides } = this.header.clips[index], shared = this.shared[level];
+    const isHidden = hides ? reader.take((shared.n + 7) >> 3) : null;
+    const rows = reader.rows(own ? own.levels[level] : 0);
+    const shown = shownPlanes(colorPlanes(shared), shared.n, isHidden), n = shown.length / 3 + rows.n, keys = [];
+    let before = light && joinedPlanes(shown, colorPlanes(rows));
+    for (const _ of light ? light.frames : []) keys.push((before = reader.changed(before)));
+    return { n, isHidden, own: rows, shown, light: keys, frames: reader.frames(moving.rows[level], moving.levels[level]) };
+  }
+
+  /** Let go of clips that were not asked for the longest. Returns their numbers. */
+  makeRoom(newest) {
+    const size = ({ index }) => this.header.clips[index].parts.reduce((sum, [, nBytes]) => sum + nBytes, 0), gone = [];
+    let held = 0;
+    for (const clip of this.clips.values()) held += size(clip);
+    for (const [index, clip] of this.clips) {
+      if (held <= CLIPS_BYTES || this.clips.size <= 2) break;
+      if (index === newest) continue;
+      this.clips.delete(index);
+      gone.push(index);
+      held -= size(clip);
+    }
+    return gone;
   }
 
   clip(index) {
@@ -37,49 +79,61 @@ class Scene {
       this.clips.delete(index);
       this.clips.set(index, clip);
     }
-    return clip;
+    return clip && clip.levels.length ? clip : null;
   }
 
-  light(reader, before, n) {
-    const keys = [];
-    for (let key = 0; key < n; key++) keys.push((before = reader.changed(before)));
-    return keys;
-  }
-
-  /** Shapes of everything that stands still in a clip. */
+  /** Shapes of everything that stands still in a clip, as far as it is there. */
   still(clip) {
-    const { own } = this.header.clips[clip.index], shapes = new Shapes(clip.nStill);
-    const first = shapes.put(this.rows, this.header.shared.rounding, 0, clip.isHidden);
-    if (own) shapes.put(clip.own, own.rounding, first);
-    return shapes;
+    const { own } = this.header.clips[clip.index], ends = [];
+    const shapes = new Shapes(clip.levels.reduce((sum, level) => sum + level.n, 0));
+    let row = 0;
+    clip.levels.forEach((level, i) => {
+      row = shapes.put(this.shared[i], this.header.shared.rounding, row, level.isHidden);
+      if (own) row = shapes.put(level.own, own.rounding, row);
+      ends.push(row);
+    });
+    return Object.assign(shapes, { ends });
   }
 
   /** Colours of everything that stands still, in the light of a frame of the clip. */
   stillColors(clip, frame) {
-    const { own, light } = this.header.clips[clip.index], n = clip.nStill, colors = emptyColors(n);
-    if (!light) {
-      const first = n - clip.own.n;
-      addColors(colors, clip.shown, this.header.shared.rounding.color_max, 0, first);
-      if (own) addColors(colors, colorPlanes(clip.own), own.rounding.color_max, first, clip.own.n);
-      return colors;
+    const { own, light } = this.header.clips[clip.index], { shared } = this.header, unit = (of) => of.color_max / of.color_levels;
+    const colors = emptyColors(clip.levels.reduce((sum, level) => sum + level.n, 0));
+    const { key, next, share } = light ? between(light.frames, frame) : {};
+    let row = 0;
+    for (const level of clip.levels) {
+      const first = level.n - level.own.n;
+      if (light) {
+        addColors(colors, level.light[key], ((1 - share) * light.color_max) / 255, row, level.n);
+        if (share > 0) addColors(colors, level.light[next], (share * light.color_max) / 255, row, level.n);
+      } else {
+        addColors(colors, level.shown, unit(shared.rounding), row, first);
+        if (own) addColors(colors, colorPlanes(level.own), unit(own.rounding), row + first, level.own.n);
+      }
+      row += level.n;
     }
-    const { frames, color_max } = light;
-    let key = 0;
-    while (key + 1 < frames.length && frames[key + 1] <= frame) key++;
-    const next = Math.min(key + 1, frames.length - 1);
-    const share = next > key ? (frame - frames[key]) / (frames[next] - frames[key]) : 0;
-    addColors(colors, clip.light[key], color_max, 0, n, 1 - share);
-    if (share > 0) addColors(colors, clip.light[next], color_max, 0, n, share);
     return colors;
   }
 
   moving(clip, frame) {
-    const rows = clip.frames[frame], { rounding } = this.header.clips[clip.index].moving;
-    const shapes = new Shapes(rows.n), colors = emptyColors(rows.n);
-    shapes.put(rows, rounding, 0);
-    addColors(colors, colorPlanes(rows), rounding.color_max, 0, rows.n);
-    return { shapes, colors };
+    const { rounding } = this.header.clips[clip.index].moving, levels = clip.levels.map((level) => level.frames[frame]);
+    const n = levels.reduce((sum, rows) => sum + rows.n, 0), shapes = new Shapes(n), colors = emptyColors(n), ends = [];
+    let row = 0;
+    for (const rows of levels) {
+      addColors(colors, colorPlanes(rows), rounding.color_max / rounding.color_levels, row, rows.n);
+      row = shapes.put(rows, rounding, row);
+      ends.push(row);
+    }
+    return { shapes: Object.assign(shapes, { ends }), colors };
   }
+}
+
+/** The stored frames before and after one, and how far it is from the first to the second. */
+function between(frames, frame) {
+  let key = 0;
+  while (key + 1 < frames.length && frames[key + 1] <= frame) key++;
+  const next = Math.min(key + 1, frames.length - 1);
+  return { key, next, share: next > key ? (frame - frames[key]) / (frames[next] - frames[key]) : 0 };
 }
 
 function joinedPlanes(some, others) {

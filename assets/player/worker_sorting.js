@@ -1,7 +1,6 @@
 // In the worker: the order in which Gaussians are drawn, farthest first, exact.
 
 const RADIX = 1 << 16;
-const CORNERS = 4; // every Gaussian is drawn as four, each of which has its number
 
 class DepthSorter {
   constructor() {
@@ -22,9 +21,10 @@ class DepthSorter {
   /**
    * Numbers of the Gaussians beyond the near plane. Of two at the same depth the later one comes first, because it lies
    * behind the other for the rasterizer.
-   * parts: [{means, n, first}] with the number of the first one; row: third row of world_to_camera.
+   * parts: [{means, n, first}] with the number of the first one; row: third row of world_to_camera; nEach: how often each
+   * number is there.
    */
-  order(parts, row, near) {
+  order(parts, row, near, nEach) {
     const nAll = parts.reduce((sum, part) => sum + part.n, 0);
     if (nAll > this.size) this.hold(Math.ceil(nAll * 1.25));
     const { depths, keys, ids, low, high } = this, [rx, ry, rz, t] = row;
@@ -50,10 +50,10 @@ class DepthSorter {
       this.halfKeys[place] = keys[i];
       this.halfIds[place] = ids[i];
     }
-    const order = new Uint32Array(CORNERS * n);
+    const order = new Uint32Array(nEach * n);
     for (let i = 0; i < n; i++) {
-      const place = CORNERS * high[this.halfKeys[i] >>> 16]++;
-      order[place] = order[place + 1] = order[place + 2] = order[place + 3] = this.halfIds[i];
+      const place = nEach * high[this.halfKeys[i] >>> 16]++, id = this.halfIds[i];
+      for (let k = 0; k < nEach; k++) order[place + k] = id;
     }
     return order;
   }

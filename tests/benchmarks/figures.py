@@ -211,6 +211,14 @@ TABLES: dict[str, Clips | Printed] = {
         "files over time and .splat4d",
         (_TRAIN_HALF, "python -m tests.benchmarks.bench_splat4d DIR OUT"),
     ),
+    "player-drawing": Printed(
+        "the player in a browser without a graphics card",
+        (
+            "clipgstream train SAMPLE --scale 0.5 --clip-length 5 --set quality=draft --project DIR --clips 0:1",
+            "python -m tests.benchmarks.bench_drawing DIR",
+        ),
+    ),
+    "player": Printed("the streaming player", (_TRAIN_HALF, "python -m tests.benchmarks.bench_player DIR")),
     "timeline": Printed("the timeline", ("python -m tests.benchmarks.bench_timeline",), is_long=False),
     "window": Printed("the window", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_window DIR --no-training")),
     "opening": Printed("opening", ("python -m tests.benchmarks.bench_opening OUT",), which=None),

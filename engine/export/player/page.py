@@ -1,4 +1,5 @@
-"""The page: scripts, shaders and the scene's bytes in one HTML file, which needs no network and no other file.
+"""The page: scripts, shaders and the scene's bytes in one HTML file, which needs no network and no other file; or the
+page, and a folder of bytes that it fetches from where it came from.
 
 Whatever comes from a capture goes into the page as JSON without a "<", and from there into text nodes only. The page's
 own policy lets no other script run than its own, which it knows by its hash.
@@ -23,23 +24,38 @@ from engine.export.player.blocks import Block
 SCRIPTS = (
     "textures.js",
     "renderer.js",
+    "webgpu.js",
     "view.js",
     "pointer.js",
     "clock.js",
     "blocks.js",
+    "loader.js",
     "pictures.js",
     "timeline.js",
     "keys.js",
+    "stage.js",
+    "headset.js",
+    "embedding.js",
     "player.js",
 )
 """In the order in which they are joined."""
-WORKER_SCRIPTS = ("textures.js", "worker_decoding.js", "worker_scene.js", "worker_sorting.js", "worker_main.js")
+WORKER_SCRIPTS = (
+    "textures.js",
+    "worker_decoding.js",
+    "worker_scene.js",
+    "worker_sorting.js",
+    "worker_painting.js",
+    "worker_main.js",
+)
 SHADERS = ("splat.vert", "splat.frag", "resolve.vert")
 """The shaders of the window, in assets/shaders."""
+OWN_SHADERS = ("present.frag", "mark.vert", "mark.frag", "splats.wgsl")
+"""Those of the page alone, in assets/player."""
 CONSTANTS = ("ALPHA_MIN", "ALPHA_MAX", "EPS2D_PX2", "FRUSTUM_MARGIN")
-"""Names of engine.conventions, which shaders see as #define."""
-FORMAT, VERSION = "clipgstream-player", 1
+"""Names of engine.conventions, which shaders see as #define, and the worker as const."""
+FORMAT, VERSION = "clipgstream-player", 2
 
+_POSTER = '<img id="poster" alt="The first view of the scene" src="data:image/jpeg;base64,{}">'
 _PRECISION = "".join(f"precision highp {kind};\n" for kind in ("float", "int", "sampler2D"))
 
 
@@ -56,28 +72,35 @@ class PageWriter:
         self.n_bytes_of_blocks += len(text)
         if self._folder is None:
             self._stream.write(f'<script type="text/plain" id="block-{name}">{text}</script>\n')
-        else:  # a page from a disk may load scripts, and nothing else
-            (self._folder / f"{name}.js").write_text(f'clipgstreamBlock("{name}","{text}");\n', encoding="ascii")
+            return
+        (self._folder / f"{name}.bin").write_bytes(block.data)
+        self.n_bytes_of_blocks += len(block.data)
+        # A page from a disk may load scripts, and nothing else.
+        (self._folder / f"{name}.js").write_text(f'clipgstreamBlock("{name}","{text}");\n', encoding="ascii")
 
 
 @contextmanager
-def page_writer(stream: TextIO, header: dict[str, Any], *, folder: Path | None = None) -> Iterator[PageWriter]:
+def page_writer(
+    stream: TextIO, header: dict[str, Any], *, folder: Path | None = None, poster: bytes | None = None
+) -> Iterator[PageWriter]:
     """Write the page around its blocks.
 
     Args:
         stream: Of the page, UTF-8.
         header: The page's facts about the scene; see docs/player_format.md. It may be completed until the end.
         folder: Where blocks go as files of their own; None to put them into the page.
+        poster: A JPEG of the first view, 16:9, which is seen until the first picture is there; None for none.
     """
     before, after = _asset("player.html").split("{{blocks}}\n")
     script = "'use strict';\n" + "\n".join(map(_asset, SCRIPTS))
     style = _asset("style.css")
     parts = {
         "policy": _policy(script, style, has_folder=folder is not None),
+        "poster": "" if poster is None else _POSTER.format(base64.b64encode(poster).decode("ascii")),
         "style": style,
         "script": script,
-        "worker": "'use strict';\n" + "\n".join(map(_asset, WORKER_SCRIPTS)),
-        "shaders": json_for_html({name: web_shader(name) for name in (*SHADERS, "present.frag")}),
+        "worker": "'use strict';\n" + _constants("const {} = {};\n") + "\n".join(map(_asset, WORKER_SCRIPTS)),
+        "shaders": json_for_html({name: web_shader(name) for name in (*SHADERS, *OWN_SHADERS)}),
     }
     stream.write(_filled(before, parts))
     yield PageWriter(stream, folder)
@@ -98,25 +121,34 @@ def json_for_html(value: Any) -> str:
 
 
 def web_shader(name: str) -> str:
-    """A shader of desktop OpenGL in the language of WebGL 2, with the rasterizer's constants.
+    """A shader of desktop OpenGL in the language of WebGL 2, with the rasterizer's constants; one of WebGPU as it is,
+    with these.
 
     Only the first line and the precision differ, so that page and window draw alike.
     """
-    source = asset_path("player" if name == "present.frag" else "shaders", name).read_text(encoding="utf-8")
+    source = asset_path("player" if name in OWN_SHADERS else "shaders", name).read_text(encoding="utf-8")
+    if name.endswith(".wgsl"):
+        return _constants("const {} = {};\n") + source
     version, _, rest = source.partition("\n")
     if version != "#version 330 core":
         raise ValueError(f"{name} is not in the version that can be translated: {version!r}")
-    defines = "".join(f"#define {constant} {float(getattr(conventions, constant))!r}\n" for constant in CONSTANTS)
+    defines = _constants("#define {} {}\n")
     return f"#version 300 es\n{_PRECISION}{defines}#line 2\n{rest}"
 
 
+def _constants(line: str) -> str:
+    return "".join(line.format(name, repr(float(getattr(conventions, name)))) for name in CONSTANTS)
+
+
 def _policy(script: str, style: str, *, has_folder: bool) -> str:
-    """The sources the page may load: itself, and the blocks next to it where there are some. No network in any case."""
-    scripts = f"'sha256-{_digest(script)}' blob:" + (" 'self' file:" if has_folder else "")
+    """The sources the page may load: itself, and the blocks next to it where there are some, which are fetched from a
+    server and are scripts on a disk. Nothing else of any network."""
     rules = {
         "default-src": "'none'",
-        "script-src": scripts,
+        "script-src": f"'sha256-{_digest(script)}'" + (" file:" if has_folder else ""),
+        "connect-src": "'self'" if has_folder else "'none'",
         "worker-src": "blob:",
+        "img-src": "data:",
         "style-src": f"'sha256-{_digest(style)}'",
         "base-uri": "'none'",
         "form-action": "'none'",

@@ -29,7 +29,12 @@ def test_clips_go_into_a_folder_on_request(run, project: Path, tmp_path: Path):
     code, _, err = run("export", project, "--player", tmp_path / "scene.html", "--data-folder", "--clip", 1)
     assert code == 0
     assert "folder scene_data, which must stay next to the page" in err
-    assert sorted(path.name for path in (tmp_path / "scene_data").iterdir()) == ["clip00001.js", "shared.js"]
+    assert sorted(path.name for path in (tmp_path / "scene_data").iterdir()) == [
+        "clip00001.bin",
+        "clip00001.js",
+        "shared.bin",
+        "shared.js",
+    ]
 
 
 def test_it_names_what_is_wrong_with_its_arguments(run, project: Path, tmp_path: Path):

@@ -3,6 +3,7 @@ where something is missing. Pages lie on the disk, and the browser has no networ
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import torch
 from engine.backends.table import backend_called
 from engine.export.player.blocks import joined
 from engine.raster.rasterize import rasterize
-from tests.browser import Browser, chromium
+from tests.browser import AS_A_CARD, AS_A_CARD_WITH_WEBGPU, WEBGPU_FLAGS, WITHOUT_WEBGPU, Browser, chromium
 from tests.player_scenes import (
     BACKGROUND,
     LENGTHS,
@@ -37,11 +38,13 @@ pytestmark = [
 
 SHIFT, CTRL = 8, 2
 LEAST_PSNR = 35.0
+LEAST_PSNR_OF_WAYS = 45.0
+"""Of pictures that are drawn otherwise than by WebGL, against it."""
 SCALE = 3
 """Pictures are drawn so many times as large as the cameras' own."""
 PICTURE = (SCALE * SIZE[0], SCALE * SIZE[1])
 SETTLED = (
-    "(p => p && p.isDrawn && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
+    "(p => p && p.isDrawn && p.renderer.isDone() && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
     " && p.pictures.answered === p.pictures.wish.key)(window.clipgstreamPlayer)"
 )
 EVIL = "</script><img src=x onerror=\"document.title='pwned'\">"
@@ -52,9 +55,12 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_page(tmp_path_factory.mktemp("player") / "scene.html", header())
 
 
-@pytest.fixture(scope="module")
-def shared_browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+@pytest.fixture(scope="module", params=["processor", "card"])
+def shared_browser(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Where the worker paints pictures, as it does without a graphics card, and where WebGL draws them."""
     with Browser(tmp_path_factory.mktemp("browser")) as browser:
+        if request.param == "card":
+            browser.before_pages(AS_A_CARD + WITHOUT_WEBGPU)
         yield browser
 
 
@@ -126,10 +132,33 @@ def test_pictures_are_those_of_the_rasterizer(browser: Browser):
     for frame, view in ((0, 0), (4, 1), (6, 2), (8, 3), (N_FRAMES - 1, 4)):
         browser.value(f"void clipgstreamPlayer.go({frame}); void clipgstreamPlayer.look({view})")
         found = drawn(browser)
+        assert state(browser, "renderer.painted !== null") == state(browser, "renderer.isSoftware")
         assert label(browser).startswith(f"Frame {frame} of {N_FRAMES - 1} ")
         assert psnr(found, expected(frame, view)) > LEAST_PSNR
         for other in {(frame + 1) % N_FRAMES, (frame + 3) % N_FRAMES}:
             assert psnr(found, expected(other, view)) < LEAST_PSNR - 5.0  # so the figure can tell frames apart
+
+
+def test_all_ways_of_drawing_make_the_same_picture(page: Path, tmp_path: Path):
+    pictures = {}
+    ways = {"WebGL": AS_A_CARD + WITHOUT_WEBGPU, "WebGPU": AS_A_CARD_WITH_WEBGPU, "painted": ""}
+    for way, script in ways.items():
+        (tmp_path / way).mkdir()
+        with Browser(tmp_path / way, flags=WEBGPU_FLAGS) as browser:
+            browser.before_pages(script)
+            show(browser, page)
+            if way == "WebGPU" and not browser.value("navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
+                continue  # an older browser
+            drawer = "GpuRenderer" if way == "WebGPU" else "Renderer"
+            assert state(browser, "renderer.constructor.name") == drawer
+            for view in range(3):
+                browser.value(f"void clipgstreamPlayer.go({3 * view}); void clipgstreamPlayer.look({view})")
+                pictures[way, view] = drawn(browser)
+            assert bool(state(browser, "renderer.painted instanceof WebGLTexture")) == (way == "painted")
+            assert browser.console == []
+    assert ("painted", 2) in pictures
+    for (way, view), picture in pictures.items():
+        assert psnr(picture, pictures["WebGL", view]) > LEAST_PSNR_OF_WAYS, way
 
 
 def test_a_screen_with_small_pixels_is_used_in_full(browser: Browser):
@@ -250,6 +279,19 @@ def test_pointer_and_fingers_move_the_view(browser: Browser):
     assert state(browser, "view.yaw") == pytest.approx(yaw + 0.3)
     browser.touch([(x - 40, y), (x - 60, y), (x - 80, y)], [(x + 40, y), (x + 60, y), (x + 80, y)])
     assert state(browser, "view.distance") == pytest.approx(distance / 2.0)
+    pivot, (width, height) = (
+        state(browser, "view.pivot"),
+        browser.value("(({width, height}) => [width, height])(clipgstreamPlayer.canvas.getBoundingClientRect())"),
+    )
+    now_s = time.time()
+    for at_s in (now_s, now_s + 0.2):
+        browser.touch([(x + 90, y - 30)], at_s=at_s)
+    moved = np.linalg.norm(np.subtract(state(browser, "view.pivot"), pivot))
+    unit = state(browser, f"view.distance / clipgstreamPlayer.view.focal({width}, {height})")
+    assert moved == pytest.approx(unit * np.hypot(x + 90 - width / 2, y - 30 - height / 2), rel=1e-3)
+    pivot = state(browser, "view.pivot")
+    browser.touch([(x, y - 80)])  # a third tap is a first one again
+    assert state(browser, "view.pivot") == pivot
     browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
     browser.key("f")
     assert psnr(drawn(browser), before) > 60.0
@@ -316,7 +358,7 @@ def test_a_damaged_clip_is_said(shared_browser: Browser, tmp_path: Path):
 )
 def test_an_old_browser_is_told_what_it_lacks(tmp_path: Path, page: Path, without: str, said: str):
     with Browser(tmp_path) as browser:
-        browser.call("Page.addScriptToEvaluateOnNewDocument", source=without)
+        browser.before_pages(without)
         browser.open(page)
         browser.wait(f"document.getElementById('notice')?.textContent.includes('{said}')")
         assert browser.console == []

@@ -13,6 +13,7 @@ import pytest
 from engine.assets import asset_path
 from engine.conventions import ALPHA_MIN
 from engine.export.player.blocks import Packer, joined
+from engine.export.player.moving_rows import NamedRows
 from engine.export.player.page import json_for_html, web_shader
 from engine.export.player.row_coding import POSITION_SHARE, differences, fitting_rounding
 from engine.export.player.still_part import shared_rows, still_part
@@ -131,7 +132,7 @@ def test_a_scene_of_nothing_is_packed():
     nothing = made_splats(3, 0)[:0]
     assert fitting_rounding([nothing]).step == 1.0
     packer = Packer()
-    block = packer.clip(2, still=lambda frame: nothing, moving=lambda frame: nothing)
+    block = packer.clip(2, still=lambda frame: nothing, moving=lambda frame: NamedRows(nothing))
     assert block.description["moving"]["n"] == [0, 0]
     assert packer.shared is not None
     assert packer.shared.description["n"] == 0
