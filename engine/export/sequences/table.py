@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from engine.export.sequences.sequence import SequenceReader, SequenceTiming, SequenceStretch
+from engine.export.sequences.sequence import SequenceReader, SequenceStretch, SequenceTiming
 
 
 class SequenceFormat(NamedTuple):
