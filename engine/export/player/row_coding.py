@@ -46,7 +46,7 @@ class RowPrecision:
 
 FINE = RowPrecision()
 COMPACT = RowPrecision(0.1, 1e-2, 31, 63, 63, 63, 0.8)
-"""For what moves on a slow line: half the bytes of FINE, and still more than 55 dB on the real capture."""
+"""For what moves on a slow line: half the bytes of FINE, and pictures of the real capture still at 53 dB."""
 
 
 @dataclass(frozen=True, slots=True)
