@@ -94,6 +94,11 @@ COMMANDS = {
         "Nothing was written.",
         has_backend=True,
     ),
+    "import": Command(
+        "open a scene of another program: .4dgs, or .ply, .splat, .spz and .sog files, one per frame",
+        "app.cli.projects.import_command",
+        "Nothing was written.",
+    ),
     "inspect": Command(
         "examine and correct a capture, or show the size of a project's trained clips",
         "app.cli.captures.inspect_command",

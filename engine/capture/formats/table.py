@@ -15,6 +15,7 @@ from engine.capture.formats import (
     colmap_frames,
     easyvolcap,
     immersive,
+    imported,
     multipleview,
     n3dv,
     panoptic,
@@ -33,6 +34,7 @@ from engine.errors import CaptureError
 FORMATS = (
     capture_json,
     sample,
+    imported,
     panoptic,
     panoptic_studio,
     easyvolcap,

@@ -82,6 +82,7 @@ class Layout:
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to; None takes the usual one.
         fit: The user's fit for frames of another shape than their calibration; None where that is not known.
         is_growing: It may still be recorded: `n_frames` are those of the farthest camera, and others may lack some.
+        has_pictures: Whether its cameras took pictures; those of an imported scene are views only.
     """
 
     format: str
@@ -95,6 +96,7 @@ class Layout:
     fisheye_fov_deg: float | None = None
     fit: FrameFit | None = None
     is_growing: bool = False
+    has_pictures: bool = True
 
     @property
     def misfit_px(self) -> float:

@@ -81,6 +81,7 @@ def read(file: BinaryIO) -> Splats:
                 scales=np.exp(scale_codes[scales[:, :3]]).astype(np.float32),
                 opacities=colors[:, 3].astype(np.float32) / 255.0,
                 colors=colors_of(color_codes[colors[:, :3]]),
+                sh_degree=int(meta["shN"].get("bands", 3)) if "shN" in meta else 0,
             )
     except (zipfile.BadZipFile, OSError, EOFError, zlib.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise damaged(f"it is not a SOG file ({type(error).__name__})") from error
