@@ -13,7 +13,6 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.storing.document_store import DocumentStore
 from app.project.clips.clip_names import clip_name
-from engine.camera.depth_range import NEAR_SHARE
 from engine.capture.capture import open_capture
 from engine.capture.clip import cut_clips
 from engine.capture.formats.imported import write_imported
@@ -22,6 +21,7 @@ from engine.errors import ProjectError
 from engine.export.splats import PLY_UP, Splats
 from engine.export.world import AXES
 from engine.importing.scene_source import SceneSource, open_scene
+from engine.importing.still_rows import stored_gaussians
 from engine.importing.stored_clip import stored_clip
 from engine.importing.views import VIEW_NAMES, Contents
 from engine.storage.files import atomic_folder, disk_error
@@ -32,6 +32,8 @@ CLIP_LENGTH = 20
 CLIP_BYTES = 192 << 20
 """Of the frames of a clip: as many are in memory while it is made."""
 GAUSSIAN_BYTES = 56
+NEAR_SHARE = 0.05
+"""Near plane as a share of the distance from which the whole scene is seen."""
 DEFAULT_FPS = 30.0
 FPS_LIMITS = 0.01, 1000.0
 
@@ -107,18 +109,24 @@ def _fill(
         made.mkdir()
     clip_length, bounds = min(CLIP_LENGTH, source.n_frames), [0]
     waiting: list[Splats] = []
+
+    def end_clip() -> None:
+        bounds.append(bounds[-1] + len(waiting))
+        clip = cut_clips(bounds, clip_length)[-1]
+        found = stored_gaussians(waiting)
+        contents.add(found)
+        state = stored_clip(clip, found, near_plane=NEAR_SHARE * contents.distance, views=VIEW_NAMES)
+        write_clip_state(clips / f"{clip.clip_index}", state)
+        waiting.clear()
+
     for frame in range(source.n_frames):
         report(frame, source.n_frames)
         splats = source.splats(frame)
-        contents.add(splats)
-        waiting.append(splats)
         n_bytes = GAUSSIAN_BYTES * (sum(map(len, waiting)) + len(splats))
-        if len(waiting) == clip_length or n_bytes > CLIP_BYTES or frame == source.n_frames - 1:
-            bounds.append(frame + 1)
-            clip = cut_clips(bounds, clip_length)[-1]
-            state = stored_clip(clip, waiting, near_plane=NEAR_SHARE * contents.distance, views=VIEW_NAMES)
-            write_clip_state(clips / f"{clip.clip_index}", state)
-            waiting = []
+        if len(waiting) == clip_length or (waiting and n_bytes > CLIP_BYTES):
+            end_clip()
+        waiting.append(splats)
+    end_clip()
     for index in range(len(bounds) - 1):  # names depend on all bounds
         (clips / f"{index}").rename(clips / f"{clip_name(index, tuple(bounds), clip_length)}.safetensors")
     report(source.n_frames, source.n_frames)

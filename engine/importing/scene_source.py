@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections import Counter
@@ -122,7 +123,8 @@ class SequenceScene:
 
     def __init__(self, path: Path, reader: SequenceReader) -> None:
         self._path, self._reader = path, reader
-        self.fps, self.up = reader.timing.fps, None
+        self.fps: float | None = reader.timing.fps
+        self.up: Vector | None = reader.splats(0).up
         self._seen = _Seen()
 
     @property
@@ -200,8 +202,8 @@ class _Seen:
         said = []
         if self._sh_degree:
             said.append(
-                f"Colours that change with the viewing direction (degree {self._sh_degree}) are not kept, only those of "
-                "degree 0."
+                f"Colours that change with the viewing direction (degree {self._sh_degree}) are not kept, only those "
+                "of degree 0."
             )
         if self._n_dropped:
             said.append(f"{self._n_dropped:,} Gaussians that cannot be drawn were left out.")
@@ -238,7 +240,9 @@ def _open_folder(folder: Path) -> FrameFiles:
     kinds = Counter(Path(name).suffix.lower() for name in names)
     if len(kinds) > 1:
         found = " and ".join(f"{n} {kind}" for kind, n in kinds.items())
-        raise ProjectError(f"The folder holds {found} files.", hint="Put one kind into a folder of its own.", path=folder)
+        raise ProjectError(
+            f"The folder holds {found} files.", hint="Put one kind into a folder of its own.", path=folder
+        )
     files = [place_in(folder, name, follow_links=False, named_in=folder) for name in names]
     sidecar = _sidecar(folder)
     if sidecar is None:
@@ -262,7 +266,9 @@ def _sidecar(folder: Path) -> _Sidecar | None:
     try:
         return to_type(read_json_object(path), _Sidecar)
     except EntryError as error:
-        raise ProjectError(f"The description of the export is damaged ({error}).", hint="Remove it.", path=path) from error
+        raise ProjectError(
+            f"The description of the export is damaged ({error}).", hint="Remove it.", path=path
+        ) from error
 
 
 def _gaps(names: Sequence[str]) -> list[str]:
@@ -272,6 +278,8 @@ def _gaps(names: Sequence[str]) -> list[str]:
     if len(numbers) < len(names) or numbers[-1] - numbers[0] == len(numbers) - 1:
         return []
     runs = runs_of(numbers)
-    missing = [f"{a.stop}" if b.start - a.stop == 1 else f"{a.stop} to {b.start - 1}" for a, b in zip(runs, runs[1:], strict=False)]
+    missing = [
+        f"{a.stop}" if b.start - a.stop == 1 else f"{a.stop} to {b.start - 1}" for a, b in itertools.pairwise(runs)
+    ]
     listed = ", ".join(missing[:_LISTED]) + (f" and {len(missing) - _LISTED} more" if len(missing) > _LISTED else "")
     return [f"Numbers are missing among the files ({listed}); the frames follow each other without a pause."]

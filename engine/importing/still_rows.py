@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -25,7 +26,7 @@ def stored_gaussians(frames: Sequence[Splats]) -> StoredGaussians:
     if len({len(table) for table in tables}) == 1 and _keep_order(tables):
         is_still = np.ones(len(tables[0]), bool)
         for table in tables[1:]:
-            is_still &= (table == tables[0]).all(1)
+            np.logical_and(is_still, (table == tables[0]).all(1), out=is_still)
         presence = np.ones((int((~is_still).sum()), len(tables)), bool)
         return _stored(tables[0][is_still], [table[~is_still] for table in tables], presence)
     keys = [_keys(table) for table in tables]
@@ -39,9 +40,7 @@ def stored_gaussians(frames: Sequence[Splats]) -> StoredGaussians:
     is_still = presence.all(1)
     orders = [np.argsort(found) for found in tracks]
     still = tables[0][orders[0][is_still[tracks[0][orders[0]]]]]
-    moving = [
-        table[order[~is_still[found[order]]]] for table, found, order in zip(tables, tracks, orders, strict=True)
-    ]
+    moving = [table[order[~is_still[found[order]]]] for table, found, order in zip(tables, tracks, orders, strict=True)]
     return _stored(still, moving, presence[~is_still])
 
 
@@ -68,11 +67,7 @@ def _keep_order(tables: Sequence[np.ndarray]) -> bool:
     step = max(len(tables[0]) // _SAMPLE, 1)
     means = [table[::step, :3].view(np.float32).astype(np.float64) for table in tables]
     spread = max(float(np.linalg.norm(means[0] - np.median(means[0], 0), axis=1).mean()) if len(means[0]) else 0, 1e-30)
-    ways = [
-        float(np.median(np.linalg.norm(b - a, axis=1)))
-        for a, b in zip(means, means[1:], strict=False)
-        if len(a)
-    ]
+    ways = [float(np.median(np.linalg.norm(b - a, axis=1))) for a, b in itertools.pairwise(means) if len(a)]
     return max(ways, default=0.0) <= _ORDERED_SHARE * spread
 
 

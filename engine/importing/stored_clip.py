@@ -1,4 +1,4 @@
-"""Consecutive frames of a scene as the state of a clip that needs no training."""
+"""The Gaussians of some frames of a scene as the state of a clip that needs no training."""
 
 from __future__ import annotations
 
@@ -10,21 +10,19 @@ from engine.capture.clip import Clip
 from engine.clip_files.array_names import GAINS
 from engine.clip_files.clip_header import STORED_SCHEMA, ClipHeader
 from engine.clip_files.clip_state import ClipState
-from engine.clip_files.stored_gaussians import ONE_EACH
-from engine.export.splats import Splats
-from engine.importing.still_rows import stored_gaussians
+from engine.clip_files.stored_gaussians import ONE_EACH, StoredGaussians
 
 _LEAST = 1e-9
 
 
-def stored_clip(clip: Clip, frames: Sequence[Splats], *, near_plane: float, views: Sequence[str]) -> ClipState:
-    """A clip of these frames, which inherits nothing.
+def stored_clip(clip: Clip, found: StoredGaussians, *, near_plane: float, views: Sequence[str]) -> ClipState:
+    """A clip of these Gaussians, which inherits nothing.
 
     Args:
+        found: Of the frames of the clip.
         near_plane: Nearest depth that is drawn, scene units.
         views: Names of the cameras, which take the scene's colours as they are.
     """
-    found = stored_gaussians(frames)
     sizes = np.concatenate([found.still["scales"].max(1, initial=0.0), found.moving["scales"].max(1, initial=0.0)])
     header = ClipHeader(
         schema=STORED_SCHEMA,

@@ -16,8 +16,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "scene", type=path_argument, help="a file over time, a folder with a file of Gaussians per frame, or one file"
     )
-    command.add_argument("--project", required=True, type=path_argument, metavar="DIR", help="new folder of the project")
-    command.add_argument("--fps", type=float, metavar="F", help="frames per second (default: as the scene says, else 30)")
+    command.add_argument(
+        "--project", required=True, type=path_argument, metavar="DIR", help="new folder of the project"
+    )
+    command.add_argument(
+        "--fps", type=float, metavar="F", help="frames per second (default: as the scene says, else 30)"
+    )
     ways = command.add_mutually_exclusive_group()
     for flag, sign, text in (("--up", "+", "up"), ("--down", "-", "down")):
         ways.add_argument(
