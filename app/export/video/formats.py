@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
@@ -14,24 +15,58 @@ class MissingCodecError(ProjectError):
 
 
 @dataclass(frozen=True, slots=True)
+class Encoding:
+    """How FFmpeg encodes the pictures of a video.
+
+    Attributes:
+        codec: FFmpeg's encoder.
+        pixels: Its pixel format.
+        options: Of the encoder.
+    """
+
+    codec: str
+    pixels: str
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def needs_even_sizes(self) -> bool:
+        """Whether it has pictures of even width and height only."""
+        return self.codec != "libvpx-vp9"
+
+    @property
+    def max_level(self) -> int:
+        """Highest level of a channel that pictures are handed over with."""
+        return 65_535 if "10" in self.pixels else 255
+
+
+@dataclass(frozen=True, slots=True)
 class PictureFormat:
     """One format.
 
     Attributes:
         label: As shown to the user.
         suffixes: Of files; none of a sequence, which is a folder.
-        video_codec: FFmpeg's encoder; None where none is needed.
-        sound_codec: Likewise, for sound; None where the format holds none.
-        can_be_transparent: Whether pictures keep their opacity.
+        muxer: FFmpeg's name for the file around it, and its options.
+        encoding: Of pictures without opacity; None of a sequence.
+        transparent: Of pictures with opacity.
+        sound_codec: FFmpeg's encoder for sound; None where the format holds none.
         bytes_per_pixel: About how large a picture becomes.
+        min_size: The smallest width and height that it can hold.
     """
 
     label: str
     bytes_per_pixel: float
     suffixes: tuple[str, ...] = ()
-    video_codec: str | None = None
+    muxer: tuple[str, Mapping[str, str]] = ("", {})
+    encoding: Encoding | None = None
+    transparent: Encoding | None = None
     sound_codec: str | None = None
-    can_be_transparent: bool = False
+    min_size: tuple[int, int] = (1, 1)
+
+    @property
+    def can_be_transparent(self) -> bool:
+        """Whether pictures keep their opacity."""
+        return self.is_sequence or self.transparent is not None
 
     @property
     def is_sequence(self) -> bool:
@@ -39,12 +74,47 @@ class PictureFormat:
         return not self.suffixes
 
 
+_VP9 = {"crf": "18", "b": "0", "deadline": "good", "cpu-used": "4", "row-mt": "1"}
 FORMATS = MappingProxyType(
     {
-        "mp4": PictureFormat("H.264 in mp4", 0.1, (".mp4", ".m4v", ".mov"), "libx264", "aac"),
-        "webm": PictureFormat("VP9 in webm", 0.1, (".webm",), "libvpx-vp9", "libopus", can_be_transparent=True),
-        "png": PictureFormat("PNG files", 2.0, can_be_transparent=True),
-        "exr": PictureFormat("OpenEXR files", 8.0, can_be_transparent=True),
+        "mp4": PictureFormat(
+            "H.264 in mp4",
+            0.1,
+            (".mp4", ".m4v", ".mov"),
+            ("mp4", {"movflags": "+faststart"}),
+            # visually lossless for most eyes
+            Encoding("libx264", "yuv420p", {"crf": "16", "preset": "medium"}),
+            sound_codec="aac",
+        ),
+        "webm": PictureFormat(
+            "VP9 in webm",
+            0.1,
+            (".webm",),
+            ("webm", {}),
+            Encoding("libvpx-vp9", "yuv420p", _VP9),
+            Encoding("libvpx-vp9", "yuva420p", _VP9 | {"auto-alt-ref": "0"}),  # such frames cannot hold opacity
+            "libopus",
+        ),
+        "prores": PictureFormat(
+            "ProRes 422 HQ in mov, 4444 where transparent",
+            0.5,
+            (".mov",),
+            ("mov", {}),
+            Encoding("prores_ks", "yuv422p10le", {"profile": "hq", "vendor": "apl0"}),
+            Encoding("prores_ks", "yuva444p10le", {"profile": "4444", "vendor": "apl0", "alpha_bits": "16"}),
+            "pcm_s16le",
+        ),
+        "dnxhr": PictureFormat(
+            "DNxHR HQX in mov",
+            0.5,
+            (".mov",),
+            ("mov", {}),
+            Encoding("dnxhd", "yuv422p10le", {"profile": "dnxhr_hqx"}),
+            sound_codec="pcm_s16le",
+            min_size=(256, 120),
+        ),
+        "png": PictureFormat("PNG files", 2.0),
+        "exr": PictureFormat("OpenEXR files, linear", 8.0),
     }
 )
 """By name, the usual one first."""
@@ -63,7 +133,7 @@ def format_of(out: Path) -> str:
     if suffix and not out.is_dir():
         raise ProjectError(
             f"--out ends in '{out.suffix}', which is not a video format this program writes.",
-            hint="Write FILE.mp4 or FILE.webm, or name a folder for PNG or OpenEXR files.",
+            hint="Write FILE.mp4, FILE.webm or FILE.mov, or name a folder for PNG or OpenEXR files.",
             path=out,
         )
     return "png"
@@ -87,7 +157,7 @@ def check_codecs(name: str, *, needs_sound: bool = False) -> None:
 def missing_codecs(name: str, *, needs_sound: bool = False) -> list[str]:
     """Encoders that a format needs and that are not there."""
     kind = FORMATS[name]
-    needed = [kind.video_codec, kind.sound_codec if needs_sound else None]
+    needed = [kind.encoding and kind.encoding.codec, kind.sound_codec if needs_sound else None]
     return [codec for codec in needed if codec is not None and not _has_encoder(codec)]
 
 

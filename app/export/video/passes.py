@@ -35,19 +35,20 @@ class PassPicture:
     alpha: np.ndarray
     values: np.ndarray | None
 
-    def over(self, background: tuple[int, int, int]) -> np.ndarray:
-        """In front of a background of levels 0 to 255. [H, W, 3] uint8"""
+    def over(self, background: tuple[int, int, int], max_level: int = 255) -> np.ndarray:
+        """In front of a background of levels 0 to 255. [H, W, 3] uint8, or uint16 where `max_level` is 65,535"""
         behind = np.array(background, np.float32) / np.float32(255.0)
-        return _levels(self.color + (1.0 - self.alpha[..., None]) * behind)
+        return _levels(self.color + (1.0 - self.alpha[..., None]) * behind, max_level)
 
-    def straight(self) -> np.ndarray:
-        """Colours that are not multiplied with the opacity, and the opacity. [H, W, 4] uint8"""
+    def straight(self, max_level: int = 255) -> np.ndarray:
+        """Colours that are not multiplied with the opacity, and the opacity. [H, W, 4], of the type that `over` has"""
         color = self.color / np.maximum(self.alpha, 1e-4)[..., None]
-        return _levels(np.concatenate([color, self.alpha[..., None]], axis=2))
+        return _levels(np.concatenate([color, self.alpha[..., None]], axis=2), max_level)
 
 
-def _levels(values: np.ndarray) -> np.ndarray:
-    return (np.clip(values, 0.0, 1.0) * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
+def _levels(values: np.ndarray, max_level: int) -> np.ndarray:
+    levels = np.clip(values, 0.0, 1.0) * np.float32(max_level) + np.float32(0.5)
+    return levels.astype(np.uint8 if max_level == 255 else np.uint16)
 
 
 class Painter:

@@ -110,13 +110,20 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     sound, notes = _sound(job, capture, runs, timing)
     check_codecs(job.format, needs_sound=sound is not None)
     width, height = (3 * size[0], size[1]) if job.shows == "compare" else size
-    if job.format == "mp4" and (width % 2 or height % 2):
+    kind = FORMATS[job.format]
+    if kind.encoding is not None and kind.encoding.needs_even_sizes and (width % 2 or height % 2):
+        even = width + width % 2, height + height % 2
         notes += (
-            f"H.264 needs even sizes: {width} x {height} is written as {width + width % 2} x {height + height % 2}, "
+            f"{kind.label.split(' in ')[0]} needs even sizes: {width} x {height} is written as {even[0]} x {even[1]}, "
             "with the last row or column repeated.",
         )
-        width, height = width + width % 2, height + height % 2
-    kind = FORMATS[job.format]
+        width, height = even
+    least_width, least_height = kind.min_size
+    if width < least_width or height < least_height:
+        raise ProjectError(
+            f"{kind.label} holds pictures of at least {least_width} x {least_height}, not of {width} x {height}.",
+            hint="Choose a larger size, or another format.",
+        )
     n_bytes = round(kind.bytes_per_pixel * width * height * len(moments))
     check_target(job.out, opened=scene.opened, n_bytes=n_bytes, is_folder=kind.is_sequence)
     scene.check([part.frame for moment in moments for part in moment.sources])  # last, as it reads every clip

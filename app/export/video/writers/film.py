@@ -1,4 +1,4 @@
-"""Films: H.264 in mp4 and VP9 in webm, with or without sound."""
+"""Films: videos of every format that FORMATS has, with or without sound."""
 
 from __future__ import annotations
 
@@ -23,12 +23,6 @@ SOUND_RATE = 48_000
 SOUND_BITS_PER_S = 160_000
 _BT709, _LIMITED = 1, 1
 """Numbers of ITU-T H.273 for primaries, transfer and matrix of HD video, and FFmpeg's for levels 16 to 235."""
-_OPTIONS = {
-    # visually lossless for most eyes
-    "libx264": {"crf": "16", "preset": "medium"},
-    "libvpx-vp9": {"crf": "18", "b": "0", "deadline": "good", "cpu-used": "4", "row-mt": "1"},
-}
-_MUXER = {"mp4": ("mp4", {"movflags": "+faststart"}), "webm": ("webm", {})}
 
 
 class FilmWriter:
@@ -36,7 +30,7 @@ class FilmWriter:
 
     Args:
         path: The file to write.
-        format_name: "mp4" or "webm".
+        format_name: Of a video; see FORMATS.
         fps: Pictures per second.
         background: Behind the scene, levels 0 to 255.
         is_transparent: Keep the opacity.
@@ -55,7 +49,11 @@ class FilmWriter:
         is_transparent: bool = False,
         sound: SoundReader | TimedSound | None = None,
     ) -> None:
-        self._path, self._format, self._background, self._is_transparent = path, format_name, background, is_transparent
+        kind = FORMATS[format_name]
+        encoding = kind.transparent if is_transparent else kind.encoding
+        assert encoding is not None
+        self._path, self._kind, self._background, self._is_transparent = path, kind, background, is_transparent
+        self._encoding = encoding
         self._rate = Fraction(fps).limit_denominator(1001)
         self._sound = sound
         self._n_pictures = self._n_samples = 0
@@ -66,25 +64,21 @@ class FilmWriter:
         self._track: Any = None
 
     def __enter__(self) -> Self:
-        muxer, options = _MUXER[self._format]
-        kind = FORMATS[self._format]
-        assert kind.video_codec is not None
+        muxer, options = self._kind.muxer
         # "file:" because a name with a colon is a protocol to FFmpeg
-        self._container = av.open(f"file:{self._path}", "w", format=muxer, options=options)
+        self._container = av.open(f"file:{self._path}", "w", format=muxer, options=dict(options))
         self._stack.callback(self._container.close)
-        self._video = self._container.add_stream(kind.video_codec, rate=self._rate)
-        self._video.options = dict(_OPTIONS[kind.video_codec])
-        self._video.pix_fmt = "yuv420p"
-        if self._is_transparent:
-            self._video.pix_fmt = "yuva420p"
-            self._video.options |= {"auto-alt-ref": "0"}  # such frames cannot hold opacity
+        self._video = self._container.add_stream(self._encoding.codec, rate=self._rate)
+        self._video.options = dict(self._encoding.options)
+        self._video.pix_fmt = self._encoding.pixels
         context = self._video.codec_context
         context.color_primaries = context.color_trc = context.colorspace = _BT709
         context.color_range = _LIMITED
         if self._sound is not None:
-            assert kind.sound_codec is not None
-            self._track = self._container.add_stream(kind.sound_codec, rate=SOUND_RATE, layout="stereo")
-            self._track.bit_rate = SOUND_BITS_PER_S
+            assert self._kind.sound_codec is not None
+            self._track = self._container.add_stream(self._kind.sound_codec, rate=SOUND_RATE, layout="stereo")
+            if not self._kind.sound_codec.startswith("pcm"):  # which has no choice
+                self._track.bit_rate = SOUND_BITS_PER_S
         return self
 
     def write(self, picture: PassPicture) -> None:
@@ -107,13 +101,15 @@ class FilmWriter:
                         self._container.mux(stream.encode())
 
     def _frame(self, picture: PassPicture) -> av.VideoFrame:
+        max_level = self._encoding.max_level
         if self._is_transparent:
-            frame = av.VideoFrame.from_ndarray(_spread(picture.straight()), format="rgba")
+            image = _spread(picture.straight(max_level))
         else:
-            image = picture.over(self._background)
-            if self._format == "mp4":  # H.264 with colours at half size knows even sizes only
-                image = np.pad(image, ((0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)), mode="edge")
-            frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+            image = picture.over(self._background, max_level)
+        if self._encoding.needs_even_sizes:
+            image = np.pad(image, ((0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)), mode="edge")
+        names = {255: ("rgb24", "rgba"), 65_535: ("rgb48le", "rgba64le")}
+        frame = av.VideoFrame.from_ndarray(image, format=names[max_level][self._is_transparent])
         converted = self._reformatter.reformat(
             frame,
             format=self._video.pix_fmt,
@@ -141,9 +137,9 @@ class FilmWriter:
 def _spread(rgba: np.ndarray) -> np.ndarray:
     """Colours where nothing is, from the nearest pixel with something: colours at half size mix them into the border.
 
-    [H, W, 4] uint8
+    [H, W, 4] uint8 or uint16
     """
-    is_empty = rgba[..., 3] < 4
+    is_empty = rgba[..., 3] < np.iinfo(rgba.dtype).max / 64
     if is_empty.all() or not is_empty.any():
         return rgba
     rows, columns = np.asarray(ndimage.distance_transform_edt(is_empty, return_distances=False, return_indices=True))
