@@ -21,8 +21,8 @@ from engine.errors import ProjectError
 from engine.export.splats import PLY_UP, Splats
 from engine.export.world import AXES
 from engine.importing.scene_source import SceneSource, open_scene
-from engine.importing.still_rows import stored_gaussians
 from engine.importing.stored_clip import stored_clip
+from engine.importing.stored_rows import stored_gaussians
 from engine.importing.views import VIEW_NAMES, Contents
 from engine.storage.files import atomic_folder, disk_error
 

@@ -74,6 +74,11 @@ def read_layout(folder: Path, *, follow_links: bool) -> Layout:
     raise _not_a_capture(folder, [probe for _, probe in probes])
 
 
+def is_capture(folder: Path) -> bool:
+    """Whether some reader knows the layout of a folder. Raises OSError where it cannot be looked into."""
+    return any(reader.probe(folder).is_match for reader in FORMATS)
+
+
 def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
     """The error with the folder's contents, the layouts that can be read, and the remedy."""
     with os.scandir(folder) as entries:
@@ -101,6 +106,6 @@ def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
 
 def _is_capture(entry: os.DirEntry[str]) -> bool:
     try:
-        return entry.is_dir() and any(reader.probe(Path(entry.path)).is_match for reader in FORMATS)
+        return entry.is_dir() and is_capture(Path(entry.path))
     except OSError:  # a link to itself, a folder that may not be looked into
         return False
