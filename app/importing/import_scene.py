@@ -27,7 +27,7 @@ from engine.importing.views import VIEW_NAMES, Contents
 from engine.storage.files import atomic_folder, disk_error
 
 SCENE = "scene"
-"""The folder of a project with the views of its scene."""
+"""The folder of a project with the views of its scene, in one that has its name."""
 CLIP_LENGTH = 20
 CLIP_BYTES = 192 << 20
 """Of the frames of a clip: as many are in memory while it is made."""
@@ -86,7 +86,7 @@ def import_scene(
     source = open_scene(path)
     try:
         with atomic_folder(folder) as partial:
-            n_clips = _fill(partial, source, path.name, fps, up, meters_per_unit, report)
+            n_clips = _fill(partial, source, path.resolve().name, fps, up, meters_per_unit, report)
     except OSError as error:
         raise disk_error(error, what="The project", path=folder) from error
     finally:
@@ -104,9 +104,9 @@ def _fill(
     report: Report,
 ) -> int:
     """Write all of the project; returns the number of clips."""
-    clips, scene, contents = folder / "clips", folder / SCENE, Contents()
+    clips, scene, contents = folder / "clips", folder / SCENE / name, Contents()
     for made in (clips, scene):
-        made.mkdir()
+        made.mkdir(parents=True)
     clip_length, bounds = min(CLIP_LENGTH, source.n_frames), [0]
     waiting: list[Splats] = []
 

@@ -35,6 +35,11 @@ class StoredGaussians:
     moving: dict[str, np.ndarray]
     presence: np.ndarray
 
+    def at_first(self) -> dict[str, np.ndarray]:
+        """Columns of the Gaussians at the first frame of the clip. [N, ...] float32"""
+        n_first = int(self.presence[:, 0].sum())
+        return {name: np.concatenate([self.still[name], self.moving[name][:n_first]]) for name in COLUMNS}
+
     def arrays(self) -> dict[str, np.ndarray]:
         """By the names that they have in a file. Inverse of `read_stored`."""
         still = {f"{_STILL}{name}": array for name, array in self.still.items()}

@@ -113,16 +113,17 @@ class ProjectOpener:
 
         self._jobs.start("Opening", work, take, failed)
 
-    def _import(
-        self, path: Path, asked: OpenCapture, *, current: Path | None, recent: Sequence[RecentProject]
-    ) -> None:
+    def _import(self, path: Path, asked: OpenCapture, *, current: Path | None, recent: Sequence[RecentProject]) -> None:
         """Make a project of a scene of another program, unless there is one, and open it."""
         folder = imported_dir(path, self.projects) if self.project_dir is None else self.project_dir
         this = self._newest
 
         def work(context: JobContext) -> None:
+            def report(n_done: int, n: int) -> None:
+                context.report(n_done / n, f"{n_done} of {n} frames")
+
             if not is_project(folder):
-                import_scene(path, folder, report=lambda n_done, n: context.report(n_done / n, f"{n_done} of {n} frames"))
+                import_scene(path, folder, report=report)
 
         def done(_: None) -> None:
             if this is self._newest:
