@@ -194,12 +194,10 @@ class SceneFrames:
         """Copies of objects at a moment."""
         return self._copies.at(frame)
 
-    def _with_copies(self, edited: EditedGaussians, frame: float) -> Gaussians:
+    def _with_copies(self, edited: EditedGaussians, frame: float) -> EditedGaussians:
         """A moment and its copies; those from clips that are not trained are missing. Raises as `trained` does."""
         copies = self.copies(frame)
-        if not copies:
-            return edited.gaussians
-        return self._made_copier().with_copies(edited, copies, self._copied_clip).gaussians
+        return self._made_copier().with_copies(edited, copies, self._copied_clip) if copies else edited
 
     def copied(self, frame: float) -> Gaussians | None:
         """The copies of a moment alone; None where there are none. Raises as `trained` does."""
@@ -230,8 +228,12 @@ class SceneFrames:
         Raises:
             ProjectError: As `trained`; an edit is damaged.
         """
+        return self.edited(frame, part).gaussians
+
+    def edited(self, frame: float, part: Part = "all") -> EditedGaussians:
+        """The same with the rows that Gaussians come from. Raises as `gaussians` does."""
         edited = self._edited(frame, self.clip_time(frame), self.effects(frame), part)
-        return edited.gaussians if part == "static" else self._with_copies(edited, frame)
+        return edited if part == "static" else self._with_copies(edited, frame)
 
     def at_moments(self, moments: Sequence[SourceMoment], part: Part = "all") -> Gaussians:
         """The scene at moments that fade into each other: still parts of the one that most is seen of, and what moves
@@ -270,11 +272,13 @@ class SceneFrames:
                 trained, clip_time = self.trained(at), self.clip_time(at)
                 there = (frame - trained.clip.start) / trained.clip.clip_length  # may be outside of it
                 edited = self._edited(at, there, self.effects(frame, at), "all", alive_at=clip_time)
-                yield Share(known[at] / sum(known.values()), trained, clip_time, self._with_copies(edited, frame))
+                yield Share(
+                    known[at] / sum(known.values()), trained, clip_time, self._with_copies(edited, frame).gaussians
+                )
             return
         trained, clip_time = self.trained(frame), self.clip_time(frame)
         knots, effects = trained.model.knots(clip_time), self.effects(frame)
         for knot, weight in knots:
             alive_at = None if len(knots) == 1 else knot / trained.clip.clip_length
             edited = self._edited(frame, clip_time, effects, "all", alive_at=alive_at)
-            yield Share(weight, trained, clip_time, self._with_copies(edited, frame))
+            yield Share(weight, trained, clip_time, self._with_copies(edited, frame).gaussians)

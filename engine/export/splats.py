@@ -74,6 +74,14 @@ class Splats:
         left out and counted. Rotations become unit length, opacities are held in 0..1, and a side without thickness
         gets one that nobody sees.
         """
+        splats, _ = cls.with_kept(means, quats, scales, opacities, colors)
+        return splats
+
+    @classmethod
+    def with_kept(
+        cls, means: np.ndarray, quats: np.ndarray, scales: np.ndarray, opacities: np.ndarray, colors: np.ndarray
+    ) -> tuple[Splats, np.ndarray]:
+        """The same, and which of the given rows they are. [N] bool"""
         with np.errstate(over="ignore", invalid="ignore"):
             means, scales, colors = (np.asarray(a, np.float32).reshape(-1, 3) for a in (means, scales, colors))
             quats = np.asarray(quats, np.float32).reshape(-1, 4)
@@ -83,7 +91,7 @@ class Splats:
             is_kept = np.isfinite(numbers).all(1) & (lengths > 1e-12)
             is_kept &= (scales >= 0.0).all(1) & (scales.max(1, initial=0.0) > 0.0)
         kept_quats = quats[is_kept] / lengths[is_kept, None]
-        return cls(
+        splats = cls(
             means=np.ascontiguousarray(means[is_kept]),
             quats=kept_quats.astype(np.float32),
             scales=np.maximum(scales[is_kept], np.float32(THINNEST)),
@@ -91,6 +99,7 @@ class Splats:
             colors=np.ascontiguousarray(colors[is_kept]),
             n_dropped=int(len(is_kept) - is_kept.sum()),
         )
+        return splats, is_kept
 
     def gaussians(self) -> Gaussians:
         """The Gaussians for a rasterizer, on the CPU."""

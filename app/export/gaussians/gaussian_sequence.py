@@ -20,6 +20,7 @@ from engine.export.formats.table import Format
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
 from engine.raster.gaussians import Gaussians
+from engine.storage.files import open_regular
 
 SCHEMA = 1
 _MOST_WRITERS = 4
@@ -78,7 +79,7 @@ class GaussianSequence:
             ProjectError: A clip is damaged, or a value does not fit the format.
             OSError: The disk refused.
         """
-        check = ReadBack(self._scene, self._kind.read, self._placement)
+        check = ReadBack(self._scene, self._placement)
         middle_too = {self._frames[row].number for row in (0, len(self._frames) // 2, -1)}
         figures: dict[GaussianFile, dict[str, float]] = {}
         pending: deque[Future[WrittenFile]] = deque()
@@ -89,7 +90,9 @@ class GaussianSequence:
                 pending.append(future)
                 if file.part == "static" or one.number in middle_too:
                     future.result()
-                    figures[file] = check.psnr_db(folder / file.name, one.frame, live)
+                    with open_regular(folder / file.name) as written:
+                        found = self._kind.read(written)
+                    figures[file] = check.psnr_db(found, one.frame, live)
                 while len(pending) > self._n_writers:  # so many scenes are in memory at most
                     self.files.append(pending.popleft().result())
             self.files += [future.result() for future in pending]

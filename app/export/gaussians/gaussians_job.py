@@ -6,13 +6,12 @@ from __future__ import annotations
 import time
 from collections import Counter
 
-import numpy as np
-
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.export.edits.written_edits import written_edits
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
+from app.export.gaussians.file_place import file_world
 from app.export.gaussians.gaussian_files import SIDECAR
 from app.export.gaussians.gaussian_sequence import GaussianSequence
 from app.export.jobs.gaussians import GaussiansJob
@@ -21,7 +20,6 @@ from app.export.staging import check_target, staged_folder
 from app.export.take import take_frames
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS, FULL_PLY, Format
-from engine.export.world import FileWorld, world
 from engine.storage.json_files import json_text
 
 
@@ -38,7 +36,7 @@ def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
         if job.part != "static":
             n_gaussians += n_frames * (n_moving + (n_static if job.part == "all" else 0))
     n_files = (0 if job.part == "static" else len(frames)) + (len(stretches) if job.part in ("static", "split") else 0)
-    text = f"Coordinates: {_world(opened, job).text}."
+    text = f"Coordinates: {file_world(opened, job, is_rub=job.axes == 'rub').text}."
     return ExportEstimate(n_files + 1, round(n_gaussians * _kind(job).bytes_each), (text,))
 
 
@@ -55,7 +53,9 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     scene = _scene(opened, job)
     frames = take_frames(scene, job.frames, has_timing=job.has_timing)
     n_threads = use_threads(None)  # of this process: next to a training, a job has but one
-    sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job), n_threads=n_threads)
+    sequence = GaussianSequence(
+        scene, frames, job.part, _kind(job), file_world(opened, job, is_rub=job.axes == "rub"), n_threads=n_threads
+    )
     check_target(job.out, opened=opened, is_folder=True)
     report(ExportProgress(0, len(frames), message="Checking the clips"))
     scene.check(moment.frame for one in frames for moment in one.moments)
@@ -79,11 +79,3 @@ def _kind(job: GaussiansJob) -> Format:
     if job.fields == "full" and job.format != "ply":
         raise ProjectError(f"'{job.format}' has no choice of fields.", hint="Only ply has fields; leave them out.")
     return FULL_PLY if job.fields == "full" else FORMATS[job.format]
-
-
-def _world(opened: TrainedProject, job: GaussiansJob) -> FileWorld:
-    """The scene's place in the files."""
-    said = opened.project.document.world.meters_per_unit
-    scale = job.scale if job.scale is not None else 1.0 if said is None else said
-    scene_up = opened.up if job.scene_up is None else np.array(job.scene_up)
-    return world(scene_up, up=job.up, scale=scale, is_rub=job.axes == "rub")

@@ -1,10 +1,6 @@
-"""ReadBack: an exported file of Gaussians is read again and compared with the live scene, from capture cameras."""
+"""ReadBack: what an exported file of Gaussians gives back is compared with the live scene, from capture cameras."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 import torch
@@ -16,7 +12,6 @@ from engine.export.world import FileWorld
 from engine.images.psnr import psnr
 from engine.model.clip_view import render_gaussians
 from engine.raster.gaussians import Gaussians
-from engine.storage.files import open_regular
 
 N_CAMERAS = 3
 LONGEST_SIDE_PX = 960
@@ -28,25 +23,24 @@ class ReadBack:
 
     Args:
         scene: The source of its frames.
-        read: Of the format.
         world: The scene's placement in the file; undone here.
     """
 
-    def __init__(self, scene: SceneFrames, read: Callable[[BinaryIO], Splats], world: FileWorld) -> None:
-        self._scene, self._read, self._world = scene, read, world
+    def __init__(self, scene: SceneFrames, world: FileWorld) -> None:
+        self._scene, self._world = scene, world
         rig = scene.opened.rig
         self._rig = _reduced(rig.subset(np.unique(np.linspace(0, len(rig) - 1, N_CAMERAS).round().astype(int))))
 
-    def psnr_db(self, path: Path, frame: float, live: Gaussians) -> dict[str, float]:
-        """PSNR of the file's picture against the live one, by the name of the camera. Nothing but Gaussians: black
+    def psnr_db(self, splats: Splats, frame: float, live: Gaussians) -> dict[str, float]:
+        """PSNR of the picture of a file against the live one, by the name of the camera. Nothing but Gaussians: black
         behind them, and no camera's own colours.
 
-        Raises:
-            ProjectError: The file is not what was written.
-            OSError: It cannot be read.
+        Args:
+            splats: As they were read.
+            frame: Of the capture.
+            live: What was written.
         """
-        with open_regular(path) as file:
-            found = self._world.returned(self._read(file)).gaussians()
+        found = self._world.returned(splats).gaussians()
         trained = self._scene.trained(frame)
         figures = {}
         for camera, name in enumerate(self._rig.names):

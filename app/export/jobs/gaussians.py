@@ -5,25 +5,11 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 from app.export.jobs.job import EDITS, FRAMES, OBJECT, TIMING, ExportJob, option
+from app.export.jobs.placing import SCALE, SCENE_UP, UP, Vector
 from app.export.picked_frames import PickedFrames
 from engine.export.formats.table import FORMATS
-from engine.export.world import AXES
-from engine.setting import Flag, Writing, value_text
 
 WrittenPart = Literal["all", "static", "moving", "split"]
-Vector = tuple[float, float, float]
-
-
-def _read_vector(text: str) -> Vector:
-    x, y, z = map(float, text.split())
-    return x, y, z
-
-
-def _vector_text(vector: Vector) -> str:
-    return " ".join(map(value_text, vector))
-
-
-_SCENE_UPS = {"": "As in the project"} | {_vector_text(axis): name for name, axis in AXES.items()}
 
 
 class GaussiansJob(ExportJob, frozen=True):
@@ -54,33 +40,8 @@ class GaussiansJob(ExportJob, frozen=True):
             },
         ),
     ] = "all"
-    up: Annotated[
-        str | None,
-        option(
-            "Turns the scene so that up points along this axis of the files",
-            "Up axis",
-            none="as in the capture",
-            choices=dict.fromkeys(AXES, ""),
-            titles={"": "As in the capture", "+y": "+y", "-y": "-y", "+z": "+z", "-z": "-z"},
-            flags=(
-                Flag("--up", "Turns the scene so that this axis points up", prefix="+"),
-                Flag("--down", "Turns the scene so that this axis points down", prefix="-"),
-            ),
-        ),
-    ] = None
-    scale: Annotated[
-        float | None,
-        option(
-            "Units of the files per unit of the capture",
-            "Scale",
-            low=1e-6,
-            high=1e6,
-            none="metres where the project says how long a unit is, else as in the capture",
-            titles={"": "Metres, where the scale is known"}
-            | {size: size for size in ("1", "0.001", "0.01", "10", "100", "1000")},
-            like="S",
-        ),
-    ] = None
+    up: Annotated[str | None, UP] = None
+    scale: Annotated[float | None, SCALE] = None
     axes: Annotated[
         Literal["ply", "rub"],
         option(
@@ -93,16 +54,7 @@ class GaussiansJob(ExportJob, frozen=True):
             shown_with={"format": ("spz",)},
         ),
     ] = "ply"
-    scene_up: Annotated[
-        Vector | None,
-        option(
-            "Which way is up in the capture, for the up axis of the files",
-            "Up in the capture",
-            none="set in the project, else derived from the cameras",
-            titles=_SCENE_UPS,
-            writing=Writing("X Y Z", "three numbers", _read_vector, _vector_text),
-        ),
-    ] = None
+    scene_up: Annotated[Vector | None, SCENE_UP] = None
     has_edits: Annotated[bool, EDITS] = True
     object: Annotated[str | None, OBJECT] = None
     has_timing: Annotated[bool, TIMING] = True

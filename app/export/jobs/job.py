@@ -65,6 +65,13 @@ TIMING = option(
     titles={"true": "As edited", "false": "As captured"},
     flags=(Flag("--as-captured", "The take as captured, without its timing", constant=False),),
 )
+SOUND = option(
+    "Adds the sound recorded by this camera",
+    "Sound",
+    titles={"": "None", "*": "Camera {}"},
+    names="cameras",
+    like="CAMERA",
+)
 
 
 class JobModule(Protocol):

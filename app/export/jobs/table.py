@@ -10,13 +10,14 @@ from app.export.jobs.gaussians import GaussiansJob
 from app.export.jobs.job import ExportJob
 from app.export.jobs.metrics import MetricsJob
 from app.export.jobs.player import PlayerJob
+from app.export.jobs.sequence import SequenceJob
 from app.export.jobs.video import VideoJob
 from engine.errors import ProjectError
 from engine.setting import settings_of
 from engine.text import shown
 
 KINDS: dict[str, type[ExportJob]] = {
-    job.kind: job for job in (GaussiansJob, VideoJob, PlayerJob, MetricsJob, CamerasJob)
+    job.kind: job for job in (GaussiansJob, SequenceJob, VideoJob, PlayerJob, MetricsJob, CamerasJob)
 }
 """By name, in the order in which they are offered."""
 

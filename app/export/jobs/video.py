@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from app.export.jobs.job import EDITS, FRAMES, OBJECT, TIMING, ExportJob, option
+from app.export.jobs.job import EDITS, FRAMES, OBJECT, SOUND, TIMING, ExportJob, option
 from app.export.jobs.question import Question
 from app.export.picked_frames import PickedFrames
 from app.export.video.formats import FORMATS
@@ -213,16 +213,7 @@ class VideoJob(ExportJob, frozen=True):
             flags=(Flag("--transparent", constant=True),),
         ),
     ] = False
-    sound: Annotated[
-        str | None,
-        option(
-            "Adds the sound recorded by this camera",
-            "Sound",
-            titles={"": "None", "*": "Camera {}"},
-            names="cameras",
-            like="CAMERA",
-        ),
-    ] = None
+    sound: Annotated[str | None, SOUND] = None
     features: Annotated[
         Literal["both", "static", "dynamic"],
         option(

@@ -34,6 +34,7 @@ class SequenceFormat(NamedTuple):
             store as it is. The path has the right suffix and is replaced.
         open: Opens a file to read frames from it. Raises ProjectError where it is damaged, of an unknown version, or
             asks for more memory than a limit.
+        has_sound: Whether it can hold sound.
         check: Raises ProjectError where something is missing that it is written and read with.
         problems: What the format's own validator says is wrong with a file.
     """
@@ -47,6 +48,7 @@ class SequenceFormat(NamedTuple):
     limits: tuple[str, ...]
     write: Callable[[Iterable[Stretch], SequenceTiming, Path], tuple[str, ...]]
     open: Callable[[Path], SequenceReader]
+    has_sound: bool = False
     check: Callable[[], None] = _can_always
     problems: Callable[[Path], tuple[str, ...]] = _is_valid
 
@@ -62,6 +64,7 @@ SEQUENCES: dict[str, SequenceFormat] = {
         fourdgs_writer.LIMITS,
         fourdgs_writer.write,
         fourdgs_reader.FourdgsReader,
+        has_sound=True,
         problems=fourdgs_reader.problems,
     ),
 }

@@ -1,0 +1,48 @@
+"""Options of all exports of Gaussians: how the scene lies in a file."""
+
+from __future__ import annotations
+
+from app.export.jobs.job import option
+from engine.export.world import AXES
+from engine.setting import Flag, Writing, value_text
+
+Vector = tuple[float, float, float]
+
+
+def _read_vector(text: str) -> Vector:
+    x, y, z = map(float, text.split())
+    return x, y, z
+
+
+def _vector_text(vector: Vector) -> str:
+    return " ".join(map(value_text, vector))
+
+
+UP = option(
+    "Turns the scene so that up points along this axis of the files",
+    "Up axis",
+    none="as in the capture",
+    choices=dict.fromkeys(AXES, ""),
+    titles={"": "As in the capture", "+y": "+y", "-y": "-y", "+z": "+z", "-z": "-z"},
+    flags=(
+        Flag("--up", "Turns the scene so that this axis points up", prefix="+"),
+        Flag("--down", "Turns the scene so that this axis points down", prefix="-"),
+    ),
+)
+SCALE = option(
+    "Units of the files per unit of the capture",
+    "Scale",
+    low=1e-6,
+    high=1e6,
+    none="metres where the project says how long a unit is, else as in the capture",
+    titles={"": "Metres, where the scale is known"}
+    | {size: size for size in ("1", "0.001", "0.01", "10", "100", "1000")},
+    like="S",
+)
+SCENE_UP = option(
+    "Which way is up in the capture, for the up axis of the files",
+    "Up in the capture",
+    none="set in the project, else derived from the cameras",
+    titles={"": "As in the project"} | {_vector_text(axis): name for name, axis in AXES.items()},
+    writing=Writing("X Y Z", "three numbers", _read_vector, _vector_text),
+)

@@ -1,0 +1,1 @@
+"""Frames as one file of Gaussians over time."""
