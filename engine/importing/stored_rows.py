@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 
 from engine.clip_files.stored_gaussians import COLUMNS, StoredGaussians
 from engine.export.splats import Splats
 
+MEANS = COLUMNS["means"]
+"""Centres come first in a row."""
 _ORDERED_SHARE = 0.05
 """Rows keep their order where from one frame to the next most move by less than this share of the scene's spread."""
 _SAMPLE = 10_000
@@ -20,7 +23,7 @@ def stored_gaussians(frames: Sequence[Splats]) -> StoredGaussians:
     """Consecutive frames as a clip holds them: bit for bit what they are.
 
     Where all frames have as many rows, in the same order as far as can be told, a row is one Gaussian throughout.
-    Elsewhere rows with equal values are.
+    Elsewhere rows with equal values are, and of the others those that have moved and are the same in all else.
     """
     tables = [_table(splats) for splats in frames]
     if len({len(table) for table in tables}) == 1 and _keep_order(tables):
@@ -30,18 +33,18 @@ def stored_gaussians(frames: Sequence[Splats]) -> StoredGaussians:
         presence = np.ones((int((~is_still).sum()), len(tables)), bool)
         return _stored(tables[0][is_still], [table[~is_still] for table in tables], presence)
     keys = [_keys(table) for table in tables]
-    _, first, track = np.unique(np.concatenate(keys), return_index=True, return_inverse=True)
+    lasting = reduce(np.intersect1d, keys)
+    still = tables[0][np.isin(keys[0], lasting)]
+    moving = [table[~np.isin(key, lasting)] for table, key in zip(tables, keys, strict=True)]
+    names = np.concatenate([_keys(table[:, MEANS:]) for table in moving])
+    _, first, name = np.unique(names, return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first)] = np.arange(len(first))  # tracks in the order in which they appear
-    tracks = np.split(rank[track], np.cumsum([len(key) for key in keys])[:-1])
+    tracks = np.split(rank[name], np.cumsum([len(table) for table in moving])[:-1])
     presence = np.zeros((len(first), len(tables)), bool)
     for frame, found in enumerate(tracks):
         presence[found, frame] = True
-    is_still = presence.all(1)
-    orders = [np.argsort(found) for found in tracks]
-    still = tables[0][orders[0][is_still[tracks[0][orders[0]]]]]
-    moving = [table[order[~is_still[found[order]]]] for table, found, order in zip(tables, tracks, orders, strict=True)]
-    return _stored(still, moving, presence[~is_still])
+    return _stored(still, [table[np.argsort(found)] for table, found in zip(moving, tracks, strict=True)], presence)
 
 
 def _table(splats: Splats) -> np.ndarray:
@@ -65,7 +68,7 @@ def _columns(table: np.ndarray) -> dict[str, np.ndarray]:
 def _keep_order(tables: Sequence[np.ndarray]) -> bool:
     """Whether equal places hold the same Gaussian, judged by how far most of them move."""
     step = max(len(tables[0]) // _SAMPLE, 1)
-    means = [table[::step, :3].view(np.float32).astype(np.float64) for table in tables]
+    means = [table[::step, :MEANS].view(np.float32).astype(np.float64) for table in tables]
     spread = max(float(np.linalg.norm(means[0] - np.median(means[0], 0), axis=1).mean()) if len(means[0]) else 0, 1e-30)
     ways = [float(np.median(np.linalg.norm(b - a, axis=1))) for a, b in itertools.pairwise(means) if len(a)]
     return max(ways, default=0.0) <= _ORDERED_SHARE * spread
