@@ -49,7 +49,7 @@ def stored_gaussians(frames: Sequence[Splats]) -> StoredGaussians:
 
 def _table(splats: Splats) -> np.ndarray:
     """All columns as bits, so that rows are equal only if nothing differs. [N, 14] uint32"""
-    columns = [np.asarray(getattr(splats, name), np.float32).reshape(len(splats), -1) for name in COLUMNS]
+    columns = [np.asarray(getattr(splats, name), np.float32).reshape(-1, width) for name, width in COLUMNS.items()]
     return np.ascontiguousarray(np.concatenate(columns, axis=1)).view(np.uint32)
 
 

@@ -115,7 +115,7 @@ class StoredModel(ClipModel):
                 continue
             found = self._rows_at[self._frame(clip_time)][chosen]
             parts.append(self._moving[torch.where(found >= 0, found, self._first_rows[chosen])])
-        return Gaussians.concatenate(parts) if len(parts) != 1 else parts[0]
+        return Gaussians.concatenate(parts) if parts else self._moving[:0]
 
     def static_gaussians(self, role: str) -> Gaussians:
         """Gaussians of a whole set as it first is."""
