@@ -20,7 +20,7 @@ from engine.model.field import SpatioTemporalField
 from engine.model.host_array import host_array
 from engine.model.model_backend import ModelBackend
 from engine.model.motion import AnchorMotion
-from engine.model.stored_model import StoredModel
+from engine.model.stored.stored_model import StoredModel
 
 
 def inherit(
