@@ -6,11 +6,12 @@ from __future__ import annotations
 import argparse
 import time
 
-from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_NOT_READY, EXIT_OK, EXIT_STOPPED, fail
+from app.cli.arguments import EXIT_NOT_READY, EXIT_OK, EXIT_STOPPED, fail
 from app.cli.chosen_project import open_for_clip
+from app.cli.terminal.exit_codes import exit_code
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import show_event, show_outcome, show_status
-from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
+from app.evaluation.headless import ClipOutcome, train_clips, train_document
 from app.project.claims.claims import LOOK_EVERY_S, ClipClaimed
 from app.project.clips.clip_catalog import ClipCatalog
 from app.training.service import Launch, TrainingService
@@ -93,12 +94,12 @@ def _claim(service: TrainingService, clip_index: int, line: ProgressLine) -> Non
 
 
 def _exit_code(outcome: ClipOutcome) -> int:
-    if outcome.state in ("trained", "skipped"):
-        return EXIT_OK
+    code = exit_code([outcome])
+    if code == EXIT_OK:
+        return code
     said = " ".join(part for part in (outcome.message, outcome.hint) if part)
     if outcome.kind == ClipClaimed.__name__:
         return fail(EXIT_NOT_READY, said)
     if outcome.state == "stopped":
         return fail(EXIT_STOPPED, f"The training of clip {outcome.clip_index} was stopped; progress is kept.")
-    is_input = outcome.state == "damaged" or outcome.kind in BAD_INPUT_KINDS
-    return fail(EXIT_BAD_INPUT if is_input else EXIT_FAILED, said)
+    return fail(code, said)

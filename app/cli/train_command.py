@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
-    EXIT_FAILED,
     EXIT_NOT_READY,
     EXIT_OK,
     EXIT_STOPPED,
@@ -20,6 +18,7 @@ from app.cli.arguments import (
 )
 from app.cli.chosen_project import add_project_arguments, open_for_training, project_to_plan, what_goes
 from app.cli.single_clip import train_single_clip
+from app.cli.terminal.exit_codes import exit_code
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import (
     PlanLines,
@@ -32,7 +31,7 @@ from app.cli.terminal.training_lines import (
 from app.cluster.cluster import Cluster
 from app.cluster.joined import JoinedCluster
 from app.document.storing.document_file import PROJECT_FILE
-from app.evaluation.headless import BAD_INPUT_KINDS, ClipOutcome, train_clips, train_document
+from app.evaluation.headless import ClipOutcome, train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.sequence import plan_sequence, sequence_text
 from app.plan.side_by_side import PlannedClips, SideBySide, plan_here
@@ -106,16 +105,6 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output"
     )
     command.add_argument("--quiet", action="store_true", help="show no progress")
-
-
-def exit_code(outcomes: Sequence[ClipOutcome]) -> int:
-    """Of a training that ended like this: bad input only where nothing else went wrong."""
-    failed = [outcome for outcome in outcomes if outcome.state == "failed"]
-    if failed and all(outcome.kind in BAD_INPUT_KINDS for outcome in failed):
-        return EXIT_BAD_INPUT
-    if any(outcome.state in ("failed", "damaged") for outcome in outcomes):
-        return EXIT_FAILED
-    return EXIT_STOPPED if any(outcome.state == "stopped" for outcome in outcomes) else EXIT_OK
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:

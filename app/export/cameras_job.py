@@ -1,4 +1,4 @@
-"""The cameras of a project's capture for other programs: as COLMAP's sparse model, or as transforms.json."""
+"""The cameras of a project's capture for other programs: as COLMAP's sparse model, as transforms.json, or as USD."""
 
 from __future__ import annotations
 
@@ -9,19 +9,25 @@ import numpy as np
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.jobs.cameras import CamerasJob
-from app.export.staging import check_target
+from app.export.staging import check_target, staged_folder
+from app.export.usd_cameras import write_usd_cameras
 from engine.camera.corrections import corrected_camera
 from engine.capture.frames import ImageFrames
 from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.writers.conversion import convert
 
-ROW_BYTES = {"colmap": 240, "transforms": 720}
+ROW_BYTES = {"colmap": 240, "transforms": 720, "usd": 900}
+SAMPLE_BYTES = 400
+"""Of a camera path, at a frame, as USD."""
 WORLD = "Cameras are in the coordinates and units of the Gaussians; frames are not copied."
 
 
 def estimate(opened: TrainedProject, job: CamerasJob) -> ExportEstimate:
     """See `JobModule`."""
     layout = opened.capture.layout
+    if job.format == "usd":
+        n_samples = layout.n_frames * len(opened.project.document.camera_paths)
+        return ExportEstimate(1, len(layout.cameras) * ROW_BYTES["usd"] + n_samples * SAMPLE_BYTES, (WORLD,))
     points = layout.points.stat().st_size if layout.points is not None and layout.points.is_file() else 0
     has_images = all(isinstance(entry.source, ImageFrames) for entry in layout.cameras)
     n_rows = len(layout.cameras) * (layout.n_frames if job.format == "transforms" and has_images else 1)
@@ -34,15 +40,28 @@ def run(opened: TrainedProject, job: CamerasJob, report: Report) -> ExportResult
 
     Raises:
         CaptureError: The layout has no words for a lens.
-        ProjectError: The folder cannot be written.
+        ProjectError: The folder cannot be written, or USD's library is missing.
     """
     n_cameras = len(opened.capture.layout.cameras)
     check_target(job.out, opened=opened, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
     report(ExportProgress(0, n_cameras, "cameras"))
     layout, lines = _as_trained(opened)
-    done = convert(layout, job.out, job.format)
+    if job.format == "usd":
+        document = opened.project.document
+        with staged_folder(job.out, what="The export") as folder:
+            notes = write_usd_cameras(
+                folder,
+                layout.cameras,
+                document.camera_paths,
+                n_frames=layout.n_frames,
+                fps=layout.fps,
+                up=opened.up,
+                meters_per_unit=document.world.meters_per_unit,
+            )
+    else:
+        notes = convert(layout, job.out, job.format).lines
     report(ExportProgress(n_cameras, n_cameras, "cameras"))
-    return written(job.out, lines=(WORLD, *lines, *done.lines))
+    return written(job.out, lines=(WORLD, *lines, *notes))
 
 
 def _as_trained(opened: TrainedProject) -> tuple[Layout, tuple[str, ...]]:

@@ -447,7 +447,8 @@ def fingerprint(layout: Layout) -> str:
     rig = layout.rig()
     digest = hashlib.sha256()
     length = ("growing",) if layout.is_growing else (layout.n_frames, round(layout.fps, 6))
-    header = (layout.format, *length, rig.names)
+    curve = () if layout.curve is None else (layout.curve,)
+    header = (layout.format, *length, rig.names, *curve)
     digest.update(repr(header).encode())
     for array in (rig.world_to_camera, rig.Ks, rig.image_sizes):
         digest.update(np.ascontiguousarray(array).tobytes())

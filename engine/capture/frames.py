@@ -12,9 +12,10 @@ from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 import numpy as np
+from av import CodecContext, Packet
 from av.video.reformatter import VideoReformatter
 from PIL import Image
 
@@ -33,10 +34,12 @@ from engine.capture.files.media import (
 )
 from engine.capture.growing.numbered_files import NumberedFiles
 from engine.capture.layout.limits import MAX_PIXELS
+from engine.capture.pixels.transfer_curves import CurveName, display_levels
 from engine.capture.pixels.video_colors import rgb_picture
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 
+_DEEP_CODECS = {"PNG": "png", "TIFF": "tiff"}
 MAX_DECODER_BYTES = 384 << 20
 """Limit of the decoded frames that all open videos of a capture hold because others refer to them."""
 DECODER_BYTES_PER_PIXEL = 24
@@ -68,10 +71,11 @@ class FrameSource(Protocol):
 
 
 class ImageFrames:
-    """One image file per frame. Owns paths only."""
+    """One image file per frame. Owns paths only. curve: See `rgb_picture`."""
 
-    def __init__(self, folder: Path, files: Sequence[Path]) -> None:
+    def __init__(self, folder: Path, files: Sequence[Path], *, curve: CurveName | None = None) -> None:
         self.path = folder
+        self.curve: CurveName | None = curve
         self.files = files if isinstance(files, NumberedFiles) else tuple(files)
 
     @property
@@ -86,14 +90,14 @@ class ImageFrames:
             CaptureError: A file is missing, truncated or no image.
         """
         for frame_index in frame_indices:
-            yield read_image(self.files[frame_index])
+            yield read_image(self.files[frame_index], curve=self.curve)
 
     def close(self) -> None:
         """Nothing is held open between reads."""
 
 
-def read_image(path: Path) -> np.ndarray:
-    """Decode one image file to [H, W, 3] uint8 RGB.
+def read_image(path: Path, *, curve: CurveName | None = None) -> np.ndarray:
+    """Decode one image file, of 8 or 16 bits, to [H, W, 3] uint8 RGB. curve: See `rgb_picture`.
 
     Raises:
         CaptureError: The file is missing, truncated or no image.
@@ -103,13 +107,34 @@ def read_image(path: Path) -> np.ndarray:
         with open_regular(path) as file, Image.open(file, formats=IMAGE_KINDS) as image:
             if image.width * image.height > MAX_PIXELS:
                 raise CaptureError(f"The image is {image.width}x{image.height}.", hint=again, path=path)
-            return np.asarray(image.convert("RGB"))
+            if curve is None and not image.mode.startswith("I;16"):
+                return np.asarray(image.convert("RGB"))
+            levels = _deep_levels(image, file)
+            return display_levels(curve, is_stretched=False)[levels] if curve else (levels >> 8).astype(np.uint8)
     except FileNotFoundError:
         raise CaptureError("The image is missing.", hint="Put the file back or export it again.", path=path) from None
     except IMAGE_FAULTS as error:
         raise CaptureError(
             f"The image cannot be decoded ({error}), so it is truncated or damaged.", hint=again, path=path
         ) from error
+
+
+def _deep_levels(image: Image.Image, file: BinaryIO) -> np.ndarray:
+    """An opened image with 16 bits a channel. [H, W, 3] uint16
+
+    Pillow reads grey ones so, but keeps only 8 bits of colours; those of PNG and TIFF are decoded by FFmpeg.
+    """
+    if image.mode.startswith("I;16"):
+        return np.repeat(np.asarray(image).astype(np.uint16)[..., None], 3, axis=2)
+    codec = _DEEP_CODECS.get(image.format or "")
+    if codec is None or not any("16" in str(tile[3]) for tile in getattr(image, "tile", ())):
+        return np.asarray(image.convert("RGB")).astype(np.uint16) * 257
+    file.seek(0)
+    decoder: Any = CodecContext.create(codec, "r")
+    frames = decoder.decode(Packet(file.read()))
+    if not frames:
+        raise ValueError("no picture in it")
+    return frames[0].to_ndarray(format="rgb48le")
 
 
 class VideoFrames:
@@ -120,10 +145,20 @@ class VideoFrames:
         n_frames: Number of frames, as its header says.
         is_turned: Whether pictures are turned as the file says; otherwise they come as they are stored.
         is_growing: The file may still be written, so that it need not have so many frames, or may have more.
+        curve: See `rgb_picture`.
     """
 
-    def __init__(self, path: Path, n_frames: int, *, is_turned: bool = True, is_growing: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        n_frames: int,
+        *,
+        is_turned: bool = True,
+        is_growing: bool = False,
+        curve: CurveName | None = None,
+    ) -> None:
         self.path, self.is_turned, self.is_growing = path, is_turned, is_growing
+        self.curve: CurveName | None = curve
         self._n_frames = n_frames
         self._turn: Turn | None = None if is_turned else UPRIGHT  # as its first frame says; None before that
         self._reformatter = VideoReformatter()
@@ -178,7 +213,7 @@ class VideoFrames:
             if frame is not None:
                 if self._turn is None:  # asked once: PyAV never lets go of a frame that was asked
                     self._turn = turn_of_frame(frame)
-                return self._turn.upright(rgb_picture(frame, self._reformatter))
+                return self._turn.upright(rgb_picture(frame, self._reformatter, self.curve))
         except (*VIDEO_FAULTS, OSError, ValueError) as error:  # ValueError: a pixel format that cannot be converted
             self._close()
             raise self._damaged(frame_index, getattr(error, "strerror", None) or "damaged") from error

@@ -1,7 +1,6 @@
 """XML files of other programs, read strictly: bounded in size, depth and number of elements, and without a DOCTYPE.
 
-Entities can only be declared in a DOCTYPE, so that none is expanded and nothing else is opened. Only elements with
-their attributes are kept; text between tags is not.
+Entities can only be declared in a DOCTYPE, so that none is expanded and nothing else is opened.
 """
 
 from __future__ import annotations
@@ -30,11 +29,13 @@ class XmlElement:
         tag: Its name.
         attributes: By name, as texts.
         children: Elements inside it, in order.
+        text: Its own text, that of elements inside it left out.
     """
 
     tag: str
     attributes: dict[str, str]
     children: list[XmlElement] = field(default_factory=list)
+    text: str = ""
 
     def inside(self, *tags: str) -> Iterator[XmlElement]:
         """Elements along a path of tags below this one, in order: `inside("cameras", "camera")`."""
@@ -65,6 +66,7 @@ def parse_xml(data: bytes) -> XmlElement:
     """
     top = XmlElement("", {})
     opened = [top]
+    texts: list[list[str]] = [[]]
     n_elements = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -77,16 +79,20 @@ def parse_xml(data: bytes) -> XmlElement:
         element = XmlElement(tag, attributes)
         opened[-1].children.append(element)
         opened.append(element)
+        texts.append([])
 
     def end(tag: str) -> None:
-        opened.pop()
+        opened.pop().text = "".join(texts.pop())
+
+    def say(text: str) -> None:
+        texts[-1].append(text)
 
     def refuse(*what: object) -> None:
         raise XmlError("it has a DOCTYPE, which is not read")
 
     parser = xml.parsers.expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.StartDoctypeDeclHandler = refuse
+    parser.CharacterDataHandler, parser.StartDoctypeDeclHandler = say, refuse
     try:
         parser.Parse(data, True)
     except xml.parsers.expat.ExpatError as error:

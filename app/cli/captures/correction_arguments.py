@@ -11,6 +11,7 @@ from app.cli.arguments import path_argument
 from engine.capture.capture import Capture
 from engine.capture.layout.limits import MAX_NAME_LENGTH
 from engine.capture.pixels.frame_fit import FITS, FrameFit
+from engine.capture.pixels.transfer_curves import CURVE_NAMES
 from engine.capture.writers.capture_json import Corrections, write_corrections
 from engine.doctor.finding import Finding
 from engine.errors import CaptureError
@@ -51,13 +52,19 @@ def add_correction_arguments(command: argparse.ArgumentParser) -> None:
         "lower "
         "border (end), at the left and upper one (start), or at both by the same (middle)",
     )
+    group.add_argument(
+        "--curve",
+        choices=CURVE_NAMES,
+        help="the log or HDR curve that all frames were recorded in, to be converted for display",
+    )
     group.add_argument("--apply", action="store_true", help="apply the fixes the doctor is sure of, except notes")
     group.add_argument("--out", metavar="FOLDER", type=path_argument, help="write capture.json there instead")
 
 
 def asked_corrections(options: argparse.Namespace) -> Corrections | None:
     """The corrections that flags other than --apply ask for; None where none was given."""
-    if not (options.exclude or options.include or options.shift or options.hold_out or options.mask or options.fit):
+    names = ("exclude", "include", "shift", "hold_out", "mask", "fit", "curve")
+    if not any(getattr(options, name) for name in names):
         return None
     holdout = [name for name in options.hold_out if name.lower() != NONE] if options.hold_out else None
     return Corrections(
@@ -66,6 +73,7 @@ def asked_corrections(options: argparse.Namespace) -> Corrections | None:
         holdout=holdout,
         masks=dict(options.mask),
         fit=None if options.fit is None else as_fit(options.fit),
+        curve=options.curve,
     )
 
 
@@ -120,6 +128,8 @@ def correction_flags(corrections: Corrections) -> str:
         words += ["--mask", f"{name}={files}"]
     if corrections.fit is not None:
         words += ["--fit", corrections.fit.replace("_", "-")]
+    if corrections.curve is not None:
+        words += ["--curve", corrections.curve]
     return shlex.join(words)
 
 

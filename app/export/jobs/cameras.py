@@ -17,13 +17,14 @@ class CamerasJob(ExportJob, frozen=True):
     is_prefixed: ClassVar[bool] = True
 
     format: Annotated[
-        Literal["colmap", "transforms"],
+        Literal["colmap", "transforms", "usd"],
         option(
             "What is written",
             "Format",
             answers={
                 "colmap": ("COLMAP", "a folder with COLMAP's sparse model, as text"),
                 "transforms": ("transforms.json", "a folder with transforms.json of nerfstudio"),
+                "usd": ("USD", "a folder with cameras.usda, with all camera paths, for compositing"),
             },
         ),
     ] = "colmap"

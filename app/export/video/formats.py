@@ -15,7 +15,7 @@ class MissingCodecError(ProjectError):
 
 
 @dataclass(frozen=True, slots=True)
-class Encoding:
+class FilmEncoding:
     """How FFmpeg encodes the pictures of a video.
 
     Attributes:
@@ -58,8 +58,8 @@ class PictureFormat:
     bytes_per_pixel: float
     suffixes: tuple[str, ...] = ()
     muxer: tuple[str, Mapping[str, str]] = ("", {})
-    encoding: Encoding | None = None
-    transparent: Encoding | None = None
+    encoding: FilmEncoding | None = None
+    transparent: FilmEncoding | None = None
     sound_codec: str | None = None
     min_size: tuple[int, int] = (1, 1)
 
@@ -83,7 +83,7 @@ FORMATS = MappingProxyType(
             (".mp4", ".m4v", ".mov"),
             ("mp4", {"movflags": "+faststart"}),
             # visually lossless for most eyes
-            Encoding("libx264", "yuv420p", {"crf": "16", "preset": "medium"}),
+            FilmEncoding("libx264", "yuv420p", {"crf": "16", "preset": "medium"}),
             sound_codec="aac",
         ),
         "webm": PictureFormat(
@@ -91,8 +91,8 @@ FORMATS = MappingProxyType(
             0.1,
             (".webm",),
             ("webm", {}),
-            Encoding("libvpx-vp9", "yuv420p", _VP9),
-            Encoding("libvpx-vp9", "yuva420p", _VP9 | {"auto-alt-ref": "0"}),  # such frames cannot hold opacity
+            FilmEncoding("libvpx-vp9", "yuv420p", _VP9),
+            FilmEncoding("libvpx-vp9", "yuva420p", _VP9 | {"auto-alt-ref": "0"}),  # such frames cannot hold opacity
             "libopus",
         ),
         "prores": PictureFormat(
@@ -100,8 +100,8 @@ FORMATS = MappingProxyType(
             0.5,
             (".mov",),
             ("mov", {}),
-            Encoding("prores_ks", "yuv422p10le", {"profile": "hq", "vendor": "apl0"}),
-            Encoding("prores_ks", "yuva444p10le", {"profile": "4444", "vendor": "apl0", "alpha_bits": "16"}),
+            FilmEncoding("prores_ks", "yuv422p10le", {"profile": "hq", "vendor": "apl0"}),
+            FilmEncoding("prores_ks", "yuva444p10le", {"profile": "4444", "vendor": "apl0", "alpha_bits": "16"}),
             "pcm_s16le",
         ),
         "dnxhr": PictureFormat(
@@ -109,7 +109,7 @@ FORMATS = MappingProxyType(
             0.5,
             (".mov",),
             ("mov", {}),
-            Encoding("dnxhd", "yuv422p10le", {"profile": "dnxhr_hqx"}),
+            FilmEncoding("dnxhd", "yuv422p10le", {"profile": "dnxhr_hqx"}),
             sound_codec="pcm_s16le",
             min_size=(256, 120),
         ),

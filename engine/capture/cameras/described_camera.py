@@ -12,6 +12,7 @@ from engine.camera.lens import PINHOLE, Lens
 from engine.capture.files.media import read_image_header, read_video_header
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames, is_turned_as_calibrated
 from engine.capture.growing.numbered_files import NumberedFiles
+from engine.capture.pixels.transfer_curves import CurveName
 from engine.errors import CaptureError
 
 
@@ -32,6 +33,7 @@ class DescribedCamera:
         offset_frames: Its own frame is the capture's frame plus this.
         frame_times_s: When each of its frames was taken, in seconds of a clock that all cameras share, rising; None
             where nothing says so. Either all cameras have them or none. [T]
+        curve: Transfer curve of its frames, to be undone; None keeps their values.
         frame_indices: Numbers of its own frames that the capture shows, in order; None shows all. [T]
     """
 
@@ -47,6 +49,7 @@ class DescribedCamera:
     offset_frames: float = 0.0
     frame_times_s: np.ndarray | None = None
     frame_indices: Sequence[int] | None = None
+    curve: CurveName | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +62,7 @@ class SeenFiles:
         rate: Frames per second; 0 where nothing says so.
         paths, n_bytes: Their files, and the sizes of those that were looked at.
         is_even: Whether they were recorded at equal steps of time.
+        stated_curve: Transfer curve that they say they are in, other than that of displays; None without.
         is_lying: Whether they stay as they are stored, although the file says that they are to be turned.
     """
 
@@ -69,6 +73,7 @@ class SeenFiles:
     n_bytes: Sequence[int]
     is_even: bool = True
     is_lying: bool = False
+    stated_curve: CurveName | None = None
 
 
 def seen_files(camera: DescribedCamera, *, is_growing: bool = False) -> SeenFiles:
@@ -95,11 +100,14 @@ def _look_at(camera: DescribedCamera, *, is_growing: bool) -> SeenFiles:
         header = read_video_header(camera.files, is_growing=is_growing)
         is_turned = camera.calibrated_size is None or is_turned_as_calibrated(header, camera.calibrated_size)
         size = header.size if is_turned else header.stored_size
-        source = VideoFrames(camera.files, header.n_frames, is_turned=is_turned, is_growing=is_growing)
-        return SeenFiles(source, size, header.rate, [camera.files], [header.n_bytes], header.is_even, not is_turned)
+        source = VideoFrames(
+            camera.files, header.n_frames, is_turned=is_turned, is_growing=is_growing, curve=camera.curve
+        )
+        n_bytes, is_even = [header.n_bytes], header.is_even
+        return SeenFiles(source, size, header.rate, [camera.files], n_bytes, is_even, not is_turned, header.curve)
     if isinstance(camera.files, NumberedFiles):
         header = read_image_header(camera.files.seen)  # others may be missing or half-written
-        source = ImageFrames(camera.files.seen.parent, camera.files)
+        source = ImageFrames(camera.files.seen.parent, camera.files, curve=camera.curve)
         return SeenFiles(source, header.size, 0.0, [camera.files.seen], [header.n_bytes])
     paths = list(camera.files)
     if not paths:
@@ -111,7 +119,7 @@ def _look_at(camera: DescribedCamera, *, is_growing: bool) -> SeenFiles:
             first = f"{headers[0].size[0]}x{headers[0].size[1]}"
             text = f"Its frame {row} is {header.size[0]}x{header.size[1]}, its first one {first}."
             raise CaptureError(text, hint="Export all frames of a camera at one size.", path=paths[row])
-    source = ImageFrames(paths[0].parent, paths)
+    source = ImageFrames(paths[0].parent, paths, curve=camera.curve)
     return SeenFiles(source, headers[0].size, 0.0, paths, [header.n_bytes for header in headers])
 
 

@@ -1,4 +1,4 @@
-"""Shared by the readers of motion capture systems: where their XML lies, numbers in it, cameras without a video."""
+"""Shared by the readers of calibrations in XML: where the file lies, numbers in it, cameras without a video."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from engine.text import shown
 PLACES = ("", "calibration")
 """Folders below the capture's where the file may lie; the second is Pose2Sim's."""
 FRAME_FOLDERS = ("", "videos", "images")
+MAX_TRIED = 20
+"""Files of one suffix that are opened to see what they are."""
 MM = 0.001
 """Motion capture systems measure in millimetres; this program's distances are then metres."""
 _AGAIN = "Export the calibration again."
@@ -43,11 +45,13 @@ def read_motion_capture(
     cameras_in: Callable[[XmlElement], list[NamedCamera]],
     described: Callable[[str, XmlElement, Files, Path], DescribedCamera],
     follow_links: bool,
+    is_it: Callable[[Path], bool] | None = None,
 ) -> Layout:
     """Read the likeliest calibration of a folder and the headers of its frames; no pixels.
 
     Args:
         suffix: Of the calibration, with its dot.
+        is_it: Whether a file that ends so is one; None where the suffix is enough.
         format_name: Of the layout.
         cameras_in: The cameras of the file that are calibrated.
         described: A camera by its name, its element, its frames and the file.
@@ -55,7 +59,7 @@ def read_motion_capture(
     Raises:
         CaptureError: Listing every problem found.
     """
-    path, *others = calibrations(folder, suffix)
+    path, *others = calibrations(folder, suffix, is_it)
     root = read_calibration(path)
     findings = Findings()
     cameras = cameras_in(root)
@@ -82,8 +86,8 @@ def whole_size(width: float, height: float, path: Path, *, what: str) -> tuple[i
     return size
 
 
-def calibrations(folder: Path, suffix: str) -> list[Path]:
-    """Files that end so, whatever their case, the likeliest first."""
+def calibrations(folder: Path, suffix: str, is_it: Callable[[Path], bool] | None = None) -> list[Path]:
+    """Files that end so, whatever their case, and are what is looked for, the likeliest first."""
     found: list[Path] = []
     for place in PLACES:
         inside = folder / place
@@ -92,12 +96,12 @@ def calibrations(folder: Path, suffix: str) -> list[Path]:
         except OSError:
             continue
         found += [inside / name for name in names if name.lower().endswith(suffix) and (inside / name).is_file()]
-    return found
+    return found if is_it is None else [path for path in found[:MAX_TRIED] if is_it(path)]
 
 
-def probe_calibration(folder: Path, suffix: str) -> Probe:
+def probe_calibration(folder: Path, suffix: str, is_it: Callable[[Path], bool] | None = None) -> Probe:
     """Whether a folder has such a calibration, and a video or a folder of images where they are looked for."""
-    found = calibrations(folder, suffix)
+    found = calibrations(folder, suffix, is_it)
     if not found:
         return Probe(False, lacks=f"no {suffix}")
     if (folder / "images").is_dir() or any(_has_video(folder / place) for place in FRAME_FOLDERS):
@@ -139,12 +143,15 @@ def numbers(element: XmlElement, keys: Sequence[str], path: Path) -> np.ndarray:
 
 
 def numbers_in(element: XmlElement, key: str, count: int, path: Path) -> np.ndarray:
-    """As many numbers, separated by blanks, of one attribute. [count]
+    """As many numbers, separated by blanks, of one attribute, or of the text of the element inside that has the name.
+    [count]
 
     Raises:
-        CaptureError: The attribute is missing or has another count, or a word.
+        CaptureError: It is missing or has another count, or a word.
     """
     words = element.attributes.get(key, "").split()
+    if not words:
+        words = [word for child in element.inside(key) for word in child.text.split()]
     if len(words) != count:
         raise CaptureError(f"Its {key} has {len(words)} numbers, not {count}.", hint=_AGAIN, path=path)
     return np.array([_number(word, key, path) for word in words])

@@ -23,6 +23,7 @@ from PIL import Image
 
 from engine.capture.cameras.orientation import UPRIGHT, Turn, may_be_turned, turn_of_frame
 from engine.capture.layout.limits import MAX_PIXELS
+from engine.capture.pixels.transfer_curves import STATED, CurveName
 from engine.errors import CaptureError
 from engine.storage.files import check_regular, open_regular
 
@@ -151,6 +152,7 @@ class VideoHeader:
         rate: Frames per second; 0 when the container does not say.
         n_bytes: Size of the file.
         turn: How its pictures are to be turned for display.
+        curve: The transfer curve that it states, where that is not one of displays.
         is_even: Whether its frames have the same distance in time, as far as its index tells.
     """
 
@@ -160,6 +162,7 @@ class VideoHeader:
     n_bytes: int
     turn: Turn = UPRIGHT
     is_even: bool = True
+    curve: CurveName | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -191,13 +194,14 @@ def read_video_header(path: Path, *, is_growing: bool = False) -> VideoHeader:
             size = (stream.codec_context.width, stream.codec_context.height)
             rate = float(stream.average_rate or 0)
             turn = _read_turn(path, container.format.name)
+            curve = STATED.get(stream.codec_context.color_trc)
             if is_growing:
                 pts, _ = times_so_far(container, stream)
-                return VideoHeader(len(pts), size, rate, n_bytes, turn)
+                return VideoHeader(len(pts), size, rate, n_bytes, turn, curve=curve)
             entries = [entry for entry in stream.index_entries if not entry.is_discard]
             if len(entries) != stream.frames or not entries:  # the index lists key frames only, or frames not shown
                 pts = [pts for packet in container.demux(stream) if (pts := shown_pts(packet)) is not None]
-                return VideoHeader(len(pts), size, rate, n_bytes, turn, _is_even(pts))
+                return VideoHeader(len(pts), size, rate, n_bytes, turn, _is_even(pts), curve)
             is_even = _is_even([entry.timestamp for entry in entries])
             n_whole = sum(entry.pos + entry.size <= n_bytes for entry in entries)
     except FileNotFoundError as error:
@@ -220,7 +224,7 @@ def read_video_header(path: Path, *, is_growing: bool = False) -> VideoHeader:
             hint=again,
             path=path,
         )
-    return VideoHeader(len(entries), size, rate, n_bytes, turn, is_even)
+    return VideoHeader(len(entries), size, rate, n_bytes, turn, is_even, curve)
 
 
 def times_so_far(container: Any, stream: Any) -> tuple[list[int], int]:

@@ -23,6 +23,7 @@ from engine.capture.layout.format_checks import check_fps, is_name, parse_matrix
 from engine.capture.layout.format_result import MATCH, Layout, Probe
 from engine.capture.layout.limits import MAX_SIDE
 from engine.capture.pixels.frame_fit import FrameFit
+from engine.capture.pixels.transfer_curves import CurveName
 from engine.errors import CaptureError
 from engine.storage.typed_json import EntryError, to_type
 from engine.text import shown
@@ -100,6 +101,7 @@ class CaptureDocument:
         points_to_world: Brings the points into that world, where they are in another one. 4x4
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to.
         fit: The fit of frames of another shape than `width` and `height` of their camera.
+        curve: Transfer curve of all frames; without, values are kept as they are.
         world_scale: All distances are multiplied by it.
         up: Direction in the world that is up; the world is turned so that it becomes +z.
     """
@@ -113,6 +115,7 @@ class CaptureDocument:
     points_to_world: Matrix | None = None
     fisheye_fov_deg: Annotated[float, Meta(ge=10, le=150)] | None = None
     fit: FrameFit | None = None
+    curve: CurveName | None = None
     world_scale: Annotated[float, Meta(gt=0, le=1e9)] = 1.0
     up: tuple[float, float, float] | None = None
     notes: str = ""
@@ -173,6 +176,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         points_to_world=_points_to_world(document, path, problems),
         fisheye_fov_deg=document.fisheye_fov_deg,
         fit=document.fit,
+        curve=document.curve,
         problems=problems,
         said_in=path,
     )
@@ -255,6 +259,7 @@ def _described(
         masks=masks,
         color_matrix=colors,
         offset_frames=entry.offset_frames,
+        curve=document.curve,
         frame_indices=entry.frames,
     )
 

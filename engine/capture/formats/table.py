@@ -16,11 +16,13 @@ from engine.capture.formats import (
     easyvolcap,
     immersive,
     imported,
+    metashape,
     multipleview,
     n3dv,
     panoptic,
     panoptic_studio,
     qualisys,
+    realitycapture,
     sample,
     technicolor,
     toml_cameras,
@@ -48,6 +50,8 @@ FORMATS = (
     colmap,
     qualisys,
     vicon,
+    metashape,
+    realitycapture,
 )
 """Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 

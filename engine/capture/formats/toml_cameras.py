@@ -1,4 +1,4 @@
-"""Calibrations of Caliscope, anipose and Pose2Sim: a TOML file with a table per camera, and videos next to it.
+"""Calibrations of Caliscope, anipose, Pose2Sim, FreeMoCap: a TOML file with a table per camera, videos next to it.
 
 Each table has `matrix`, `distortions` (4 or 5), `rotation` (a vector or a matrix) and `translation`, world to camera,
 `size` and mostly `name`; pixel centres are at whole numbers. timestamps.csv (cam_id, frame_time), where it is there,
@@ -32,13 +32,14 @@ from engine.storage.files import read_bytes
 from engine.text import shown
 
 FORMAT = "toml"
-LAYOUT = "a TOML file with cameras, and a video per camera (Caliscope, anipose, Pose2Sim)"
+LAYOUT = "a TOML file with cameras, and a video per camera (Caliscope, anipose, Pose2Sim, FreeMoCap)"
 """The layout in words."""
 USUAL = ("camera_array.toml", "camera_array_aniposelib.toml", "calibration.toml")
 """The file's usual names. Among several, the first of these is read."""
 PLACES = ("", "calibration")
 """Folders below the capture's where the file may lie."""
-FRAME_FOLDERS = ("", "videos", "images")
+FRAME_FOLDERS = ("", "videos", "images", "synchronized_videos")
+"""The last is FreeMoCap's."""
 QUALISYS = ".qca.txt"
 """The calibration that Pose2Sim projects keep next to the TOML made of it."""
 MAX_BYTES = 1 << 20

@@ -26,9 +26,9 @@ def stretched(source: FrameSource, n_frames: int) -> FrameSource:
     """
     match source:
         case ImageFrames(files=NumberedFiles() as files):
-            return ImageFrames(source.path, files.stretched(n_frames))
+            return ImageFrames(source.path, files.stretched(n_frames), curve=source.curve)
         case VideoFrames():
-            return VideoFrames(source.path, n_frames, is_turned=source.is_turned, is_growing=True)
+            return VideoFrames(source.path, n_frames, is_turned=source.is_turned, is_growing=True, curve=source.curve)
         case IndexedFrames():
             first = int(source.frame_indices[0])
             return IndexedFrames(stretched(source.source, first + n_frames), np.arange(first, first + n_frames))

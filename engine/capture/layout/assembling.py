@@ -27,6 +27,7 @@ from engine.capture.layout.format_checks import (
 )
 from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.pixels.frame_fit import FIT_WORDS, FrameFit, OtherSize
+from engine.capture.pixels.transfer_curves import CURVES, CurveName
 from engine.capture.times.timed_frames import at_common_moments, own_times
 from engine.errors import CaptureError
 from engine.text import rate_text
@@ -56,6 +57,7 @@ def assemble(
     points_to_world: np.ndarray | None = None,
     fisheye_fov_deg: float | None = None,
     fit: FrameFit | None = None,
+    curve: CurveName | None = None,
     problems: Sequence[CaptureError] = (),
     warnings: Sequence[str] = (),
     said_in: Path | None = None,
@@ -71,6 +73,7 @@ def assemble(
         points, points_to_world: See `Layout`.
         fisheye_fov_deg: See `Layout`.
         fit: The fit of frames that have another shape than their calibration; None where nothing says so.
+        curve: Transfer curve of all frames, which their cameras have, too; None keeps values as they are.
         problems: Problems the reader found already; they are reported with the others.
         warnings: The reader's warnings: odd but usable.
         said_in: The file that the cameras come from, for messages.
@@ -158,6 +161,13 @@ def assemble(
         said.append(
             f"Not rotated for display as their files ask, because only the stored orientation fits: {shortened(lying)}."
         )
+    stated: set[CurveName] = {seen.stated_curve for seen in files.values() if seen.stated_curve is not None}
+    if stated and curve is None:
+        titles = " and ".join(sorted(CURVES[name].title for name in stated))
+        said.append(
+            f"Videos state that they are in {titles}, and are shown as recorded, which is flat or dark. clipgstream "
+            f"inspect --curve {min(stated)} converts them."
+        )
     offsets = [camera.offset_frames for camera in cameras]
     frame_times_s: Sequence[np.ndarray | None] | None = [camera.frame_times_s for camera in cameras]
     if may_grow:  # one by one: how even they are can only be told at the end
@@ -181,6 +191,7 @@ def assemble(
         points_to_world=points_to_world,
         fisheye_fov_deg=fisheye_fov_deg,
         fit=fit,
+        curve=curve,
         is_growing=may_grow,
     )
 

@@ -11,6 +11,7 @@ from engine.camera.lens import PINHOLE, Lens
 from engine.camera.rig import CameraRig
 from engine.capture.frames import FrameSource
 from engine.capture.pixels.frame_fit import FrameFit, OtherSize
+from engine.capture.pixels.transfer_curves import CurveName
 from engine.capture.pixels.undistortion import undistorted_K
 
 
@@ -81,6 +82,7 @@ class Layout:
         points_to_world: Brings its points into the world of the cameras; None where they are in it. [4, 4]
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to; None takes the usual one.
         fit: The user's fit for frames of another shape than their calibration; None where that is not known.
+        curve: Transfer curve of all frames, which their sources undo; None keeps values as they are.
         is_growing: It may still be recorded: `n_frames` are those of the farthest camera, and others may lack some.
         has_pictures: Whether its cameras took pictures; those of an imported scene are views only.
     """
@@ -95,6 +97,7 @@ class Layout:
     points_to_world: np.ndarray | None = None
     fisheye_fov_deg: float | None = None
     fit: FrameFit | None = None
+    curve: CurveName | None = None
     is_growing: bool = False
     has_pictures: bool = True
 

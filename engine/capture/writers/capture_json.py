@@ -14,6 +14,7 @@ from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
 from engine.capture.layout.format_checks import read_json_object
 from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.pixels.frame_fit import FrameFit
+from engine.capture.pixels.transfer_curves import CurveName
 from engine.capture.writers.frame_files import name_in
 from engine.errors import CaptureError
 from engine.storage.files import checked_path
@@ -33,6 +34,7 @@ class Corrections:
         fps: None leaves it.
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to, 10 to 150; None leaves it.
         fit: The fit of frames of another shape than their calibration; None leaves it.
+        curve: Transfer curve of all frames; None leaves it.
     """
 
     is_excluded: Mapping[str, bool] = field(default_factory=dict)
@@ -44,6 +46,7 @@ class Corrections:
     fps: float | None = None
     fisheye_fov_deg: float | None = None
     fit: FrameFit | None = None
+    curve: CurveName | None = None
 
 
 def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
@@ -63,6 +66,8 @@ def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
         document["fisheye_fov_deg"] = layout.fisheye_fov_deg
     if layout.fit is not None:
         document["fit"] = layout.fit
+    if layout.curve is not None:
+        document["curve"] = layout.curve
     is_resampled = any(not _is_one_by_one(entry.source) for entry in layout.cameras)
     document["cameras"] = [_camera(entry, folder, is_resampled=is_resampled) for entry in layout.cameras]
     return document
@@ -111,7 +116,7 @@ def write_corrections(layout: Layout, folder: Path, corrections: Corrections, *,
     ):
         for name, value in values.items():
             rows[name][key] = value
-    for key in ("holdout", "world_scale", "up", "fps", "fisheye_fov_deg", "fit"):
+    for key in ("holdout", "world_scale", "up", "fps", "fisheye_fov_deg", "fit", "curve"):
         value = getattr(corrections, key)
         if value is not None:
             document[key] = list(value) if isinstance(value, tuple | list) else value

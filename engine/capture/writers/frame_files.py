@@ -64,7 +64,8 @@ def with_frames_in(layout: Layout, folder: Path, frames: Frames, report: Report)
         n_done += 1
         report(n_done, n_files)
 
-    return replace(layout, cameras=tuple(plan.carried_out(count) for plan in plans))
+    # frames in a log curve were written as they are displayed
+    return replace(layout, cameras=tuple(plan.carried_out(count) for plan in plans), curve=None)
 
 
 class _Plan:
@@ -73,9 +74,10 @@ class _Plan:
     def __init__(self, entry: CameraEntry, name: str, folder: Path, frames: Frames, n_frames: int) -> None:
         self._entry, self._name, self._folder, self._frames = entry, name, folder, frames
         source, indices = plain_source(entry.source, n_frames)
-        self._is_video = isinstance(source, VideoFrames) and indices is None and frames != "png"
+        is_kept = frames != "png" and getattr(source, "curve", None) is None
+        self._is_video = isinstance(source, VideoFrames) and indices is None and is_kept
         self._files: tuple[Path, ...] | None = None
-        if isinstance(source, ImageFrames) and frames != "png":
+        if isinstance(source, ImageFrames) and is_kept:
             rows = range(n_frames) if indices is None else indices
             self._files = tuple(source.files[int(row)] for row in rows)
         self.n_files = 1 if self._is_video else n_frames

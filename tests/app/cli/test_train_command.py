@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from app.cli.cli import main
+from app.cli.terminal.exit_codes import exit_code
 from app.cli.terminal.training_lines import failure_text
-from app.cli.train_command import exit_code
 from app.evaluation.headless import ClipOutcome
 from app.project.opening.project_access import open_project, read_settings
 from engine.clip_files.clip_state import read_clip_state
@@ -223,4 +223,6 @@ def test_a_training_that_somebody_stopped_is_no_finished_one() -> None:
         "Stopped from elsewhere, with progress kept: clip 1.",
     ]
     assert exit_code([*outcomes, ClipOutcome(3, "failed", kind="ProjectError")]) == 2
+    assert exit_code([ClipOutcome(0, "damaged")]) == 2, "trying again does not mend a file"
+    assert exit_code([ClipOutcome(0, "damaged"), ClipOutcome(1, "failed", kind="WorkerDied")]) == 1
     assert exit_code([ClipOutcome(0, "trained"), ClipOutcome(1, "skipped")]) == 0

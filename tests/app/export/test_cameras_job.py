@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,8 @@ import pytest
 from app.evaluation.headless import TrainedProject
 from app.export.cameras_job import WORLD, CamerasJob, estimate, run
 from app.export.export_progress import ExportProgress
+from app.export.usd_cameras import write_usd_cameras
+from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.corrections import N_VALUES, corrected
 from engine.capture.colmap.model_cameras import read_rig
 from engine.children.kind import Unwanted
@@ -86,3 +89,63 @@ def test_a_folder_that_is_taken_and_a_cancelled_export(opened: TrainedProject, t
     with pytest.raises(Unwanted):
         run(opened, CamerasJob(tmp_path / "out" / "new"), cancel)
     assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_usd_has_cameras_and_paths_that_see_what_they_see_here(opened: TrainedProject, tmp_path: Path):
+    """A point falls where K and pose put it, through the window that USD's own camera computes; times are frames."""
+    Usd, UsdGeom, Gf = (pytest.importorskip(f"pxr.{name}") for name in ("Usd", "UsdGeom", "Gf"))
+    layout = opened.capture.layout
+    moved_K = np.array([[0, 0, 1.5], [0, 0.7, -2.0], [0, 0, 0]])
+    cameras = tuple(replace(entry, K=entry.K + moved_K) for entry in layout.cameras)
+    moved = np.eye(4)
+    moved[:3, 3] = [0.1, -0.2, 0.3]
+    start = layout.cameras[0].world_to_camera
+    keys = (CameraKey(0.0, start, 0.6), CameraKey(4.0, moved @ start, 0.9))
+    lines = write_usd_cameras(
+        tmp_path,
+        cameras,
+        [CameraPath("Way in", keys), CameraPath("way in")],
+        n_frames=6,
+        fps=25.0,
+        up=np.array([0.0, 0.0, 1.0]),
+        meters_per_unit=0.5,
+    )
+    assert lines == ("The camera path 'way in' has no keys and is left out.",)
+    stage = Usd.Stage.Open(str(tmp_path / "cameras.usda"))
+    assert UsdGeom.GetStageUpAxis(stage) == "Z"
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 0.5
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetFramesPerSecond()) == (0, 5, 25)
+    prims = stage.GetDefaultPrim().GetChildren()
+    assert len(prims) == len(cameras) + 1
+
+    def seen(prim, frame: float, point: np.ndarray) -> np.ndarray:
+        """From -1 to 1 across the picture, x to the right and y up."""
+        frustum = UsdGeom.Camera(prim).GetCamera(frame).frustum
+        matrix = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
+        return np.array(matrix.Transform(Gf.Vec3d(*point)))[:2]
+
+    points = opened.capture.rig.centers.mean(0) + np.random.default_rng(0).normal(0, 0.2, (8, 3))
+    for prim, entry in zip(prims, cameras, strict=False):
+        (width, height), pose = entry.image_size, entry.world_to_camera
+        for point in points:
+            x, y, z = entry.K @ (pose[:3, :3] @ point + pose[:3, 3])
+            expected = [2 * x / z / width - 1, 1 - 2 * y / z / height]
+            np.testing.assert_allclose(seen(prim, 0, point), expected, atol=1e-5)
+    way = CameraPath("Way in", keys)
+    for frame in (0.0, 3.0, 4.0):
+        pose, fov_rad = way.at(frame)
+        x, y, z = pose[:3, :3] @ points[0] + pose[:3, 3]
+        expected = np.array([x / z * 9 / 16, -y / z]) / np.tan(fov_rad / 2)
+        np.testing.assert_allclose(seen(prims[-1], frame, points[0]), expected, atol=1e-5)
+
+
+def test_usd_is_exported_and_a_missing_library_is_said_with_the_remedy(opened, tmp_path: Path, monkeypatch):
+    pytest.importorskip("pxr")
+    result = run(opened, CamerasJob(tmp_path / "u", "usd"), nothing)
+    assert (tmp_path / "u" / "cameras.usda").is_file()
+    assert result.n_files == 1
+    monkeypatch.setitem(sys.modules, "pxr.Usd", None)
+    with pytest.raises(ProjectError, match="not installed") as error:
+        run(opened, CamerasJob(tmp_path / "v", "usd"), nothing)
+    assert "clipgstream[usd]" in error.value.hint
+    assert not (tmp_path / "v").exists()

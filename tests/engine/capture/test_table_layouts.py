@@ -28,6 +28,8 @@ FORMATS = {
     "panoptic_studio": "panoptic-studio",
     "qualisys": "qualisys",
     "vicon": "vicon",
+    "metashape": "metashape",
+    "realitycapture": "realitycapture",
     "technicolor": "technicolor",
 }
 """What readers call each layout."""

@@ -10,9 +10,11 @@ from tests.engine.capture.layouts import (
     written_capture_json,
     written_easyvolcap,
     written_immersive,
+    written_metashape,
     written_panoptic,
     written_panoptic_studio,
     written_qualisys,
+    written_realitycapture,
     written_sample,
     written_technicolor,
     written_toml,
@@ -98,6 +100,17 @@ TABLES: Mapping[str, Write] = {
             partial(written_vicon.write, kind=kind), partial(written_vicon.make_corrected_scene, kind=kind)
         )
         for kind in written_vicon.KINDS
+    },
+    **{
+        f"metashape-{lens}": written_by(written_metashape.write, partial(make_scene, lens=lens))
+        for lens in written_metashape.LENSES
+    },
+    "metashape-plain": written_by(
+        partial(written_metashape.write, is_plain=True), partial(make_scene, lens="pinhole", is_centered=True)
+    ),
+    **{
+        f"realitycapture-{lens}": written_by(written_realitycapture.write, partial(make_scene, lens=lens))
+        for lens in written_realitycapture.LENSES
     },
     "technicolor": written_by(
         written_technicolor.write, partial(make_scene, lens="pinhole", names=("00", "01", "02", "03"))
