@@ -22,9 +22,14 @@ class Placed(Protocol):
     def scene_up(self) -> Vector | None: ...
 
 
-def file_world(opened: TrainedProject, job: Placed, *, is_rub: bool = False) -> FileWorld:
-    """The scene's place in the files. is_rub: See engine.export.world.world."""
+def file_world(opened: TrainedProject, job: Placed, *, usual_up: str | None = None, is_rub: bool = False) -> FileWorld:
+    """The scene's place in the files.
+
+    Args:
+        usual_up: The axis that is up where the job does not say; None as in the capture.
+        is_rub: See engine.export.world.world.
+    """
     said = opened.project.document.world.meters_per_unit
     scale = job.scale if job.scale is not None else 1.0 if said is None else said
     scene_up = opened.up if job.scene_up is None else np.array(job.scene_up)
-    return world(scene_up, up=job.up, scale=scale, is_rub=is_rub)
+    return world(scene_up, up=job.up or usual_up, scale=scale, is_rub=is_rub)

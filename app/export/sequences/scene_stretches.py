@@ -15,8 +15,8 @@ from engine.export.sequences.sequence import MovingSplats, Stretch
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
 
-SAME_COLOR = 0.25 / 255.0
-"""Still Gaussians whose colours change by more than this within a stretch count as moving."""
+SAME_LIGHT = 1.5 / 255.0
+"""Still Gaussians whose colours change by more than this within a stretch count as moving; others get the middle."""
 
 
 class SceneStretches:
@@ -53,12 +53,17 @@ class SceneStretches:
         still = self._still(begin)
         self.n_dropped += still.n_dropped
         is_same = np.ones(len(still), bool)
+        lowest = highest = still.colors
         for number in range(begin + 1, end):
             other = self._still(number)
             if len(other) != len(still):  # then row for row says nothing
                 still, is_same = still[:0], np.zeros(0, bool)
                 break
-            is_same &= _are_same(still, other)
+            is_same &= _have_same_shape(still, other)
+            lowest, highest = np.minimum(lowest, other.colors), np.maximum(highest, other.colors)
+        else:
+            is_same &= (highest - lowest).max(1, initial=0.0) <= SAME_LIGHT
+            still = replace(still, colors=0.5 * (lowest + highest))
         names: dict[tuple[int, RowSet], int] = {}
         return Stretch(begin, end - begin, still[is_same], lambda number: self._moving(number, is_same, names))
 
@@ -94,9 +99,9 @@ class SceneStretches:
         return MovingSplats(joined(moving, still[rows]), np.concatenate([*ids, -1 - rows]))
 
 
-def _are_same(one: Splats, other: Splats) -> np.ndarray:
-    """Which rows are the same but for a little light on them. [N] bool"""
-    is_same = np.abs(one.colors - other.colors).max(1, initial=0.0) <= SAME_COLOR
+def _have_same_shape(one: Splats, other: Splats) -> np.ndarray:
+    """Which rows are the same but for their colours. [N] bool"""
+    is_same = np.ones(len(one), bool)
     for name in ("means", "quats", "scales", "opacities"):
         is_same &= (getattr(one, name) == getattr(other, name)).reshape(len(one), -1).all(1)
     return is_same

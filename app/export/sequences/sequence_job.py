@@ -55,7 +55,7 @@ def estimate(opened: TrainedProject, job: SequenceJob) -> ExportEstimate:
     check_target(job.out, n_bytes=round(n_bytes))
     lines = (
         f"About {n_bytes / 1e6:.1f} MB for {len(frames)} frames at {fps:g} frames per second.",
-        f"Coordinates: {file_world(opened, job).text}.",
+        f"Coordinates: {file_world(opened, job, usual_up=kind.up).text}.",
         *kind.limits,
         *_sound_lines(job, frames),
     )
@@ -73,7 +73,8 @@ def run(opened: TrainedProject, job: SequenceJob, report: Report) -> ExportResul
         DiskError: The disk refused.
     """
     estimate(opened, job)
-    kind, world, scene = SEQUENCES[job.format], file_world(opened, job), _scene(opened, job)
+    kind, scene = SEQUENCES[job.format], _scene(opened, job)
+    world = file_world(opened, job, usual_up=kind.up)
     frames = take_frames(scene, job.frames, has_timing=job.has_timing)
     report(ExportProgress(0, len(frames), message="Checking the clips"))
     scene.check(moment.frame for one in frames for moment in one.moments)

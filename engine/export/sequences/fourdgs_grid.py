@@ -19,12 +19,12 @@ from fourdgs.serialization import CODEC_DEFLATE, encode_stream
 
 from engine.export.splats import THINNEST, Splats
 
-POSITION_SHARE = 0.1
+POSITION_SHARE = 0.05
 """Positions are off by this share of the largest side of a usual Gaussian at most."""
-BOUNDS = {"scale_rel": 0.05, "rot": 0.01, "rgb": 1.0 / 255.0, "alpha": 2.0 / 255.0, "sigma_rel": 0.05, "sh": 0}
+BOUNDS = {"scale_rel": 0.03, "rot": 0.006, "rgb": 1.0 / 255.0, "alpha": 2.0 / 255.0, "sigma_rel": 0.05, "sh": 0}
 """Of everything else, as the file states them."""
-COARSE_COLOR = 3
-"""Steps of the grid of colours that count as one in what moves, which nobody sees that well."""
+COARSE = {opcode.A_SCALE: 2, opcode.A_ROTATION: 3, opcode.A_COLOR: 3, opcode.A_OPACITY: 2}
+"""Steps of the grids that count as one in what moves, which is seen less well."""
 LARGEST_BIN = 1 << 30
 """Positions that are farther off than this cannot be stored."""
 DEFLATE_LEVEL = 9
@@ -100,27 +100,27 @@ class Grid:
         steps, splats, n = self.steps, rows.splats, len(rows.first)
         means = quantize(splats.means - self.origin, steps.pos)
         largest, three = quantize_rotation(splats.quats[:, [1, 2, 3, 0]], steps.rot)
-        colors = quantize(np.clip(splats.colors, 0.0, 1.0), steps.rgb)
-        velocities = np.zeros((n, 3), np.int64)
-        if rows.velocities is not None:
-            colors = COARSE_COLOR * np.rint(colors / COARSE_COLOR).astype(np.int64)
-            lengths = (rows.end - rows.first) / self.fps
-            never_fades = np.ones(n, bool)
-            pitch = motion_steps(life_class(np.zeros(n), steps.sigma_log, never_fades, lengths), steps.motion)
-            velocities = quantize(rows.velocities * self.fps / pitch[:, None], 1.0)
         columns = {
             opcode.A_POSITION: means,
             opcode.A_SCALE: quantize(np.log(splats.scales.astype(np.float64)), steps.scale_log),
             opcode.A_ROTATION_INDEX: largest[:, None],
             opcode.A_ROTATION: three,
-            opcode.A_COLOR: rct_forward(colors),
+            opcode.A_COLOR: quantize(np.clip(splats.colors, 0.0, 1.0), steps.rgb),
             opcode.A_OPACITY: quantize(splats.opacities, steps.alpha)[:, None],
-            opcode.A_MOTION: velocities,
+            opcode.A_MOTION: np.zeros((n, 3), np.int64),
             opcode.A_MU_T: rows.first[:, None],
             opcode.A_SIGMA_T: np.zeros((n, 1), np.int64),
             opcode.A_FLAGS: np.full((n, 1), opcode.FLAG_NEVER_FADES),
             opcode.A_WINDOW_INDEX: windows[:, None],
         }
+        if rows.velocities is not None:
+            for name, step in COARSE.items():
+                columns[name] = step * np.rint(columns[name] / step).astype(np.int64)
+            lengths = (rows.end - rows.first) / self.fps
+            never_fades = np.ones(n, bool)
+            pitch = motion_steps(life_class(np.zeros(n), steps.sigma_log, never_fades, lengths), steps.motion)
+            columns[opcode.A_MOTION] = quantize(rows.velocities * self.fps / pitch[:, None], 1.0)
+        columns[opcode.A_COLOR] = rct_forward(columns[opcode.A_COLOR])
         streams = b"".join(
             encode_stream(name, values, channels=values.shape[1], codec=CODEC_DEFLATE, level=DEFLATE_LEVEL)
             for name, values in columns.items()

@@ -185,7 +185,7 @@ def problems(path: Path) -> tuple[str, ...]:
         if path.stat().st_size > MAX_VALIDATED_BYTES:
             return ()
         found = validate(path.read_bytes())
-    return tuple(str(finding) for finding in found.findings if finding.severity in ("error", "warning"))
+    return tuple(finding.message for finding in found.findings if finding.severity == "error")
 
 
 @contextmanager

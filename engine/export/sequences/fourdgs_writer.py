@@ -33,7 +33,7 @@ FAINTEST = 5.0 / 255.0
 """Fainter Gaussians are left out: they are many, and all together nobody sees them."""
 LIMITS = (
     "Colours beyond the brightest white are cut off.",
-    "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within a fifth of a "
+    "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an eighth of a "
     "Gaussian's size.",
 )
 PRODUCER = "ClipGStream Studio"

@@ -10,7 +10,7 @@ import numpy as np
 from engine.export.sequences.sequence import MovingSplats
 from engine.export.splats import THINNEST
 
-PATH_SHARE = 0.2
+PATH_SHARE = 0.12
 """A segment's path passes each position this near: a share of the Gaussian's mean size, for one that hides what is
 behind it; see FAINT."""
 SCALE_RATIO = 0.1

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from engine.export.sequences import fourdgs_reader, fourdgs_writer
+from engine.export.sequences import fourdgs_reader, fourdgs_writer, usd
 from engine.export.sequences.sequence import SequenceReader, SequenceTiming, Stretch
 
 
@@ -35,6 +35,7 @@ class SequenceFormat(NamedTuple):
         open: Opens a file to read frames from it. Raises ProjectError where it is damaged, of an unknown version, or
             asks for more memory than a limit.
         has_sound: Whether it can hold sound.
+        up: One of engine.export.world.AXES: up in the file where the user does not say; None as in the capture.
         check: Raises ProjectError where something is missing that it is written and read with.
         problems: What the format's own validator says is wrong with a file.
     """
@@ -49,23 +50,45 @@ class SequenceFormat(NamedTuple):
     write: Callable[[Iterable[Stretch], SequenceTiming, Path], tuple[str, ...]]
     open: Callable[[Path], SequenceReader]
     has_sound: bool = False
+    up: str | None = None
     check: Callable[[], None] = _can_always
     problems: Callable[[Path], tuple[str, ...]] = _is_valid
 
 
+_USD = SequenceFormat(
+    "USD",
+    "for programs with OpenUSD 26.03 or later, such as usdview and Omniverse",
+    ".usdc",
+    45.0,
+    56.0,
+    35.0,
+    usd.LIMITS,
+    usd.write,
+    usd.UsdReader,
+    up="+y",
+    check=usd.check,
+)
 SEQUENCES: dict[str, SequenceFormat] = {
     "4dgs": SequenceFormat(
         "4DGS",
         "small and quick to seek, with sound, for players of .4dgs",
         ".4dgs",
         45.0,
-        9.0,
-        3.5,
+        8.5,
+        2.2,
         fourdgs_writer.LIMITS,
         fourdgs_writer.write,
         fourdgs_reader.FourdgsReader,
         has_sound=True,
         problems=fourdgs_reader.problems,
+    ),
+    "usd": _USD,
+    "usda": _USD._replace(
+        title="USD as text",
+        use="the same to look into, several times as large",
+        suffix=".usda",
+        still_bytes=160.0,
+        moving_bytes=100.0,
     ),
 }
 """By the name that the command line has for it, in the order in which they are offered."""

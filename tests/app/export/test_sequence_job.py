@@ -1,0 +1,195 @@
+"""Exports as one file over time: they look like the scene, say what is lost, and leave nothing behind."""
+
+from __future__ import annotations
+
+import io
+import sys
+import wave
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.evaluation.headless import TrainedProject, open_trained
+from app.export.export_progress import ExportProgress
+from app.export.jobs.sequence import SequenceJob
+from app.export.picked_frames import PickedFrames
+from app.export.scene_frames import SceneFrames
+from app.export.sequences import sequence_job, take_sound
+from app.export.sequences.scene_stretches import SceneStretches
+from app.export.sequences.sequence_job import estimate, run
+from app.export.take import TakeFrame, take_frames
+from app.project.opening.project_access import open_project
+from engine.children.kind import Unwanted
+from engine.errors import CaptureError, DiskError, ProjectError
+from engine.export.sequences.table import SEQUENCES
+from engine.export.splats import Splats
+from engine.export.world import FileWorld
+from engine.timing.timing import SourceMoment
+from tests.app.stored_project import copy_stored
+from tests.engine.synchronisation.made_recordings import write_sound_video
+from tests.faults.full_disk import can_mount, full_disk
+
+
+def quiet(progress: ExportProgress) -> None:
+    """Nothing is told."""
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> TrainedProject:
+    """A real training, in which things move: frames 0 to 5."""
+    return open_trained(open_project(copy_stored(tmp_path / "stored"), is_writable=False))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEQUENCES)
+def test_every_format_holds_all_frames_and_looks_like_them(opened: TrainedProject, tmp_path: Path, name: str):
+    kind = SEQUENCES[name]
+    out = tmp_path / f"scene{kind.suffix}"
+    expected = estimate(opened, SequenceJob(out, name))
+    assert set(kind.limits) <= set(expected.lines)
+    result = run(opened, SequenceJob(out, name, PickedFrames.of(range(1, 6, 2)), up="+z", scale=2.0), quiet)
+    assert result.psnr_db is not None
+    assert result.psnr_db >= kind.min_psnr_db
+    assert (result.path, result.n_files, result.n_bytes) == (out, 1, out.stat().st_size)
+    assert list(tmp_path.glob("*scene*")) == [out]
+    with closing(kind.open(out)) as reader:
+        assert reader.timing.n_frames == 3
+        assert reader.timing.fps == opened.capture.fps / 2
+        live, found = SceneFrames(opened).gaussians(3), reader.splats(1)
+        size = np.ptp(live.means.numpy(), axis=0).max()
+        assert np.ptp(found.means, axis=0).max() > 1.2 * size
+    assert any("+z is up, 2 units" in line for line in result.lines)
+
+
+def test_frames_come_as_stretches_with_ids(stored: TrainedProject):
+    scene = SceneFrames(stored)
+    told: list[int] = []
+    stretches = SceneStretches(scene, take_frames(scene, None, has_timing=True), FileWorld(), told.append)
+    parts = [(one.first_frame, one.n_frames) for one in stretches]
+    assert parts == [(0, 3), (3, 3)]
+    for one in stretches:
+        for frame in range(one.first_frame, one.first_frame + one.n_frames):
+            moving = one.moving(frame)
+            assert len(np.unique(moving.ids)) == len(moving.ids) == len(moving.splats)
+            assert len(moving.splats) + len(one.still) == len(Splats.of(scene.gaussians(frame)))
+    assert told == list(range(6))
+
+
+def test_moments_that_fade_are_both_there_and_light_that_changes_moves(
+    stored: TrainedProject, monkeypatch: pytest.MonkeyPatch
+):
+    scene = SceneFrames(stored)
+    fading = [
+        TakeFrame(0, (SourceMoment(4),)),
+        TakeFrame(1, (SourceMoment(4, 0.75), SourceMoment(5, 0.25))),
+    ]
+    (one,) = SceneStretches(scene, fading, FileWorld(), quiet_number)
+    alone, both = one.moving(0), one.moving(1)
+    assert len(both.splats) > len(alone.splats)
+    assert len(np.unique(both.ids)) == len(both.ids)
+    assert np.isin(alone.ids, both.ids).all()
+
+    whole = len(one.still)
+    gaussians = scene.gaussians
+
+    def lit(frame: float, part: str = "all") -> Any:
+        found = gaussians(frame, part)  # type: ignore[arg-type]
+        if part == "static":
+            found.colors[:7] = 0.1 * frame
+        return found
+
+    monkeypatch.setattr(scene, "gaussians", lit)
+    frames = [TakeFrame(frame, (SourceMoment(frame),)) for frame in range(3)]
+    (one,) = SceneStretches(scene, frames, FileWorld(), quiet_number)
+    assert len(one.still) == whole - 7
+    moving = one.moving(2)
+    assert (moving.ids < 0).sum() == 7
+    np.testing.assert_allclose(moving.splats.colors[moving.ids < 0], 0.2)
+
+
+def quiet_number(n_done: int) -> None:
+    """Nothing is told."""
+
+
+def test_wrong_wishes_are_refused_and_nothing_is_written(
+    opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    wrong = (
+        (SequenceJob(tmp_path / "a.ply"), "has to end in .4dgs"),
+        (SequenceJob(tmp_path / "a.4dgs", frames=PickedFrames.of(range(90, 91))), "There is no frame 90"),
+        (SequenceJob(tmp_path / "a.usdc", "usd", sound="0"), "USD cannot hold sound"),
+        (SequenceJob(opened.project.folder / "a.4dgs"), "inside the project"),
+    )
+    for job, words in wrong:
+        with pytest.raises(ProjectError, match=words):
+            run(opened, job, quiet)
+    with pytest.raises(CaptureError, match="its frames are image files"):
+        run(opened, SequenceJob(tmp_path / "a.4dgs", sound=opened.capture.rig.names[0]), quiet)
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    with pytest.raises(ProjectError, match="usd-core"):
+        estimate(opened, SequenceJob(tmp_path / "a.usdc", "usd"))
+    assert list(tmp_path.glob("a*")) == []
+
+
+def test_what_ends_early_or_is_not_valid_leaves_nothing(
+    opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def stop(progress: ExportProgress) -> None:
+        if progress.n_done == 3:
+            raise Unwanted
+
+    out = tmp_path / "a.4dgs"
+    with pytest.raises(Unwanted):
+        run(opened, SequenceJob(out), stop)
+    kind = SEQUENCES["4dgs"]._replace(problems=lambda path: ("it is upside down",))
+    monkeypatch.setitem(sequence_job.SEQUENCES, "4dgs", kind)
+    with pytest.raises(ProjectError, match="not valid: it is upside down"):
+        run(opened, SequenceJob(out), quiet)
+    assert list(tmp_path.glob("*4dgs*")) == []
+
+
+@pytest.mark.slow
+def test_a_file_that_looks_wrong_is_said(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sequence_job.SEQUENCES, "4dgs", SEQUENCES["4dgs"]._replace(min_psnr_db=200.0))
+    lines = run(opened, SequenceJob(tmp_path / "a.4dgs"), quiet).lines
+    assert sum(line.startswith("Warning: of 5 frames") for line in lines) == 1
+
+
+@pytest.mark.skipif(not can_mount(), reason="needs to mount a file system")
+@pytest.mark.parametrize("name", SEQUENCES)
+def test_a_full_disk_is_said(opened: TrainedProject, tmp_path: Path, name: str):
+    (tmp_path / "disk").mkdir()
+    with full_disk(tmp_path / "disk", 20_000) as disk:
+
+        def fill(progress: ExportProgress) -> None:
+            with suppress(OSError), (disk / "other").open("ab", buffering=0) as file:
+                while progress.n_done == 0 and file.write(bytes(1 << 12)):
+                    pass
+
+        with pytest.raises(DiskError, match="No space left on device"):
+            run(opened, SequenceJob(disk / f"a{SEQUENCES[name].suffix}", name), fill)
+        assert [path.name for path in disk.iterdir()] == ["other"]
+
+
+def test_sound_is_that_of_the_frames(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    rate, fps = take_sound.RATE, opened.capture.fps
+    sound = np.zeros(rate)
+    sound[round((0.3 + 2 / fps) * rate)] = 1.0
+    write_sound_video(tmp_path / "loud.mp4", sound, n_frames=30)
+    monkeypatch.setattr(
+        take_sound, "sound_source", lambda capture, row, frame: (tmp_path / "loud.mp4", 0.3 + frame / fps)
+    )
+    camera = opened.capture.rig.names[0]
+    job = SequenceJob(tmp_path / "s.4dgs", frames=PickedFrames.of(range(1, 5)), sound=camera)
+    run(opened, job, quiet)
+    with closing(SEQUENCES["4dgs"].open(job.out)) as reader:
+        assert reader.timing.sound is not None
+        with wave.open(io.BytesIO(reader.timing.sound)) as file:
+            assert file.getnframes() == round(4 / fps * rate)
+            samples = np.frombuffer(file.readframes(file.getnframes()), "<i2")[::2]
+    assert abs(int(np.abs(samples).argmax()) - rate / fps) < 0.002 * rate
+    gaps = SequenceJob(tmp_path / "g.4dgs", frames=PickedFrames((range(0, 2), range(4, 6)), 1), sound=camera)
+    assert any("sound is left out" in line for line in estimate(opened, gaps).lines)
