@@ -12,7 +12,7 @@ from typing import Annotated, Any, Protocol
 
 from msgspec import Meta, Struct
 
-from engine.capture.files.frame_files import natural_key
+from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed, natural_key
 from engine.capture.files.frame_runs import runs_of
 from engine.capture.files.places import place_in
 from engine.capture.layout.format_checks import read_json_object
@@ -23,11 +23,10 @@ from engine.export.formats.table import FORMATS
 from engine.export.sequences.sequence import SequenceReader
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
+from engine.importing.suffixes import FRAME_SUFFIXES, SEQUENCE_SUFFIXES, is_scene_file
 from engine.storage.files import open_regular
 from engine.storage.typed_json import EntryError, to_type
 
-FRAME_SUFFIXES = (".ply", ".spz", ".splat", ".sog")
-"""Of files that hold one frame; those of .compressed.ply are among them."""
 SIDECAR = "_export.json"
 """End of the name of the file that our own exports describe their frames in."""
 MAX_FILE_BYTES = 2 << 30
@@ -77,19 +76,14 @@ class _Sidecar(Struct, frozen=True):
     files: list[dict[str, Any]]
 
 
-def sequence_suffixes() -> tuple[str, ...]:
-    """Of files that hold a scene over time."""
-    return tuple(row.suffix for row in SEQUENCES.values())
-
-
 def is_scene(path: Path) -> bool:
-    """Whether a path looks like a scene that can be imported; a folder that cannot be looked into does not."""
-    suffix = path.suffix.lower()
-    if path.is_file():
-        return suffix in (*FRAME_SUFFIXES, *sequence_suffixes())
+    """Whether a path looks like a scene that can be imported; a folder with videos, or one that cannot be looked into,
+    does not."""
     try:
-        return path.is_dir() and bool(_frame_names(path))
-    except OSError:
+        if not path.is_dir():
+            return is_scene_file(path)
+        return bool(_frame_names(path)) and not listed(path, VIDEO_SUFFIXES)
+    except (OSError, ProjectError):
         return False
 
 
@@ -114,7 +108,7 @@ def open_scene(path: Path) -> SceneSource:
     except (OSError, CaptureError) as error:
         reason = getattr(error, "strerror", None) or getattr(error, "message", str(error))
         raise ProjectError(f"The scene cannot be read: {reason}", hint="Check its files.", path=path) from error
-    known = ", ".join((*sequence_suffixes(), *FRAME_SUFFIXES))
+    known = ", ".join((*SEQUENCE_SUFFIXES, *FRAME_SUFFIXES))
     raise ProjectError(f"This is not a scene that can be imported; these are {known}.", path=path)
 
 
@@ -135,7 +129,8 @@ class SequenceScene:
     @property
     def notes(self) -> tuple[str, ...]:
         """See SceneSource."""
-        return (*self._reader.notes, *self._seen.notes())
+        sound = () if self._reader.timing.sound is None else ("Its sound is not kept.",)
+        return (*self._reader.notes, *sound, *self._seen.notes())
 
     def splats(self, frame: int) -> Splats:
         """See SceneSource."""
@@ -281,5 +276,5 @@ def _gaps(names: Sequence[str]) -> list[str]:
     missing = [
         f"{a.stop}" if b.start - a.stop == 1 else f"{a.stop} to {b.start - 1}" for a, b in itertools.pairwise(runs)
     ]
-    listed = ", ".join(missing[:_LISTED]) + (f" and {len(missing) - _LISTED} more" if len(missing) > _LISTED else "")
-    return [f"Numbers are missing among the files ({listed}); the frames follow each other without a pause."]
+    shown = ", ".join(missing[:_LISTED]) + (f" and {len(missing) - _LISTED} more" if len(missing) > _LISTED else "")
+    return [f"Numbers are missing among the files ({shown}); the frames follow each other without a pause."]

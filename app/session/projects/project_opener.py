@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.background.jobs import JobContext, Jobs
-from app.importing.import_scene import import_scene
-from app.importing.importable import imported_dir, is_importable
 from app.project.opening.opening import Opened, open_for_window
 from app.project.opening.project_access import is_project
 from app.project.projects_folder import projects_dir
@@ -72,6 +70,8 @@ class ProjectOpener:
         self._newest = this = object()
 
         def work(context: JobContext) -> Opened | None:
+            from app.importing.importable import is_importable  # with libraries that a window starts without
+
             if is_importable(path):
                 return None
             return self._open_path(
@@ -115,17 +115,22 @@ class ProjectOpener:
 
     def _import(self, path: Path, asked: OpenCapture, *, current: Path | None, recent: Sequence[RecentProject]) -> None:
         """Make a project of a scene of another program, unless there is one, and open it."""
-        folder = imported_dir(path, self.projects) if self.project_dir is None else self.project_dir
-        this = self._newest
+        this, chosen, projects = self._newest, self.project_dir, self.projects
 
-        def work(context: JobContext) -> None:
+        def work(context: JobContext) -> Path:
+            from app.importing.import_scene import import_scene
+            from app.importing.importable import imported_dir
+
+            folder = imported_dir(path, projects) if chosen is None else chosen
+
             def report(n_done: int, n: int) -> None:
                 context.report(n_done / n, f"{n_done} of {n} frames")
 
             if not is_project(folder):
                 import_scene(path, folder, report=report)
+            return folder
 
-        def done(_: None) -> None:
+        def done(folder: Path) -> None:
             if this is self._newest:
                 self.open(OpenProject(folder, asked.choices), current=current, recent=recent)
 

@@ -13,8 +13,11 @@ import pytest
 from engine.errors import ProjectError
 from engine.export.formats.ply import COLUMNS
 from engine.export.formats.table import FORMATS, FULL_PLY
+from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
 from engine.importing.scene_source import is_scene, open_scene
+from engine.importing.suffixes import SEQUENCE_SUFFIXES
 from tests.engine.export.scenes import chance_splats, order_of
 from tests.engine.importing.frames import moving_frames
 
@@ -131,6 +134,33 @@ def test_damaged_frames_are_refused_and_named(tmp_path: Path):
     assert "no column rot_3" in refused(folder)
     path.write_bytes(b"ply\n")
     assert "head is not complete" in refused(folder)
+
+
+def test_every_format_over_time_is_known_by_its_name():
+    assert {row.suffix for row in SEQUENCES.values()} == set(SEQUENCE_SUFFIXES)
+
+
+def test_a_file_over_time_is_read_like_any_scene(tmp_path: Path):
+    frames, path = moving_frames(4), tmp_path / "s.4dgs"
+    none, timing = chance_splats(0), SequenceTiming(4, 25.0)
+    stretch = Stretch(0, 4, none, lambda frame: MovingSplats(frames[frame], np.arange(60)))
+    SEQUENCES["4dgs"].write([stretch], timing, path)
+    scene = open_scene(path)
+    try:
+        assert (scene.n_frames, scene.fps, scene.notes) == (4, 25.0, ())
+        found = scene.splats(3)
+        np.testing.assert_allclose(found.means, frames[3].means[order_of(found, frames[3])], atol=0.02)
+    finally:
+        scene.close()
+    path.write_bytes(path.read_bytes()[:200])
+    assert "4dgs" in refused(path)
+
+
+def test_videos_with_points_are_no_scene(tmp_path: Path):
+    folder = write_frames(tmp_path / "s", "ply", moving_frames(1))
+    assert is_scene(folder)
+    (folder / "cam0.mp4").touch()
+    assert not is_scene(folder)
 
 
 def test_links_and_pipes_are_refused(tmp_path: Path):
