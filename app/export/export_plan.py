@@ -13,13 +13,14 @@ from app.export.export_choices import ExportChoices, ExportContext
 from app.export.jobs.answers import Answers
 from app.export.staging import check_target
 from engine.errors import EngineError, ProjectError
+from engine.export.sequences.table import SEQUENCES
 
 if TYPE_CHECKING:
     from app.evaluation.headless import TrainedProject
 
 TAKEN = "Another running or waiting export writes to this place."
 _SAME = {".htm": ".html"}
-_OWN_SUFFIXES = (".mp4", ".webm", ".html")
+_OWN_SUFFIXES = (".mp4", ".webm", ".html", *{row.suffix for row in SEQUENCES.values()})
 """Suffixes that state the kind of a file."""
 _FILE_SUFFIXES = (*_OWN_SUFFIXES, ".csv", ".json")
 """Of everything that is one file."""

@@ -181,6 +181,11 @@ TABLES: dict[str, Clips | Printed] = {
     "objects-drawing": Printed(
         "frames with edits, objects and copies", (_TRAIN_HALF, "python -m tests.benchmarks.bench_edits DIR"), which=-1
     ),
+    "sequences": Printed(
+        "files over time",
+        (_TRAIN_HALF, "python -m tests.benchmarks.bench_sequences DIR --frames 40,150"),
+        which=-1,
+    ),
     "kernels": Printed("kernels", ("clipgstream bench --full --out OUT --quiet",), is_long=False),
     "steps": Printed("training steps", ("clipgstream bench --full --out OUT --quiet",), which=1, is_long=False),
     "ablation-sample": _ablation("sample, this program's scheme", "SAMPLE --set passes=4", seeds=(0, 1, 2)),
