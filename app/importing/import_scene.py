@@ -87,11 +87,11 @@ def import_scene(
     try:
         with atomic_folder(folder) as partial:
             n_clips = _fill(partial, source, path.resolve().name, fps, up, meters_per_unit, report)
+        return ImportedScene(folder, source.n_frames, n_clips, source.notes)
     except OSError as error:
         raise disk_error(error, what="The project", path=folder) from error
     finally:
         source.close()
-    return ImportedScene(folder, source.n_frames, n_clips, source.notes)
 
 
 def _fill(

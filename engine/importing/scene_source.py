@@ -23,6 +23,7 @@ from engine.export.formats.table import FORMATS
 from engine.export.sequences.sequence import SequenceReader
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
+from engine.export.world import AXES
 from engine.importing.suffixes import FRAME_SUFFIXES, SEQUENCE_SUFFIXES, is_scene_file
 from engine.storage.files import open_regular
 from engine.storage.typed_json import EntryError, to_type
@@ -102,7 +103,7 @@ def open_scene(path: Path) -> SceneSource:
             raise ProjectError("There is no such file or folder.", hint="Check the path.", path=path)
         for row in SEQUENCES.values():
             if path.suffix.lower() == row.suffix:
-                return SequenceScene(path, row.open(path))
+                return SequenceScene(row.open(path), up=None if row.up is None else AXES[row.up])
         if path.suffix.lower() in FRAME_SUFFIXES:
             return FrameFiles([path])
     except (OSError, CaptureError) as error:
@@ -115,10 +116,10 @@ def open_scene(path: Path) -> SceneSource:
 class SequenceScene:
     """A file over time."""
 
-    def __init__(self, path: Path, reader: SequenceReader) -> None:
-        self._path, self._reader = path, reader
+    def __init__(self, reader: SequenceReader, *, up: Vector | None) -> None:
+        self._reader = reader
         self.fps: float | None = reader.timing.fps
-        self.up: Vector | None = reader.splats(0).up
+        self.up: Vector | None = up
         self._seen = _Seen()
 
     @property

@@ -6,7 +6,7 @@ from pathlib import Path
 
 FRAME_SUFFIXES = (".ply", ".spz", ".splat", ".sog")
 """Of files that hold one frame; those of .compressed.ply are among them."""
-SEQUENCE_SUFFIXES = (".4dgs", ".usda", ".usdc")
+SEQUENCE_SUFFIXES = (".4dgs", ".usda", ".usdc", ".tsog")
 """Of files over time, those of engine.export.sequences.table.SEQUENCES."""
 
 

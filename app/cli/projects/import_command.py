@@ -52,5 +52,5 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     line.finish()
     for said in done.notes:
         line.say(f"Note: {said}")
-    line.say(f"{done.n_frames} frames in {done.n_clips} clips in {done.folder}")
+    line.say(f"Frames: {done.n_frames}, clips: {done.n_clips}, project: {done.folder}")
     return EXIT_OK
