@@ -103,7 +103,7 @@ def open_scene(path: Path) -> SceneSource:
             raise ProjectError("There is no such file or folder.", hint="Check the path.", path=path)
         for row in SEQUENCES.values():
             if path.suffix.lower() == row.suffix:
-                return SequenceScene(row.open(path), up=None if row.up is None else AXES[row.up])
+                return SequenceScene(row.open(path), None if row.up is None else AXES[row.up])
         if path.suffix.lower() in FRAME_SUFFIXES:
             return FrameFiles([path])
     except (OSError, CaptureError) as error:
@@ -114,12 +114,12 @@ def open_scene(path: Path) -> SceneSource:
 
 
 class SequenceScene:
-    """A file over time."""
+    """A file over time. usual_up: Which way is up in files of this format; None where each says it itself."""
 
-    def __init__(self, reader: SequenceReader, *, up: Vector | None) -> None:
+    def __init__(self, reader: SequenceReader, usual_up: Vector | None) -> None:
         self._reader = reader
         self.fps: float | None = reader.timing.fps
-        self.up: Vector | None = up
+        self.up: Vector | None = reader.splats(0).up if usual_up is None else usual_up
         self._seen = _Seen()
 
     @property

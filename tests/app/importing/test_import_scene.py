@@ -85,9 +85,9 @@ def test_views_see_the_contents(scene: Path, tmp_path: Path):
 
 def test_picked_gaussians_are_deleted_in_all_frames(scene: Path, frames: list[Splats], tmp_path: Path):
     folder = import_scene(scene, tmp_path / "p").folder
-    center = tuple(map(float, frames[0].means[-1]))
+    x, y, z = frames[0].means[-1].tolist()
     with open_script(folder) as project:
-        project.apply_edit("delete", project.select(volume=Sphere(center, 1e-4)))
+        project.apply_edit("delete", project.select(volume=Sphere((x, y, z), 1e-4)))
         n = [len(shown(folder, frame)) for frame in range(N_FRAMES)]
         assert n == [59] * N_FRAMES  # it moves, and is the same in all of them
         project.apply_edit("hold", scope=Scope(0, N_FRAMES), frame_index=2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import os
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -141,13 +142,13 @@ def test_every_format_over_time_is_known_by_its_name():
 
 
 def test_a_file_over_time_is_read_like_any_scene(tmp_path: Path):
-    frames, path = moving_frames(4), tmp_path / "s.4dgs"
-    none, timing = chance_splats(0), SequenceTiming(4, 25.0)
+    frames = [replace(splats, up=(0.0, 0.0, 1.0)) for splats in moving_frames(4)]
+    path, none, timing = tmp_path / "s.4dgs", chance_splats(0), SequenceTiming(4, 25.0)
     stretch = Stretch(0, 4, none, lambda frame: MovingSplats(frames[frame], np.arange(60)))
     SEQUENCES["4dgs"].write([stretch], timing, path)
     scene = open_scene(path)
     try:
-        assert (scene.n_frames, scene.fps, scene.notes) == (4, 25.0, ())
+        assert (scene.n_frames, scene.fps, scene.up, scene.notes) == (4, 25.0, (0.0, 0.0, 1.0), ())
         found = scene.splats(3)
         np.testing.assert_allclose(found.means, frames[3].means[order_of(found, frames[3])], atol=0.02)
     finally:
