@@ -40,6 +40,15 @@ class StoredGaussians:
         n_first = int(self.presence[:, 0].sum())
         return {name: np.concatenate([self.still[name], self.moving[name][:n_first]]) for name in COLUMNS}
 
+    def without(self, still: np.ndarray, tracks: np.ndarray) -> StoredGaussians:
+        """Without some of them. still: [S] bool; tracks: [A] bool"""
+        rows = ~tracks[np.nonzero(self.presence.T)[1]]
+        return StoredGaussians(
+            {name: column[~still] for name, column in self.still.items()},
+            {name: column[rows] for name, column in self.moving.items()},
+            self.presence[~tracks],
+        )
+
     def arrays(self) -> dict[str, np.ndarray]:
         """By the names that they have in a file. Inverse of `read_stored`."""
         still = {f"{_STILL}{name}": array for name, array in self.still.items()}

@@ -16,7 +16,7 @@ from app.importing import import_scene as importing
 from app.importing.import_scene import import_scene
 from app.project.opening.project_access import open_project
 from app.project.projects_folder import projects_dir
-from app.scripting import Scope, Sphere
+from app.scripting import Box, Scope, Sphere
 from app.scripting import open_project as open_script
 from app.session.clips.clip_commands import SplitClip
 from app.session.projects.project_commands import OpenCapture
@@ -92,6 +92,17 @@ def test_picked_gaussians_are_deleted_in_all_frames(scene: Path, frames: list[Sp
         assert n == [59] * N_FRAMES  # it moves, and is the same in all of them
         project.apply_edit("hold", scope=Scope(0, N_FRAMES), frame_index=2)
         np.testing.assert_array_equal(values(shown(folder, 5)), values(shown(folder, 2)))
+
+
+def test_deleted_gaussians_can_be_taken_out_for_good(scene: Path, tmp_path: Path):
+    folder = import_scene(scene, tmp_path / "p").folder
+    with open_script(folder) as project:
+        project.apply_edit("delete", Box((2.0, 0.0, 0.0), (2.0, 9.0, 9.0), (1.0, 0.0, 0.0, 0.0)))
+        edited = [values(shown(folder, frame)) for frame in range(N_FRAMES)]
+        assert project.apply_permanently() == (0,)
+    assert 0 < len(edited[0]) < 60
+    for frame, before in enumerate(edited):
+        np.testing.assert_array_equal(values(shown(folder, frame)), before)
 
 
 def test_a_moment_between_frames_is_the_nearest_one(scene: Path, tmp_path: Path):
