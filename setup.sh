@@ -4,7 +4,8 @@
 #
 #   ./setup.sh              everything `make run` needs
 #   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd), programs of
-#                           others that read exported files (from npm, 115 MB in tests/oracles/node_modules), SLURM and Ray
+#                           others that read exported files (from npm, 115 MB in tests/oracles/node_modules; Blender as
+#                           a Python module, 374 MB to download, in .venv/blender), SLURM and Ray
 #
 #   PYTHON=/path/to/python           take this interpreter (3.11, 3.12 or 3.13)
 #   CLIPGSTREAM_TORCH_INDEX=URL      take the CPU build of torch from this package index
@@ -233,6 +234,21 @@ PYTHON
     fi
 }
 
+BLENDER=5.0.1 # its wheel is for Python 3.11
+blender_key() { printf '%s\n' "$BLENDER"; }
+
+install_blender() { # apart from the others: it wants another numpy
+    say "installing Blender $BLENDER as a Python module into $VENV/blender (374 MB)"
+    if "$VENV/bin/python" -m venv --clear "$VENV/blender" 2>/dev/null &&
+        "$VENV/blender/bin/python" -m pip --disable-pip-version-check --no-input install -qq --retries 2 "bpy==$BLENDER" 2>/dev/null &&
+        "$VENV/blender/bin/python" -c 'import bpy' >/dev/null 2>&1; then
+        stamp blender "$(blender_key)"
+    else
+        rm -rf "$VENV/blender"
+        say "Blender could not be installed; the tests of its add-on are skipped"
+    fi
+}
+
 # ---------------------------------------------------------------- main
 is_stamped() { [ "$(cat "$VENV/.$1" 2>/dev/null)" = "$2" ]; }
 stamp() { printf '%s\n' "$2" >"$VENV/.$1.new" && mv "$VENV/.$1.new" "$VENV/.$1"; }
@@ -258,4 +274,7 @@ if [ "$WITH_TESTS" = yes ] && ! { [ -d tests/oracles/node_modules ] && is_stampe
 fi
 if [ "$WITH_TESTS" = yes ] && ! is_stamped extras "$(extras_key)"; then
     install_extras
+fi
+if [ "$WITH_TESTS" = yes ] && ! { [ -d "$VENV/blender" ] && is_stamped blender "$(blender_key)"; }; then
+    install_blender
 fi

@@ -95,9 +95,12 @@ COMMANDS = {
         has_backend=True,
     ),
     "import": Command(
-        "open a scene of another program: .4dgs, or .ply, .splat, .spz and .sog files, one per frame",
+        "open a scene of another program: a file over time, or .ply, .splat, .spz or .sog, one per frame",
         "app.cli.projects.import_command",
         "Nothing was written.",
+    ),
+    "blender": Command(
+        "write the add-on with which Blender opens exported sequences", "app.cli.addons.blender_command"
     ),
     "inspect": Command(
         "examine and correct a capture, or show the size of a project's trained clips",

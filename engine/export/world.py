@@ -44,6 +44,17 @@ class FileWorld:
         """The scene of a file as it lies in the capture: the inverse of `placed`."""
         return self._moved(splats, self.rotation.T, 1.0 / self.scale)
 
+    def placed_cameras(self, world_to_camera: np.ndarray) -> np.ndarray:
+        """Cameras as they stand in the file: camera_to_world, rigid, OpenCV axes, units of the file.
+
+        Args:
+            world_to_camera: In the capture. [C, 4, 4]
+        """
+        poses = np.linalg.inv(world_to_camera)
+        poses[:, :3] = self.rotation @ poses[:, :3]
+        poses[:, :3, 3] *= self.scale
+        return poses
+
     @staticmethod
     def _moved(splats: Splats, rotation: np.ndarray, scale: float) -> Splats:
         if scale == 1.0 and np.array_equal(rotation, np.eye(3)):

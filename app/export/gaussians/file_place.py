@@ -11,7 +11,7 @@ from app.export.jobs.placing import Vector
 from engine.export.world import FileWorld, world
 
 
-class Placed(Protocol):
+class PlacedInFile(Protocol):
     """What a job says of it; see app.export.jobs.placing."""
 
     @property
@@ -22,7 +22,9 @@ class Placed(Protocol):
     def scene_up(self) -> Vector | None: ...
 
 
-def file_world(opened: TrainedProject, job: Placed, *, usual_up: str | None = None, is_rub: bool = False) -> FileWorld:
+def file_world(
+    opened: TrainedProject, job: PlacedInFile, *, usual_up: str | None = None, is_rub: bool = False
+) -> FileWorld:
     """The scene's place in the files.
 
     Args:

@@ -16,6 +16,7 @@ from app.export.gaussians.gaussian_files import GaussianFile, WrittenPart, base_
 from app.export.gaussians.read_back import ReadBack
 from app.export.scene_frames import SceneFrames
 from app.export.take import TakeFrame
+from engine.camera.rig import CameraRig
 from engine.export.formats.table import Format
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
@@ -144,18 +145,23 @@ class GaussianSequence:
         return min((value for written in self.files for value in (written.psnr_db or {}).values()), default=None)
 
     def document(self) -> dict[str, Any]:
-        """The document that is written next to the files."""
+        """The document that is written next to the files. Its cameras are those of the capture as refined, where they
+        stand in the files. In units of the files are meters_per_unit, null where the project does not say, and
+        near_plane, the nearest depth that is drawn."""
+        opened = self._scene.opened
+        meters_per_unit = opened.project.document.world.meters_per_unit
         return {
             "schema": SCHEMA,
             "program": "ClipGStream Studio",
-            "project": self._scene.opened.project.folder.resolve().name,
+            "project": opened.project.folder.resolve().name,
             "first_frame": min(one.number for one in self._frames),
             "last_frame": max(one.number for one in self._frames),
             "n_frames": len(self._frames),
-            "fps": self._scene.opened.capture.fps,
+            "fps": opened.capture.fps,
             "axes": self._placement.text,
             "up": [round(value, 6) for value in self._placement.up],
             "scale": self._placement.scale,
+            "meters_per_unit": None if meters_per_unit is None else meters_per_unit / self._placement.scale,
             "psnr_db": self.psnr_db,
             "min_psnr_db": self._kind.min_psnr_db,
             "lines": list(self.lines()),
@@ -171,7 +177,14 @@ class GaussianSequence:
                 }
                 for written in self.files
             ],
+            "near_plane": self._near_plane * self._placement.scale,
+            "cameras": camera_rows(opened.rig, self._placement),
         }
+
+    @property
+    def _near_plane(self) -> float:
+        """Nearest depth that is drawn, scene units."""
+        return self._scene.trained(self._frames[0].frame).base.header.near_plane
 
     def lines(self) -> tuple[str, ...]:
         """Sentences for the user: where the scene lies, how near files come, and what was left out."""
@@ -205,6 +218,16 @@ class GaussianSequence:
                 f"{self._kind.suffix}; check the file before use."
             )
         return lines
+
+
+def camera_rows(rig: CameraRig, placement: FileWorld) -> list[dict[str, Any]]:
+    """Cameras as the document lists them: name, size in pixels, intrinsics (pixel centres at +0.5), and the upper three
+    rows of camera_to_world in the coordinates of the files (x right, y down, z forward)."""
+    poses = placement.placed_cameras(rig.world_to_camera)[:, :3]
+    return [
+        {"name": name, "image_size": size.tolist(), "K": K.tolist(), "camera_to_world": pose.tolist()}
+        for name, size, K, pose in zip(rig.names, rig.image_sizes, rig.Ks, poses, strict=True)
+    ]
 
 
 def _are_same(a: Gaussians, b: Gaussians) -> bool:

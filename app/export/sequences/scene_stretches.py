@@ -11,7 +11,7 @@ from app.export.scene_frames import SceneFrames
 from app.export.take import TakeFrame
 from engine.editing.gaussian_rows import RowSet
 from engine.export.player.blocks import joined
-from engine.export.sequences.sequence import MovingSplats, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
 
@@ -38,7 +38,7 @@ class SceneStretches:
         self._scene, self._frames, self._world, self._told = scene, frames, world, told
         self.n_dropped = 0
 
-    def __iter__(self) -> Iterator[Stretch]:
+    def __iter__(self) -> Iterator[SequenceStretch]:
         begin = 0
         for end in range(1, len(self._frames) + 1):
             if end == len(self._frames) or self._kind(end) != self._kind(begin):
@@ -49,7 +49,7 @@ class SceneStretches:
         frame = self._frames[number].frame
         return self._scene.clip_at(frame).clip_index, self._scene.effects(frame)
 
-    def _stretch(self, begin: int, end: int) -> Stretch:
+    def _stretch(self, begin: int, end: int) -> SequenceStretch:
         still = self._still(begin)
         self.n_dropped += still.n_dropped
         is_same = np.ones(len(still), bool)
@@ -65,7 +65,7 @@ class SceneStretches:
             is_same &= (highest - lowest).max(1, initial=0.0) <= SAME_LIGHT
             still = replace(still, colors=0.5 * (lowest + highest))
         names: dict[tuple[int, RowSet], int] = {}
-        return Stretch(begin, end - begin, still[is_same], lambda number: self._moving(number, is_same, names))
+        return SequenceStretch(begin, end - begin, still[is_same], lambda number: self._moving(number, is_same, names))
 
     def _still(self, number: int) -> Splats:
         return self._world.placed(Splats.of(self._scene.gaussians(self._frames[number].frame, "static")))

@@ -51,7 +51,7 @@ class ChunkRows:
         return ChunkRows(self.splats[rows], self.first[rows], self.end[rows], velocities)
 
 
-class Grid:
+class FourdgsGrid:
     """The grids of one file.
 
     Args:

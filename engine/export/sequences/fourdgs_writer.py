@@ -3,7 +3,7 @@
 The library's own writer takes the whole scene at once. This one writes chunk by chunk with the library's records, so
 that memory does not grow with the length of a capture. What stands still is one row for as long as it does not change;
 what moves is cut into segments (engine.export.sequences.segments). Keyframes with differences, the other model of the
-format, took 40 to 55 % more bytes on a real capture.
+format, took 41 to 56 % more bytes on a real capture.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ import numpy as np
 from fourdgs import records
 from fourdgs.serialization import MAGIC, crc32
 
-from engine.export.sequences.fourdgs_grid import ChunkRows, Grid
+from engine.export.sequences.fourdgs_grid import ChunkRows, FourdgsGrid
 from engine.export.sequences.segments import segments
-from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
 from engine.export.splats import Splats
 
@@ -43,7 +43,7 @@ FPS_KEY = "clipgstream_fps"
 """Attribute with the frames per second of the take that was written; the format itself knows seconds only."""
 
 
-def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
+def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
     """Write a file; memory holds a few frames at a time.
 
     Args:
@@ -64,7 +64,9 @@ def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> t
     return chunks.notes()
 
 
-def _rows(stretches: Iterable[Stretch], timing: SequenceTiming, look: Callable[[Splats], None]) -> Iterator[ChunkRows]:
+def _rows(
+    stretches: Iterable[SequenceStretch], timing: SequenceTiming, look: Callable[[Splats], None]
+) -> Iterator[ChunkRows]:
     """Rows of each chunk, in order of the frames at which they end. look: is shown each still part beforehand."""
     still = StillRows()
     span = max(1, round(SPAN_S * timing.fps))
@@ -115,7 +117,7 @@ class _Chunks:
 
     def __init__(self, body: BinaryIO, timing: SequenceTiming) -> None:
         self._body, self._timing = body, timing
-        self._grid: Grid | None = None
+        self._grid: FourdgsGrid | None = None
         self._first_still: list[Splats] = []
         self._windows: dict[tuple[int, int], int] = {}
         self._entries: list[records.ChunkIndexEntry] = []
@@ -131,7 +133,7 @@ class _Chunks:
     def add(self, rows: ChunkRows) -> None:
         """Add a chunk."""
         if self._grid is None:
-            self._grid = Grid([rows.splats, *self._first_still], self._timing.fps)
+            self._grid = FourdgsGrid([rows.splats, *self._first_still], self._timing.fps)
             self._first_still, self._up = [], rows.splats.up
         is_storable = self._grid.storable(rows.splats)
         if not is_storable.all():
@@ -165,7 +167,7 @@ class _Chunks:
 
     def _front(self) -> Iterator[bytes]:
         """Everything before the chunks."""
-        timing, grid = self._timing, self._grid or Grid([_NOTHING], self._timing.fps)
+        timing, grid = self._timing, self._grid or FourdgsGrid([_NOTHING], self._timing.fps)
         duration_s = grid.seconds(timing.n_frames)
         box = [*self._low.tolist(), *self._high.tolist()] if self._entries else [0.0] * 6
         yield records.Header(

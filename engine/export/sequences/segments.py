@@ -52,7 +52,7 @@ class Segments:
 
 
 def segments(frames: Sequence[MovingSplats]) -> Segments:
-    """The fewest rows that a greedy pass finds: a segment goes on for as long as some line and some fixed looks are
+    """The fewest rows that a greedy pass finds: a segment lasts for as long as some line and some fixed looks are
     near enough to all of its frames. frames: consecutive ones, at least one."""
     ids = np.unique(np.concatenate([frame.ids for frame in frames]))
     open_rows = _OpenSegments(ids)
@@ -76,7 +76,7 @@ class _OpenSegments:
         self._closed: list[Segments] = []
 
     def add(self, number: int, frame: MovingSplats) -> None:
-        """Go on with the next frame."""
+        """Add the next frame."""
         splats, at = frame.splats, np.searchsorted(self._ids, frame.ids)
         logs = np.log(np.maximum(splats.scales.astype(np.float64), THINNEST))
         weight = np.maximum(splats.opacities.astype(np.float64), FAINT)[:, None]

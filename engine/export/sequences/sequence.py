@@ -25,7 +25,7 @@ class MovingSplats:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class SequenceStretch:
     """Consecutive frames that share what stands still, normally those of a clip.
 
     Attributes:

@@ -31,7 +31,7 @@ class StillRows:
         self._lowest = self._highest = np.zeros((0, 3), np.float32)
 
     def add(self, splats: Splats, first_frame: int) -> LastingRows | None:
-        """Go on with a stretch that begins at a frame. Returns the rows that have ended there."""
+        """Add a stretch that begins at a frame. Returns the rows that have ended there."""
         found, is_over = np.full(len(splats), -1, np.int64), np.ones(len(self._first), bool)
         if self._splats is not None:
             found, is_over = shared_rows(self._splats, splats)

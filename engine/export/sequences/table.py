@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from engine.export.sequences import fourdgs_reader, fourdgs_writer, usd
-from engine.export.sequences.sequence import SequenceReader, SequenceTiming, Stretch
+from engine.export.sequences.sequence import SequenceReader, SequenceStretch, SequenceTiming
 
 
 def _can_always() -> None:
@@ -47,7 +47,7 @@ class SequenceFormat(NamedTuple):
     still_bytes: float
     moving_bytes: float
     limits: tuple[str, ...]
-    write: Callable[[Iterable[Stretch], SequenceTiming, Path], tuple[str, ...]]
+    write: Callable[[Iterable[SequenceStretch], SequenceTiming, Path], tuple[str, ...]]
     open: Callable[[Path], SequenceReader]
     has_sound: bool = False
     up: str | None = None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,10 @@ import numpy as np
 from engine.conventions import ALPHA_MIN
 from engine.errors import ProjectError
 from engine.export.player.blocks import joined
-from engine.export.sequences.sequence import SequenceTiming, Stretch
+from engine.export.sequences.sequence import SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
 from engine.export.splats import Splats, colors_of
+from engine.export.usd_library import usd_module
 from engine.export.world import FileWorld
 
 LIMITS = (
@@ -37,22 +39,14 @@ def check() -> None:
 
 
 def _library() -> Any:
-    try:
-        import pxr.Sdf
-        import pxr.Tf
-        import pxr.Usd
-        import pxr.UsdGeom
-        import pxr.UsdVol
-        import pxr.Vt
-    except ImportError as error:
-        raise ProjectError("USD needs the library usd-core.", hint="pip install clipgstream[usd]") from error
-    return pxr
+    """The modules of the library by their names. Raises ProjectError where it is missing."""
+    return SimpleNamespace(**{name: usd_module(name) for name in ("Tf", "Usd", "UsdGeom", "UsdVol", "Vt")})
 
 
 # -------------------------------------------------------------------- writing
 
 
-def write(stretches: Iterable[Stretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
+def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
     """Write a file, as text where its suffix is .usda; memory holds a few frames, but of text all of them.
 
     Returns:

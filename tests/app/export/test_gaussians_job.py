@@ -23,6 +23,7 @@ from app.export.gaussians.gaussians_job import GaussiansJob, estimate, run
 from app.export.picked_frames import PickedFrames
 from app.export.scene_frames import Part, SceneFrames
 from app.project.opening.project_access import open_project
+from engine.camera.projection import to_camera, to_pixels
 from engine.children.kind import Unwanted
 from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
@@ -96,6 +97,22 @@ def test_a_scene_that_is_turned_and_scaled_still_measures_well(opened: TrainedPr
     live = Splats.of(SceneFrames(opened).gaussians(2))
     assert np.linalg.norm(found.means, axis=1) == pytest.approx(3 * np.linalg.norm(live.means, axis=1), rel=1e-4)
     np.testing.assert_allclose(found.scales, 3 * live.scales, rtol=1e-4)
+
+
+def test_the_document_has_cameras_where_they_stand_in_the_files(opened: TrainedProject, tmp_path: Path):
+    job = GaussiansJob(tmp_path / "out", frames=PickedFrames.of(range(1)), up="+z", scale=3.0)
+    run(opened, job, quiet)
+    document, rig = sidecar(tmp_path / "out"), opened.rig
+    assert [row["name"] for row in document["cameras"]] == list(rig.names)
+    live = Splats.of(SceneFrames(opened).gaussians(0)).means
+    written = read(tmp_path / "out" / "p.ply", "ply").means
+    for camera, row in enumerate(document["cameras"]):
+        assert row["image_size"] == rig.image_sizes[camera].tolist()
+        pose = np.linalg.inv([*row["camera_to_world"], [0.0, 0.0, 0.0, 1.0]])
+        np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
+        expected = to_pixels(to_camera(live, rig.world_to_camera[camera]), rig.Ks[camera])
+        np.testing.assert_allclose(to_pixels(to_camera(written, pose), np.array(row["K"])), expected, rtol=1e-3)
+    assert (document["near_plane"], document["meters_per_unit"]) == (pytest.approx(3.0 * 0.1), None)
 
 
 def test_full_fields_are_read_back_and_measured_as_others(opened: TrainedProject, tmp_path: Path):
@@ -370,5 +387,6 @@ def test_up_and_scale_are_those_of_the_project_unless_others_are_asked_for(proje
     assert estimate(opened, job).lines == ("Coordinates: turned so that +z is up, 0.25 units per unit of the capture.",)
     run(opened, job, quiet)
     assert sidecar(tmp_path / "out")["up"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert sidecar(tmp_path / "out")["meters_per_unit"] == 1.0
     other = structs.replace(job, out=tmp_path / "other", scale=2.0, scene_up=(0.0, 1.0, 0.0))
     assert "2 units per unit" in estimate(opened, other).lines[0]

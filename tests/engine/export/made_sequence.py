@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from engine.export.player.blocks import joined
-from engine.export.sequences.sequence import MovingSplats, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch
 from engine.export.splats import Splats
 from tests.engine.export.scenes import chance_splats
 
@@ -47,7 +47,7 @@ class MadeSequence:
         """All of a frame."""
         return joined(self.still(frame // STRETCH_FRAMES), self.moving(frame).splats)
 
-    def stretches(self) -> Iterator[Stretch]:
+    def stretches(self) -> Iterator[SequenceStretch]:
         """All of them."""
         for number in range(N_STRETCHES):
-            yield Stretch(number * STRETCH_FRAMES, STRETCH_FRAMES, self.still(number), self.moving)
+            yield SequenceStretch(number * STRETCH_FRAMES, STRETCH_FRAMES, self.still(number), self.moving)

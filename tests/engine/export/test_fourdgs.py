@@ -19,7 +19,7 @@ from engine.errors import ProjectError
 from engine.export.sequences.fourdgs_reader import MAX_ROWS, FourdgsReader, problems
 from engine.export.sequences.fourdgs_writer import FAINTEST, write
 from engine.export.sequences.segments import PATH_SHARE, segments
-from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
 from engine.export.splats import Splats
 from tests.engine.export.made_sequence import FPS, N_FRAMES, N_MOVING, N_OTHER, N_STILL, N_STRETCHES, MadeSequence
 from tests.engine.export.scenes import angles_deg, chance_splats, one_splat, order_of
@@ -88,7 +88,7 @@ def test_light_that_changes_a_little_does_not_break_a_row(tmp_path: Path):
         for number in range(2):
             colors = still.colors + np.float32(change * number)
             lit = Splats(still.means, still.quats, still.scales, still.opacities, colors)
-            yield Stretch(4 * number, 4, lit, lambda frame: nothing)
+            yield SequenceStretch(4 * number, 4, lit, lambda frame: nothing)
 
     n_rows = []
     for change in (1.0 / 255.0, 10.0 / 255.0):
@@ -126,7 +126,7 @@ def test_segments_stay_near_every_frame():
 def test_nothing_at_all_is_a_file_too(tmp_path: Path):
     empty = chance_splats(3)[:0]
     nothing = MovingSplats(empty, np.zeros(0, np.int64))
-    write([Stretch(0, 2, empty, lambda frame: nothing)], SequenceTiming(2, 30.0), tmp_path / "e.4dgs")
+    write([SequenceStretch(0, 2, empty, lambda frame: nothing)], SequenceTiming(2, 30.0), tmp_path / "e.4dgs")
     with closing(FourdgsReader(tmp_path / "e.4dgs")) as reader:
         assert [len(reader.splats(frame)) for frame in range(reader.timing.n_frames)] == [0, 0]
     assert problems(tmp_path / "e.4dgs") == ()
@@ -137,7 +137,7 @@ def test_what_does_not_fit_is_said(tmp_path: Path):
     odd = [one_splat(means=[[1e12, 0.0, 0.0]]), one_splat(colors=[[1.5, 0.5, 0.5]])]
     still = Splats(*(np.concatenate([getattr(one, name) for one in (usual, *odd)]) for name in NAMES))
     moving = MovingSplats(still[:0], np.zeros(0, np.int64))
-    notes = write([Stretch(0, 1, still, lambda frame: moving)], SequenceTiming(1, 30.0), tmp_path / "o.4dgs")
+    notes = write([SequenceStretch(0, 1, still, lambda frame: moving)], SequenceTiming(1, 30.0), tmp_path / "o.4dgs")
     assert ["too far away" in notes[0], "brighter than white" in notes[1]] == [True, True]
     assert notes[0].startswith("1 Gaussians")
 

@@ -20,7 +20,7 @@ from tests.engine.export.scenes import order_of
 
 def test_without_the_library_the_remedy_is_said(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
-    with pytest.raises(ProjectError, match=r"pip install clipgstream\[usd\]"):
+    with pytest.raises(ProjectError, match=r"pip install 'clipgstream\[usd\]'"):
         SEQUENCES["usd"].check()
 
 

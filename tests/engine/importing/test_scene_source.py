@@ -14,7 +14,7 @@ import pytest
 from engine.errors import ProjectError
 from engine.export.formats.ply import COLUMNS
 from engine.export.formats.table import FORMATS, FULL_PLY
-from engine.export.sequences.sequence import MovingSplats, SequenceTiming, Stretch
+from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
 from engine.importing.scene_source import is_scene, open_scene
@@ -144,7 +144,7 @@ def test_every_format_over_time_is_known_by_its_name():
 def test_a_file_over_time_is_read_like_any_scene(tmp_path: Path):
     frames = [replace(splats, up=(0.0, 0.0, 1.0)) for splats in moving_frames(4)]
     path, none, timing = tmp_path / "s.4dgs", chance_splats(0), SequenceTiming(4, 25.0)
-    stretch = Stretch(0, 4, none, lambda frame: MovingSplats(frames[frame], np.arange(60)))
+    stretch = SequenceStretch(0, 4, none, lambda frame: MovingSplats(frames[frame], np.arange(60)))
     SEQUENCES["4dgs"].write([stretch], timing, path)
     scene = open_scene(path)
     try:

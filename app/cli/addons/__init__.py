@@ -1,0 +1,1 @@
+"""Subcommands that write add-ons for other programs."""
