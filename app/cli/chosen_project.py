@@ -149,6 +149,7 @@ def _chosen_settings(
     follow_links = options.follow_links or (stored is not None and stored.follow_links)
     is_growing = n_complete is not None or (stored is not None and stored.is_growing)
     capture = open_capture(options.capture, scale=scale, follow_links=follow_links, is_growing=is_growing)
+    capture.check_pictures()
     frames = stored.frames if stored is not None and stored.fingerprint == capture.fingerprint else None
     if n_complete is not None and frames is None:
         frames = (0, n_complete)

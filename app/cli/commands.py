@@ -95,6 +95,11 @@ COMMANDS = {
         "Nothing was written.",
         has_backend=True,
     ),
+    "import": Command(
+        "open a scene of another program: a file over time, or .ply, .splat, .spz or .sog, one per frame",
+        "app.cli.projects.import_command",
+        "Nothing was written.",
+    ),
     "blender": Command(
         "write the add-on with which Blender opens exported sequences", "app.cli.addons.blender_command"
     ),

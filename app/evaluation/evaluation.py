@@ -102,6 +102,7 @@ def evaluate_project(
 
     opened = opened.measured
     project, capture = opened.project, opened.capture
+    capture.check_pictures()
     chosen_cameras = list(range(len(capture.rig)) if cameras is None else cameras)
     scope = EvaluationScope(list(clip_indices), chosen_cameras, metrics, precision)
     for clip_index in {*scope.clips} - {*opened.trained}:

@@ -71,6 +71,8 @@ class CapturedPictures:
         request = PictureRequest(
             generation, capture.fingerprint, camera_index, frame_index, max_width, capture, rendition
         )
+        if request.is_thumbnail and not capture.has_pictures:
+            return None
         known = self._cache.get(request)
         if known is None:
             self._worker(request).request(request)

@@ -19,6 +19,7 @@ from app.project.opening.opened_project import OpenedProject
 from app.training.clip_run import ShownState
 from engine.capture.capture import Capture
 from engine.clip_files.clip_state import read_clip_state
+from engine.clip_files.stored_gaussians import read_stored
 from engine.errors import ProjectError
 
 logger = logging.getLogger(__name__)
@@ -69,7 +70,7 @@ class Clouds:
     def build_first(self, opened: OpenedProject, jobs: Jobs) -> None:
         """Make something of the scene to look at until the first training has built the real cloud."""
         path = opened.project.first_cloud_path
-        if path.is_file() or not opened.project.is_writable:
+        if path.is_file() or not (opened.project.is_writable and opened.capture.has_pictures):
             return
         capture = opened.capture
 
@@ -103,11 +104,15 @@ def static_points(path: Path, revision: str) -> PointArrays:
     """
     state = read_clip_state(path)
     record = state.anchors.get("static")
-    if record is None or record.own is None:
+    if state.header.holds == "gaussians":
+        stored = read_stored(state.arrays, state.header.n_frames).at_first()
+        points, colors = stored["means"], np.clip(stored["colors"], 0.0, 1.0)
+    elif record is None or record.own is None:
         raise ProjectError("The clip file holds no static anchors.", hint="Train the clip again.", path=path)
-    points = record.own.positions.astype(np.float32, copy=False)
-    logits = record.own.color_logits.astype(np.float32, copy=False)
-    colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
+    else:
+        points = record.own.positions.astype(np.float32, copy=False)
+        logits = record.own.color_logits.astype(np.float32, copy=False)
+        colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
     spacing = point_spacing(points)
     key = ("cloud", str(path), revision)
     return PointArrays(np.ascontiguousarray(points), colors.astype(np.float32), key, spacing=spacing)

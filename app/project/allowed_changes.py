@@ -30,9 +30,12 @@ def check_change(
     Raises:
         SettingsFixed: One is, or is being trained.
         ProjectError: They do not fit.
+        CaptureError: The scene was imported, so that no clip could be trained with other settings.
     """
     if before.settings == after.settings:
         return
+    if not capture.has_pictures and not before.settings.is_placed_as(after.settings):
+        capture.check_pictures()
     check_settings(after.settings, capture)
     if not is_shared_change(before.settings, after.settings):
         return

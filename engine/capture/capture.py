@@ -17,6 +17,7 @@ from engine.camera.rig import CameraRig
 from engine.capture.cameras.camera_optics import CameraOptics
 from engine.capture.cameras.rig_checks import check_rig, rig_extent, rig_warnings
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
+from engine.capture.formats.imported import raise_no_pictures
 from engine.capture.formats.table import read_layout
 from engine.capture.frames import FrameStore, IndexedFrames
 from engine.capture.growing.mode import reading
@@ -99,6 +100,16 @@ class Capture:
     def is_growing(self) -> bool:
         """Whether it may still be recorded; see `open_capture`."""
         return self.layout.is_growing
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether its cameras took pictures; those of an imported scene are views only."""
+        return self.layout.has_pictures
+
+    def check_pictures(self) -> None:
+        """Refuse work that needs pictures where there are none. Raises CaptureError."""
+        if not self.has_pictures:
+            raise_no_pictures(self.path)
 
     def grown(self, n_frames: int) -> Capture:
         """The same capture with more frames, which have come since it was read. Files are not read again.

@@ -15,7 +15,9 @@ from engine.storage.typed_json import EntryError, to_type
 from engine.text import shown
 
 SCHEMA = 2
-READABLE = (1, SCHEMA)
+STORED_SCHEMA = 3
+"""Of clips that hold Gaussians instead of anchors, which earlier versions cannot show."""
+READABLE = (1, SCHEMA, STORED_SCHEMA)
 """Schema 1 knew no compact form; its files are read like any other that holds its arrays as they are."""
 _MAX_TABLE_VALUES = 2**28
 """All values of a field's tables are fewer: its memory is taken before the arrays are compared with it."""
@@ -181,6 +183,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     Attributes:
         role: Whether other clips can inherit from this one, or it inherits itself.
+        holds: Anchors that were trained, or Gaussians of another program, see engine.clip_files.stored_gaussians.
         clip_length: M, the divisor of clip_time.
         n_frames, start: Frames of this clip, and where in the capture they begin.
         step, n_steps: Steps done, and those of the whole training.
@@ -216,6 +219,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
     decoder: DecoderShape
     field: FieldShape | None
     fingerprint: str
+    holds: Literal["anchors", "gaussians"] = "anchors"
     moving_spacing: Annotated[float, Meta(ge=0, lt=1e30)] | None = None
     n_anchors: dict[str, Count] = {}
     n_alive: Count | None = None
@@ -255,8 +259,8 @@ def parse_header(text: str) -> ClipHeader:
     """
     values = parse_object(text, is_nan_allowed=True)
     schema = values.get("schema")
-    if type(schema) is int and schema > SCHEMA:
-        raise NewerSchema(f"it has schema {schema}, this version reads 1 to {SCHEMA}")
+    if type(schema) is int and schema > READABLE[-1]:
+        raise NewerSchema(f"it has schema {schema}, this version reads 1 to {READABLE[-1]}")
     if type(schema) is not int or schema not in READABLE:
         raise EntryError(f"its header has schema {shown(schema)}")
     _bring_up_to_date(values)

@@ -26,6 +26,7 @@ from engine.clip_files.anchor_record import AnchorRecord, RecordError, read_reco
 from engine.clip_files.array_names import CORRECTIONS, LOG_DRIFT, VIGNETTING
 from engine.clip_files.clip_header import ClipHeader, NewerSchema, header_text, parse_header
 from engine.clip_files.coding import CodedArray, CodingError, decode_array
+from engine.clip_files.stored_gaussians import read_stored
 from engine.errors import ProjectError
 from engine.storage.array_files import ArraysError, read_arrays, read_metadata, write_arrays
 from engine.storage.json_files import JsonError, parse_object
@@ -196,6 +197,8 @@ def read_clip_state(path: Path | str, *, only: Collection[str] | None = None) ->
             arrays = _decoded(arrays, specs if only is None else {n: specs[n] for n in only if n in specs})
         if only is None:
             read_records(arrays)
+        if only is None and header.holds == "gaussians":
+            read_stored(arrays, header.n_frames)
     except FileNotFoundError as error:
         raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
     except NewerSchema as error:

@@ -32,6 +32,8 @@ class Splats:
         colors: Display-encoded RGB; a little beyond 0..1 is possible. [N, 3] float32
         up: Which way is up, unit length. [3]
         n_dropped: Rows that were left out, because they cannot be drawn.
+        sh_degree: Highest degree of the colours in the file that this was read from; those above 0, which change with
+            the viewing direction, are left out.
     """
 
     means: np.ndarray
@@ -41,6 +43,7 @@ class Splats:
     colors: np.ndarray
     up: tuple[float, float, float] = PLY_UP
     n_dropped: int = field(default=0, compare=False)
+    sh_degree: int = field(default=0, compare=False)
 
     def __len__(self) -> int:
         return len(self.means)

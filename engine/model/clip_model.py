@@ -9,7 +9,7 @@ all clips. "replacing" ones are the same for one source clip: they take the plac
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from copy import deepcopy
 from dataclasses import dataclass, fields, replace
 
@@ -83,7 +83,12 @@ class ClipModel(nn.Module):
             By role, [A of the reference] bool
         still_decoder: Heads of still parts where they are others: those they learned with, frozen like them.
         own_heads: Heads that are the clip's own, and not a reference clip's: DECODER, MOVING_DECODER.
+
+    Attributes:
+        has_features: Whether Gaussians are decoded from features, which can be used apart.
     """
+
+    has_features = True
 
     def __init__(
         self,
@@ -125,6 +130,21 @@ class ClipModel(nn.Module):
     def roles(self) -> list[str]:
         """Roles in decode order."""
         return list(self.sets.keys())
+
+    def part(self, roles: Collection[str]) -> ClipModel:
+        """A clip of some of its sets. Not for training; shares everything but caches, which are its own, so that it may
+        be decoded on another thread."""
+        return ClipModel(
+            sets={role: self.anchor_set(role) for role in self.roles() if role in roles},
+            decoder=self.decoder,
+            field=self.field,
+            clip_length=self.clip_length,
+            n_frames=self.n_frames,
+            backend=self.backend,
+            light=self.light if STATIC in roles else None,
+            hidden=self.hidden,
+            still_decoder=self.still_decoder,
+        )
 
     def add_set(self, role: str, anchors: AnchorSet) -> None:
         """Add anchors of a new role; a field attached later covers them."""

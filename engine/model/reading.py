@@ -11,6 +11,7 @@ from engine.clip_files.anchor_record import AnchorRecord, StoredAnchors
 from engine.clip_files.array_names import DECODER, FIELD, MOVING_DECODER
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.roles import ROLES, STATIC
+from engine.clip_files.stored_gaussians import read_stored
 from engine.errors import ProjectError
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
@@ -19,6 +20,7 @@ from engine.model.field import SpatioTemporalField
 from engine.model.host_array import host_array
 from engine.model.model_backend import ModelBackend
 from engine.model.motion import AnchorMotion
+from engine.model.stored.stored_model import StoredModel
 
 
 def inherit(
@@ -68,6 +70,8 @@ def load_clip_model(
             missing or do not fit together.
     """
     try:
+        if state.header.holds == "gaussians":
+            return StoredModel.of(state.header, read_stored(state.arrays, state.header.n_frames), backend)
         model = _rebuild(state, reference, backend)
     except (KeyError, TypeError, AttributeError, RuntimeError, ValueError) as error:  # arrays that do not fit together
         raise ProjectError(

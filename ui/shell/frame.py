@@ -20,6 +20,7 @@ from app.session.projects.window_memory import WindowMemory
 from app.session.session_view import WindowSession
 from app.session.showing.look_commands import SetFrameMemory
 from app.session.training.train_commands import SetWorkers
+from engine.importing.suffixes import is_scene_file
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
@@ -346,10 +347,9 @@ class Frame:
         self.request_redraw()
 
     def open_path(self, path: Path) -> None:
-        """Open a capture or project folder, or the folder of a file that was dropped."""
-
-        folder = path if path.is_dir() or not path.exists() else path.parent
-        self.dispatch(OpenCapture(folder, is_asking=True))
+        """Open a capture or project folder, a scene of another program, or the folder of any other file."""
+        is_itself = path.is_dir() or not path.exists() or is_scene_file(path)
+        self.dispatch(OpenCapture(path if is_itself else path.parent, is_asking=True))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
         is_wanted, drawer = title == self.ui.wanted_panel, self.ui.open_drawer

@@ -57,6 +57,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         fps, rig = 1 / float(np.median([np.median(np.diff(recording.times_s)) for recording in recordings])), None
     else:
         capture = open_capture(options.path, follow_links=options.follow_links, cache_bytes=ONE_PASS_CACHE_BYTES)
+        capture.check_pictures()
         recordings, fps, rig = recordings_of(capture), capture.fps, capture.rig
     line = ProgressLine(is_quiet=options.json)
 

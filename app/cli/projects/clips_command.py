@@ -40,6 +40,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     try:
         capture = open_capture_of(project.settings, project.folder)
         try:
+            if is_change:
+                capture.check_pictures()
             _change(project, capture.n_frames, options)
             found = describe_clips(project, capture)
         finally:

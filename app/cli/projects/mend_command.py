@@ -73,6 +73,7 @@ def _request(project: Project, options: argparse.Namespace) -> MendRequest:
         raise ProjectError("Name what to mend: --boundary A|B or --frames A:B.")
     settings = project.settings
     capture = open_capture_of(settings, project.folder)
+    capture.check_pictures()
     if options.frames:
         frames = parse_range(options.frames, capture.n_frames, option="--frames", what="frames")
         return MendRequest(frames=(frames.start, frames.stop), method=options.method)

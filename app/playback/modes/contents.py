@@ -33,7 +33,6 @@ def part_of(model: ClipModel, content: str) -> ClipModel:
     Not for training; its caches are its own, so it may be decoded on another thread than the model.
     """
     from engine.metrics.clips.features_apart import with_features
-    from engine.model.clip_model import ClipModel
 
     match content:
         case "f_s":
@@ -42,18 +41,7 @@ def part_of(model: ClipModel, content: str) -> ClipModel:
             return with_features(model, "dynamic")
         case "static" | "dynamic":
             wants_dynamic = content == "dynamic"
-            roles = [role for role in model.roles() if model.anchor_set(role).is_dynamic == wants_dynamic]
-            return ClipModel(
-                sets={role: model.anchor_set(role) for role in roles},
-                decoder=model.decoder,
-                field=model.field,
-                clip_length=model.clip_length,
-                n_frames=model.n_frames,
-                backend=model.backend,
-                light=None if wants_dynamic else model.light,
-                hidden=model.hidden,
-                still_decoder=model.still_decoder,
-            )
+            return model.part([role for role in model.roles() if model.anchor_set(role).is_dynamic == wants_dynamic])
         case _:
             return model
 

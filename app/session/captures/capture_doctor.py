@@ -112,6 +112,7 @@ class CaptureDoctor(SessionPart):
         if self._opened is None or self._job is not None:
             return
         capture = self._opened.capture
+        capture.check_pictures()
 
         def work(context: JobContext) -> Diagnosis:
             return self.run(capture, lambda progress: context.report(progress.done, progress.message))

@@ -266,4 +266,5 @@ class ProjectMending(SessionPart):
     def _checked(self) -> OpenedProject:
         if self._opened is None:
             raise ProjectError("No capture is open.", hint="Open one first.")
+        self._opened.capture.check_pictures()
         return self._opened

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app.background.jobs import JobContext, Jobs
 from app.project.opening.opening import Opened, open_for_window
+from app.project.opening.project_access import is_project
 from app.project.projects_folder import projects_dir
 from app.project.recents import RecentProject
 from app.session.notices import Notice, Notices
@@ -68,7 +69,11 @@ class ProjectOpener:
         asked = command if isinstance(command, OpenCapture) else OpenCapture(path, choices=command.choices)
         self._newest = this = object()
 
-        def work(context: JobContext) -> Opened:
+        def work(context: JobContext) -> Opened | None:
+            from app.importing.importable import is_importable  # with libraries that a window starts without
+
+            if is_importable(path):
+                return None
             return self._open_path(
                 path,
                 scale=asked.scale,
@@ -85,8 +90,11 @@ class ProjectOpener:
                 projects=projects,
             )
 
-        def take(opened: Opened) -> None:
-            if this is self._newest:
+        def take(opened: Opened | None) -> None:
+            if opened is None:
+                if this is self._newest:
+                    self._import(path, asked, current=current, recent=recent)
+            elif this is self._newest:
                 self._withdraw_refusals()
                 self._take(opened)
             elif opened.project is not None or opened.is_asking:  # something else was asked for meanwhile
@@ -104,6 +112,32 @@ class ProjectOpener:
                 self._refusals.append(notice)
 
         self._jobs.start("Opening", work, take, failed)
+
+    def _import(self, path: Path, asked: OpenCapture, *, current: Path | None, recent: Sequence[RecentProject]) -> None:
+        """Make a project of a scene of another program, unless there is one, and open it."""
+        this, chosen, projects = self._newest, self.project_dir, self.projects
+
+        def work(context: JobContext) -> Path:
+            from app.importing.import_scene import import_scene
+            from app.importing.importable import imported_dir
+
+            folder = imported_dir(path, projects) if chosen is None else chosen
+
+            def report(n_done: int, n: int) -> None:
+                context.report(n_done / n, f"{n_done} of {n} frames")
+
+            if not is_project(folder):
+                import_scene(path, folder, report=report)
+            return folder
+
+        def done(folder: Path) -> None:
+            if this is self._newest:
+                self.open(OpenProject(folder, asked.choices), current=current, recent=recent)
+
+        def failed(error: Exception) -> None:
+            self._refusals.append(self._notices.add_failure(f"{printable(path.name)} cannot be imported", error))
+
+        self._jobs.start(f"Importing {printable(path.name)}", work, done, failed, can_cancel=True)
 
     def _withdraw_refusals(self) -> None:
         """Something is open now: earlier refusals no longer matter."""

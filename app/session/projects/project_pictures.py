@@ -54,7 +54,7 @@ class ProjectPictures:
             if shown is not None and is_cache_warm():  # compiling kernels for it would take a minute
                 prepare_drawing()
                 write_picture(folder, render(RenderRequest(NO_KEY, look, shown), process_backend()).image)
-            elif not picture_path(folder).is_file():
+            elif opened.capture.has_pictures and not picture_path(folder).is_file():
                 write_picture(folder, opened.capture.frame(0, 0))
 
         self._jobs.start("Picture of the project", work, lambda _: None, _note)

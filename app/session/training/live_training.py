@@ -207,6 +207,7 @@ class LiveTraining(SessionPart):
         elif not service.is_busy and service.queue:
             service.go_on()
         elif service.next_clip_index is not None:
+            self.opened_project.capture.check_pictures()
             service.enqueue(service.next_clip_index)
         elif any(status.state in ("damaged", "stale", "untrained") for status in self.clip_states()):
             self._notices.add(
@@ -225,13 +226,15 @@ class LiveTraining(SessionPart):
             own: Settings that it alone is to have.
         Raises:
             ProjectError: It cannot be trained.
+            CaptureError: The scene was imported and has no pictures.
         """
         if self.service is None:
             self.tell_nothing_open()
-        elif not is_confirmed and self.service.is_finished(clip_index):
+            return None
+        self.opened_project.capture.check_pictures()
+        if not is_confirmed and self.service.is_finished(clip_index):
             return retrain_question(self.service.catalog, clip_index)
-        else:
-            self.service.enqueue(clip_index, own or None)
+        self.service.enqueue(clip_index, own or None)
         return None
 
     @property

@@ -15,6 +15,7 @@ from engine.capture.formats import (
     colmap_frames,
     easyvolcap,
     immersive,
+    imported,
     metashape,
     multipleview,
     n3dv,
@@ -35,6 +36,7 @@ from engine.errors import CaptureError
 FORMATS = (
     capture_json,
     sample,
+    imported,
     panoptic,
     panoptic_studio,
     easyvolcap,
@@ -76,6 +78,11 @@ def read_layout(folder: Path, *, follow_links: bool) -> Layout:
     raise _not_a_capture(folder, [probe for _, probe in probes])
 
 
+def is_capture(folder: Path) -> bool:
+    """Whether some reader knows the layout of a folder. Raises OSError where it cannot be looked into."""
+    return any(reader.probe(folder).is_match for reader in FORMATS)
+
+
 def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
     """The error with the folder's contents, the layouts that can be read, and the remedy."""
     with os.scandir(folder) as entries:
@@ -103,6 +110,6 @@ def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
 
 def _is_capture(entry: os.DirEntry[str]) -> bool:
     try:
-        return entry.is_dir() and any(reader.probe(Path(entry.path)).is_match for reader in FORMATS)
+        return entry.is_dir() and is_capture(Path(entry.path))
     except OSError:  # a link to itself, a folder that may not be looked into
         return False

@@ -84,6 +84,7 @@ class Layout:
         fit: The user's fit for frames of another shape than their calibration; None where that is not known.
         curve: Transfer curve of all frames, which their sources undo; None keeps values as they are.
         is_growing: It may still be recorded: `n_frames` are those of the farthest camera, and others may lack some.
+        has_pictures: Whether its cameras took pictures; those of an imported scene are views only.
     """
 
     format: str
@@ -98,6 +99,7 @@ class Layout:
     fit: FrameFit | None = None
     curve: CurveName | None = None
     is_growing: bool = False
+    has_pictures: bool = True
 
     @property
     def misfit_px(self) -> float:

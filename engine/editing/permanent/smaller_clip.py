@@ -11,6 +11,7 @@ from engine.clip_files.anchor_record import AnchorRecord, StoredAnchors
 from engine.clip_files.array_names import is_said_of_anchors, own_kind
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.roles import STATIC
+from engine.clip_files.stored_gaussians import read_stored
 from engine.errors import ProjectError
 
 Chosen = Mapping[str, np.ndarray]
@@ -29,6 +30,8 @@ def without_anchors(state: ClipState, own: Chosen, inherited: Chosen, gone_from_
     Raises:
         ProjectError: The arrays are inconsistent.
     """
+    if state.header.holds == "gaussians":
+        return _stored_without(state, own)
     others = {
         name: array for name, array in state.arrays.items() if own_kind(name) is None and not is_said_of_anchors(name)
     }
@@ -52,6 +55,15 @@ def without_anchors(state: ClipState, own: Chosen, inherited: Chosen, gone_from_
     if smaller.header.fingerprint == state.header.fingerprint:
         return smaller
     return ClipState(arrays, replace(smaller.header, rows_of=""))  # rows are others now
+
+
+def _stored_without(state: ClipState, own: Chosen) -> ClipState:
+    """A clip of stored Gaussians, each of which is an anchor."""
+    found = read_stored(state.arrays, state.header.n_frames)
+    n_still, n_tracks = len(found.still["means"]), len(found.presence)
+    still, tracks = own.get("static", np.zeros(n_still, bool)), own.get("moving", np.zeros(n_tracks, bool))
+    arrays = state.arrays | found.without(still, tracks).arrays()
+    return ClipState(arrays, replace(state.header, rows_of="")).stamped()
 
 
 def _own_without(record: AnchorRecord, gone: np.ndarray) -> AnchorRecord:

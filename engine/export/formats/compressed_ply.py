@@ -49,18 +49,21 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """Read a file of `write`. Raises ProjectError where it is something else."""
+    """Read a file of `write`, or one of another program, which may lack limits of colours and have colours of higher
+    degrees. Raises ProjectError where it is something else."""
     elements = read_header(file)
-    if [(name, tuple(columns)) for name, (_, columns) in elements.items()] != [
-        ("chunk", _CHUNK_COLUMNS),
-        ("vertex", _COLUMNS),
-    ]:
+    limits = tuple(elements["chunk"].columns) if "chunk" in elements else ()
+    is_known = list(elements)[:2] == ["chunk", "vertex"] and tuple(elements["vertex"].columns) == _COLUMNS
+    if not is_known or limits not in (_CHUNK_COLUMNS, _CHUNK_COLUMNS[:12]):
         raise damaged("it is not a compressed PLY file")
-    n_chunks, n = elements["chunk"][0], elements["vertex"][0]
+    n_chunks, n = elements["chunk"].n_rows, elements["vertex"].n_rows
     if n_chunks != -(-n // CHUNK):
         raise damaged(f"it has {n_chunks} chunks for {n} Gaussians")
-    chunks = read_rows(file, n_chunks, len(_CHUNK_COLUMNS), "<f4").astype(np.float64).reshape(n_chunks, 3, 2, 3)
-    position, rotation, scale, color = read_rows(file, n, len(_COLUMNS), "<u4").T
+    chunks = np.tile(np.repeat([0.0, 1.0], 3), (n_chunks, 3)).reshape(n_chunks, 3, 2, 3)
+    rows = read_rows(file, elements["chunk"])
+    chunks.reshape(n_chunks, 18)[:, : len(limits)] = np.stack([rows[name] for name in limits], axis=1)
+    packed = read_rows(file, elements["vertex"])
+    position, rotation, scale, color = (packed[name] for name in _COLUMNS)
     bytes_ = np.stack([(color >> shift) & 255 for shift in (24, 16, 8)], axis=1) / 255.0
     three = np.stack([(rotation >> shift) & 1023 for shift in (20, 10, 0)], axis=1) / 1023.0
     return Splats(
@@ -69,6 +72,7 @@ def read(file: BinaryIO) -> Splats:
         scales=np.exp(_between(chunks[:, 1], _unpacked_11_10_11(scale))).astype(np.float32),
         opacities=((color & 255) / 255.0).astype(np.float32),
         colors=_between(chunks[:, 2], bytes_).astype(np.float32),
+        sh_degree=round((len(elements["sh"].columns) / 3 + 1) ** 0.5) - 1 if "sh" in elements else 0,
     )
 
 

@@ -3,12 +3,14 @@ reference code for programs that want a row of 248 bytes."""
 
 from __future__ import annotations
 
-from typing import BinaryIO
+from os import SEEK_END
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from engine.export.formats.damaged import damaged
 from engine.export.splats import Splats, colors_of, opacities_of
+from engine.text import shown
 
 COLUMNS = (
     *("x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity"),
@@ -21,6 +23,18 @@ FULL_COLUMNS = (
 )
 """As the reference code of 3D Gaussian Splatting writes them."""
 _MAX_HEADER_BYTES = 1 << 16
+_MAX_DIGITS = 19
+_KINDS = {
+    **{name: "i1" for name in ("char", "int8")},
+    **{name: "u1" for name in ("uchar", "uint8")},
+    **{name: "<i2" for name in ("short", "int16")},
+    **{name: "<u2" for name in ("ushort", "uint16")},
+    **{name: "<i4" for name in ("int", "int32")},
+    **{name: "<u4" for name in ("uint", "uint32")},
+    **{name: "<f4" for name in ("float", "float32")},
+    **{name: "<f8" for name in ("double", "float64")},
+}
+"""Types of columns as files name them."""
 _ROWS = 1 << 16
 """Full rows made at a time."""
 
@@ -58,19 +72,28 @@ def _rows(splats: Splats) -> np.ndarray:
 
 
 def read(file: BinaryIO) -> Splats:
-    """Read a file of `write` or `write_full`. Raises ProjectError where it is something else."""
+    """Read a file of `write` or `write_full`, or one of another program: columns in any order, and others beside them.
+    Colours of higher degrees are left out. Raises ProjectError where it is something else."""
     elements = read_header(file)
-    names = tuple(elements.get("vertex", (0, ()))[1])
-    if names not in (COLUMNS, FULL_COLUMNS):
-        raise damaged("its columns differ")
-    rows = read_rows(file, elements["vertex"][0], len(names), "<f4")
-    rows = rows[:, [names.index(name) for name in COLUMNS]]
+    vertex = elements.get("vertex", PlyElement(0, {}))
+    missing = [name for name in COLUMNS if name not in vertex.columns]
+    if missing:
+        raise damaged(f"it has no column {missing[0]}")
+    if next(iter(elements)) != "vertex":
+        raise damaged("its Gaussians do not come first")
+    rows = read_rows(file, vertex)
+    rest = [name for name in vertex.columns if name.startswith("f_rest_")]
+
+    def columns(*names: str) -> np.ndarray:
+        return np.stack([rows[name] for name in names], axis=1).astype(np.float32, copy=False)
+
     return Splats(
-        means=rows[:, 0:3],
-        quats=rows[:, 10:14],
-        scales=np.exp(rows[:, 7:10].astype(np.float64)).astype(np.float32),
-        opacities=opacities_of(rows[:, 6]),
-        colors=colors_of(rows[:, 3:6]),
+        means=columns(*COLUMNS[0:3]),
+        quats=columns(*COLUMNS[10:14]),
+        scales=np.exp(columns(*COLUMNS[7:10]).astype(np.float64)).astype(np.float32),
+        opacities=opacities_of(rows["opacity"]),
+        colors=colors_of(columns(*COLUMNS[3:6])),
+        sh_degree=round((len(rest) / 3 + 1) ** 0.5) - 1 if any(rows[name].any() for name in rest) else 0,
     )
 
 
@@ -82,30 +105,41 @@ def header(elements: dict[str, tuple[int, str, tuple[str, ...]]]) -> bytes:
     return "\n".join([*lines, "end_header", ""]).encode("ascii")
 
 
-def read_header(file: BinaryIO) -> dict[str, tuple[int, list[str]]]:
-    """Elements in their order, each with its number of rows and its columns."""
-    if file.readline(16) != b"ply\n":
+class PlyElement(NamedTuple):
+    """An element in the head of a file: its number of rows, and the types of its columns by name."""
+
+    n_rows: int
+    columns: dict[str, str]
+
+
+def read_header(file: BinaryIO) -> dict[str, PlyElement]:
+    """Elements in their order. Raises ProjectError where it is not the head of a binary PLY file."""
+    if file.readline(16).rstrip() != b"ply":
         raise damaged("it is not a PLY file")
-    elements: dict[str, tuple[int, list[str]]] = {}
+    elements: dict[str, PlyElement] = {}
     while file.tell() < _MAX_HEADER_BYTES:
         match file.readline(_MAX_HEADER_BYTES).decode("ascii", "replace").split():
-            case ["element", name, number] if number.isdecimal():
-                elements[name] = int(number), []
-            case ["property", _, name] if elements:
-                list(elements.values())[-1][1].append(name)
+            case ["element", name, number] if number.isdecimal() and len(number) < _MAX_DIGITS:
+                elements[name] = PlyElement(int(number), {})
+            case ["property", kind, name] if elements and kind in _KINDS:
+                list(elements.values())[-1].columns[name] = _KINDS[kind]
+            case ["format", kind, *_] if kind != "binary_little_endian":
+                raise damaged(f"its format is {shown(kind)}, and only binary_little_endian is read")
             case ["end_header"]:
                 return elements
-            case ["format" | "comment", *_]:
+            case ["format" | "comment" | "obj_info", *_]:
                 pass
             case _:
                 break
     raise damaged("its head is not complete")
 
 
-def read_rows(file: BinaryIO, n_rows: int, n_columns: int, kind: str) -> np.ndarray:
-    """Rows of columns of one type. [n_rows, n_columns]"""
-    n_bytes = n_rows * n_columns * np.dtype(kind).itemsize
-    data = file.read(n_bytes)
-    if len(data) != n_bytes:
+def read_rows(file: BinaryIO, element: PlyElement) -> np.ndarray:
+    """The rows of an element, which come next. [n_rows] with a field for each column"""
+    kind = np.dtype(list(element.columns.items()))
+    n_bytes, at = element.n_rows * kind.itemsize, file.tell()
+    n_left = file.seek(0, SEEK_END) - at  # a head may announce what no memory holds
+    file.seek(at)
+    if n_bytes > n_left:
         raise damaged("it ends too early")
-    return np.frombuffer(data, kind).reshape(n_rows, n_columns)
+    return np.frombuffer(file.read(n_bytes), kind)

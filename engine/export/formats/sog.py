@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -36,6 +37,7 @@ def read(file: BinaryIO) -> Splats:
             def pixels(name: str) -> np.ndarray:
                 return pixels_of(member(archive, name, _MOST_MEMBER_BYTES), n, most_pixels=_MOST_PIXELS)
 
-            return splats_of(meta, pixels)
+            degree = int(meta["shN"].get("bands", 3)) if "shN" in meta else 0
+            return replace(splats_of(meta, pixels), sh_degree=degree)
     except (zipfile.BadZipFile, OSError, EOFError, zlib.error, ValueError, KeyError, IndexError, TypeError) as error:
         raise damaged(f"it is not a SOG file ({type(error).__name__})") from error

@@ -19,7 +19,7 @@ from engine.export.packing import as_levels, quats_of_smaller_three, smaller_thr
 from engine.export.splats import Splats, colors_of
 
 MAGIC = 0x5053474E
-VERSION = 3
+VERSION, _OLDER = 3, 2
 _HEAD = struct.Struct("<IIIBBBB")
 _USUAL_BITS = 12
 _MOST_BITS = 20
@@ -28,7 +28,7 @@ _STEPS_PER_SCALE = 16.0
 _COLOR_SCALE = 0.15
 _QUAT_TOP = 511
 _LEAST_BYTES = 20
-_MAX_BYTES = 1 << 32
+_MAX_BYTES = 1 << 30
 """Limit of an unzipped file that is read."""
 _MANY = 0.01
 """Share of the sides of Gaussians that are too thin from which on it is worth a word."""
@@ -65,35 +65,52 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
 
 
 def read(file: BinaryIO) -> Splats:
-    """Read a file of `write`, axes as stored. Raises ProjectError where it is something else."""
+    """Read a file of `write`, or one of version 2 or with colours of higher degrees, which are left out; axes as
+    stored. Raises ProjectError where it is something else."""
     try:
         with gzip.GzipFile(fileobj=file, mode="rb") as unzipped:
             head = unzipped.read(_HEAD.size)
             if len(head) < _HEAD.size:
                 raise damaged("it ends too early")
             magic, version, n, degree, bits, _, _ = _HEAD.unpack(head)
-            if (magic, version, degree) != (MAGIC, VERSION, 0) or bits > _MOST_BITS or n * _LEAST_BYTES > _MAX_BYTES:
-                raise damaged("it is not an SPZ file of version 3 with colours of degree 0")
-            data = unzipped.read(n * _LEAST_BYTES)
+            if magic != MAGIC or version not in (_OLDER, VERSION) or degree > 4 or bits > _MOST_BITS:
+                raise damaged(f"it is not an SPZ file of version {VERSION} or {_OLDER}")
+            n_bytes = n * (_LEAST_BYTES if version == VERSION else _LEAST_BYTES - 1)
+            if n_bytes > _MAX_BYTES:
+                raise damaged(f"it announces {n:,} Gaussians")
+            data = unzipped.read(n_bytes)
     except (OSError, EOFError, zlib.error) as error:
         raise damaged(f"unzipping failed ({error})") from error
-    if len(data) != n * _LEAST_BYTES:
+    if len(data) != n_bytes:
         raise damaged("it ends too early")
     values = np.frombuffer(data, np.uint8)
     position_bytes, alphas, colors, scales, rotation_bytes = np.split(values, np.cumsum([9, 1, 3, 3]) * n)
     wide = np.zeros((n, 3, 4), np.uint8)
     wide[:, :, 1:] = position_bytes.reshape(n, 3, 3)  # in the upper bytes, where the sign is; shifted down below
-    rotations = rotation_bytes.view("<u4")
-    parts = np.stack([(rotations >> shift) & 1023 for shift in (20, 10, 0)], axis=1)
-    three = (parts & _QUAT_TOP) * (np.sqrt(0.5) / _QUAT_TOP) * np.where(parts >> 9, -1.0, 1.0)
-    xyzw = quats_of_smaller_three((rotations >> 30).astype(np.int64), three)
+    xyzw = _quats(rotation_bytes) if version == VERSION else _older_quats(rotation_bytes)
     return Splats(
         means=((wide.view("<i4")[:, :, 0] >> 8) / 2.0**bits).astype(np.float32),
         quats=xyzw[:, [3, 0, 1, 2]],
         scales=np.exp(scales.reshape(n, 3) / 16.0 + LN_SCALES[0]).astype(np.float32),
         opacities=alphas.astype(np.float32) / 255.0,
         colors=colors_of((colors.reshape(n, 3) / 255.0 - 0.5) / _COLOR_SCALE),
+        sh_degree=degree,
     )
+
+
+def _quats(data: np.ndarray) -> np.ndarray:
+    """Of version 3: the three smaller numbers, and which is the largest. [N, 4] xyzw"""
+    rotations = data.view("<u4")
+    parts = np.stack([(rotations >> shift) & 1023 for shift in (20, 10, 0)], axis=1)
+    three = (parts & _QUAT_TOP) * (np.sqrt(0.5) / _QUAT_TOP) * np.where(parts >> 9, -1.0, 1.0)
+    return quats_of_smaller_three((rotations >> 30).astype(np.int64), three)
+
+
+def _older_quats(data: np.ndarray) -> np.ndarray:
+    """Of version 2: x, y and z of a rotation whose w is not negative. [N, 4] xyzw"""
+    xyz = data.reshape(-1, 3) / 127.5 - 1.0
+    w = np.sqrt(np.maximum(1.0 - (xyz**2).sum(1), 0.0))
+    return np.concatenate([xyz, w[:, None]], axis=1).astype(np.float32)
 
 
 def fractional_bits(splats: Splats) -> int:

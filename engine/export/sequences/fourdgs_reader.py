@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,8 @@ from engine.byte_cache import ByteCache
 from engine.errors import ProjectError
 from engine.export.sequences.fourdgs_writer import FPS_KEY
 from engine.export.sequences.sequence import SequenceTiming
-from engine.export.splats import Splats
+from engine.export.splats import PLY_UP, Splats
+from engine.export.world import AXES
 from engine.images.srgb import encoded_of
 
 USUAL_FPS = 30.0
@@ -84,6 +85,7 @@ class FourdgsReader:
                 self._windows = np.array(self._scene.windows or [(0.0, 0.0)], np.float64)
                 self._objects = indexed_reader.read_objects(self._file, self._scene)
                 self._fps, self._timing = self._read_timing()
+                self._up = _up_of(self._scene.header.attributes.get("coordinate_system", ""))
         except BaseException:
             self.close()
             raise
@@ -123,7 +125,7 @@ class FourdgsReader:
                 raise ValueError(f"{n_rows:,} Gaussians at one moment; at most {MAX_ROWS:,} are read")
             parts = [self._at(self._rows(entry), time_s) for entry in entries]
         columns = [np.concatenate([part[column] for part in parts]) for column in range(5)] if parts else _NO_COLUMNS
-        return Splats.from_arrays(*columns)
+        return replace(Splats.from_arrays(*columns), up=self._up)
 
     def _at(self, rows: _Rows, time_s: float) -> tuple[np.ndarray, ...]:
         """Means, quats, scales, opacities and colours of the rows that are there at a time."""
@@ -212,6 +214,13 @@ def _check_streams(chunk: bytes, n_rows: int) -> None:
         if n > n_rows:
             raise ValueError(f"a column has {n:,} rows, its chunk {n_rows:,}")
         cursor.take(n_bytes)
+
+
+def _up_of(system: str) -> tuple[float, float, float]:
+    """Which way is up in a coordinate system such as "z-up-right-handed"; as in most files where that says nothing."""
+    axis, is_said, _ = system.removeprefix("minus-").partition("-up")
+    sign = "-" if system.startswith("minus-") else "+"
+    return AXES.get(f"{sign}{axis}", PLY_UP) if is_said else PLY_UP
 
 
 def _number(text: str, otherwise: float) -> float:

@@ -31,6 +31,8 @@ SPAN_S = 10.0
 """What stands still is stated again after so long, so that a moment never needs many chunks."""
 FAINTEST = 5.0 / 255.0
 """Fainter Gaussians are left out: they are many, and all together nobody sees them."""
+NEAREST_AXIS = 0.999
+"""Cosine of the angle up to which an axis counts as up: 2.5 degrees."""
 LIMITS = (
     "Colours beyond the brightest white are cut off.",
     "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an eighth of a "
@@ -203,7 +205,7 @@ class _Chunks:
         }
         up = np.array(self._up)
         axis = int(np.abs(up).argmax())
-        if abs(up[axis]) > 1.0 - 1e-6:
+        if abs(up[axis]) > NEAREST_AXIS:
             sign = "" if up[axis] > 0 else "minus-"
             found["coordinate_system"] = f"{sign}{'xyz'[axis]}-up-right-handed"
         return found

@@ -18,9 +18,9 @@ def with_features(model: ClipModel, features: Features) -> ClipModel:
     Everything else stays, and is shared with the model, not copied: positions, cloud colours, scales, presence in
     time, decoder. So "static" is what the clip inherits or keeps at every time, with moving anchors still appearing
     and disappearing; "dynamic" is the decoder's start on the cloud's colours, changed by the field alone.
-    The variant is not for training: its anchor sets count as inherited.
+    The variant is not for training: its anchor sets count as inherited. A clip without features is itself in each.
     """
-    if features == "both":
+    if features == "both" or not model.has_features:
         return model
     sets = {}
     for role in model.roles():

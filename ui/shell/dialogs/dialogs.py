@@ -17,6 +17,7 @@ from imgui_bundle import portable_file_dialogs as native
 from app.project.opening.project_choices import ProjectChoices
 from app.session.captures.capture_commands import LookAtVideos
 from app.session.projects.project_commands import OpenCapture, OpenProject
+from engine.importing.suffixes import is_scene_file
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 
@@ -159,10 +160,11 @@ class OpenFolderDialog:
         ui.mark("open.path")
         folder = typed_path(self._text)
         is_folder = folder is not None and folder.is_dir()
+        is_scene = folder is not None and self._purpose == OPEN and is_scene_file(folder)
         if imgui.begin_child("folders", ImVec2(0, -46), imgui.ChildFlags_.borders):
             self._draw_folders(self._start if folder is None else folder if is_folder else folder.parent)
         imgui.end_child()
-        if not is_folder:
+        if not (is_folder or is_scene):
             imgui.align_text_to_frame_padding()
             imgui.text_colored(theme.ORANGE, f"{theme.Icon.WARNING}  There is no such folder")
             imgui.same_line()
@@ -170,12 +172,12 @@ class OpenFolderDialog:
         if imgui.button("Cancel", ImVec2(110, 0)):
             imgui.close_current_popup()
         imgui.same_line()
-        imgui.begin_disabled(not is_folder)
+        imgui.begin_disabled(not (is_folder or is_scene))
         is_clicked = imgui.button("Open" if self._purpose in (OPEN, READ_ONLY) else "Continue", ImVec2(120, 0))
         ui.mark("open.accept")
         imgui.end_disabled()
-        if (is_clicked or is_entered) and folder is not None and is_folder:
-            self._start = folder
+        if (is_clicked or is_entered) and folder is not None and (is_folder or is_scene):
+            self._start = folder if is_folder else folder.parent
             dispatch(self._answer(folder))
             imgui.close_current_popup()
         elif imgui.is_key_pressed(imgui.Key.escape, False):

@@ -1,0 +1,1 @@
+"""A scene of another program becomes a project."""

@@ -1,0 +1,141 @@
+"""A scene that another program made: views of it, but no pictures. Written by `clipgstream import`.
+
+imported.json names the frames, their rate and virtual cameras around the contents, so that the scene can be framed and
+exported like any other. Its Gaussians lie in the clips of the project.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, NoReturn
+
+import numpy as np
+from msgspec import Meta, Struct, to_builtins
+
+from engine.camera.rig import CameraRig
+from engine.capture.layout.format_checks import (
+    check_fps,
+    check_K,
+    check_names,
+    check_pose,
+    parse_matrix,
+    raise_problems,
+    read_json_object,
+)
+from engine.capture.layout.format_result import MATCH, CameraEntry, Layout, Probe
+from engine.capture.layout.limits import MAX_SIDE
+from engine.errors import CaptureError
+from engine.storage.files import atomic_path
+from engine.storage.json_files import json_text
+from engine.storage.typed_json import EntryError, to_type
+
+FORMAT = "imported scene"
+LAYOUT = "imported.json, the views of a scene from another program, which has no pictures"
+"""The layout in words."""
+FILE = "imported.json"
+NO_PICTURES = "This scene was imported and has no pictures."
+
+_Side = Annotated[int, Meta(ge=1, le=MAX_SIDE)]
+
+
+class ImportedView(Struct, frozen=True, forbid_unknown_fields=True):
+    """A virtual camera; as in capture.json."""
+
+    name: str
+    width: _Side
+    height: _Side
+    K: list[list[float]]
+    world_to_camera: list[list[float]]
+
+
+class ImportedDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """The whole file.
+
+    Attributes:
+        n_frames, fps: Of the scene.
+        source: File or folder that it was read from, as a name for people.
+        views: At least one.
+        notes: What of the scene is not kept, as sentences.
+    """
+
+    schema: Literal[1]
+    n_frames: Annotated[int, Meta(ge=1, lt=2**31)]
+    fps: float
+    source: str
+    views: list[ImportedView]
+    notes: list[str] = []
+
+
+@dataclass(frozen=True, slots=True)
+class NoFrames:
+    """The frames of a camera that took none."""
+
+    path: Path
+    n_frames: int
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Raises CaptureError."""
+        raise_no_pictures(self.path)
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+def raise_no_pictures(path: Path) -> NoReturn:
+    """Refuse what needs pictures. Raises CaptureError."""
+    raise CaptureError(NO_PICTURES, hint="It can be viewed, edited and exported, not trained or measured.", path=path)
+
+
+def probe(folder: Path) -> Probe:
+    """Whether the folder looks like this layout."""
+    return MATCH if (folder / FILE).is_file() else Probe(False, lacks=f"no {FILE}")
+
+
+def read(folder: Path, *, follow_links: bool = False) -> Layout:
+    """Read the views.
+
+    Raises:
+        CaptureError: Listing every problem found.
+    """
+    path = folder / FILE
+    try:
+        document = to_type(read_json_object(path), ImportedDocument)
+    except EntryError as error:
+        raise CaptureError(f"The file cannot be used ({error}).", hint="Import the scene again.", path=path) from error
+    problems = check_fps(document.fps, path) + check_names([view.name for view in document.views], path)
+    cameras, source = [], NoFrames(path, document.n_frames)
+    for view in document.views:
+        K, pose = parse_matrix(view.K, (3, 3)), parse_matrix(view.world_to_camera, (4, 4))
+        if K is None or pose is None:
+            problems.append(CaptureError(f'View "{view.name}" has no K or pose.', hint="Import again.", path=path))
+            continue
+        size = (view.width, view.height)
+        problems += check_K(view.name, K, size, path) + check_pose(view.name, pose, path)
+        cameras.append(CameraEntry(name=view.name, K=K, world_to_camera=pose, image_size=size, source=source))
+    raise_problems(problems, folder)
+    return Layout(
+        format=FORMAT,
+        cameras=tuple(cameras),
+        n_frames=document.n_frames,
+        fps=document.fps,
+        warnings=tuple(document.notes),
+        has_pictures=False,
+    )
+
+
+def write_imported(
+    folder: Path, rig: CameraRig, *, n_frames: int, fps: float, source: str, notes: Sequence[str]
+) -> None:
+    """Write the file into a folder. Inverse of `read`. Raises OSError."""
+    views = [
+        ImportedView(
+            name, int(rig.image_sizes[i, 0]), int(rig.image_sizes[i, 1]), rig.Ks[i].tolist(),
+            rig.world_to_camera[i].tolist(),
+        )
+        for i, name in enumerate(rig.names)
+    ]  # fmt: skip
+    document = ImportedDocument(1, n_frames, fps, source, views, list(notes))
+    with atomic_path(folder / FILE) as partial:
+        partial.write_text(json_text(to_builtins(document), indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Clips of Gaussians that other programs made."""
