@@ -44,6 +44,7 @@ from app.status import (
     DependencyStatus,
     JobStatus,
     OpeningForecast,
+    OtherStatus,
     Overlays,
     PlanStatus,
     ProjectStatus,
@@ -181,6 +182,8 @@ class SessionView(Protocol):
     def overlays(self) -> Overlays: ...
     @property
     def bookmarks(self) -> Bookmarks: ...
+    @property
+    def other_project(self) -> OtherStatus | None: ...
 
     # ---- edits
     @property

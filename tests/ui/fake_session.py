@@ -78,6 +78,7 @@ from app.status import (
     DependencyStatus,
     JobStatus,
     OpeningForecast,
+    OtherStatus,
     Overlays,
     PlanStatus,
     ProjectStatus,
@@ -310,6 +311,7 @@ class FakeSession:
         self.recording_status = RecordingStatus()
         self.timeline, self.views = Timeline(), Views()
         self.bookmarks = Bookmarks()
+        self.other_project: OtherStatus | None = None
         if has_capture:
             self._open(FakeCapture(make_rig()))
 

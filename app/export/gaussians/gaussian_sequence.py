@@ -161,6 +161,7 @@ class GaussianSequence:
             "axes": self._placement.text,
             "up": [round(value, 6) for value in self._placement.up],
             "scale": self._placement.scale,
+            "rotation": self._placement.rotation.tolist(),
             "meters_per_unit": None if meters_per_unit is None else meters_per_unit / self._placement.scale,
             "psnr_db": self.psnr_db,
             "min_psnr_db": self._kind.min_psnr_db,
