@@ -79,7 +79,7 @@ def _draw_versions(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
 
 def _draw_projects(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     """The other project, those opened lately, and any other."""
-    open_one, other, overlays = session.project, session.other_project, session.overlays
+    open_one, other, overlays = session.project_status, session.other_project, session.overlays
     if open_one is None:
         return
     imgui.separator()
