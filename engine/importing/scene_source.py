@@ -15,7 +15,7 @@ from msgspec import Meta, Struct
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed, natural_key
 from engine.capture.files.frame_runs import runs_of
 from engine.capture.files.places import place_in
-from engine.capture.formats.imported import ScenePlace
+from engine.capture.formats.imported import Quat, ScenePlace
 from engine.capture.layout.format_checks import read_json_object
 from engine.errors import CaptureError, ProjectError
 from engine.export.formats.compressed_ply import read as read_compressed
@@ -79,12 +79,12 @@ class _Sidecar(Struct, frozen=True):
     up: Vector
     files: list[dict[str, Any]]
     scale: float = 1.0
-    rotation: list[list[float]] | None = None
+    quat: Quat | None = None
 
     @property
     def place(self) -> ScenePlace | None:
         """Where the scene lies. Raises ValueError."""
-        return None if self.rotation is None else ScenePlace(self.rotation, self.scale)
+        return None if self.quat is None else ScenePlace(self.quat, self.scale)
 
 
 def is_scene(path: Path) -> bool:

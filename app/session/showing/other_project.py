@@ -26,6 +26,7 @@ from app.session.showing.look_commands import CompareProject
 from app.session.showing.showing import Showing
 from app.status import PROJECT, OtherStatus
 from app.training.clip_run import ShownState
+from engine.camera.rotations import matrices_of
 from engine.capture.clip import ClipSpans
 from engine.capture.formats.imported import read_place
 from engine.errors import ProjectError
@@ -209,4 +210,4 @@ def _open(path: Path, projects: Path, opened: OpenedProject, generation: int, co
 def _place(capture: Path) -> FileWorld:
     """Where our own export has placed an imported scene; any other lies as it is."""
     place = read_place(capture)
-    return FileWorld() if place is None else FileWorld(np.array(place.rotation), place.scale)
+    return FileWorld() if place is None else FileWorld(matrices_of(np.array(place.quat)), place.scale)

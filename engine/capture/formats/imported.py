@@ -6,6 +6,7 @@ exported like any other. Its Gaussians lie in the clips of the project.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,8 +37,10 @@ LAYOUT = "imported.json, the views of a scene from another program, which has no
 """The layout in words."""
 FILE = "imported.json"
 MAX_SCALE = 1e9
+QUAT_TOLERANCE = 1e-4
 NO_PICTURES = "This scene was imported and has no pictures."
 
+Quat = tuple[float, float, float, float]
 _Side = Annotated[int, Meta(ge=1, le=MAX_SIDE)]
 
 
@@ -55,18 +58,18 @@ class ScenePlace(Struct, frozen=True, forbid_unknown_fields=True):
     """Where an export of our own placed a scene: a rotation and a scale away from the capture that it was made of.
 
     Attributes:
-        rotation: [3, 3]
+        quat: wxyz, unit length.
         scale: Units of the scene per unit of that capture, > 0.
     """
 
-    rotation: list[list[float]]
+    quat: Quat
     scale: float
 
     def __post_init__(self) -> None:
         """Raises ValueError where it is no such thing."""
-        matrix = parse_matrix(self.rotation, (3, 3))
-        if matrix is None or not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-4) or np.linalg.det(matrix) < 0:
-            raise ValueError("its rotation is not valid")
+        length = math.hypot(*self.quat)
+        if not abs(length - 1.0) < QUAT_TOLERANCE:
+            raise ValueError(f"its quat has length {length:g}, not 1")
         if not 0.0 < self.scale < MAX_SCALE:
             raise ValueError(f"its scale is {self.scale:g}")
 

@@ -17,6 +17,7 @@ from app.session.projects.settings import Settings
 from app.session.session import Session
 from app.session.showing.look_commands import CompareProject, SetFrame
 from app.status import CAPTURED, PROJECT
+from engine.camera.rotations import quats_of
 from engine.export.formats.table import FORMATS
 from engine.export.world import world
 from engine.storage.json_files import json_text
@@ -35,7 +36,7 @@ def write_frames(folder: Path, n: int, *, is_placed: bool = False, has_sidecar: 
         with (folder / f"{number}.ply").open("wb") as file:
             FORMATS["ply"].write(PLACED.placed(splats) if is_placed else splats, file)
     if has_sidecar:
-        said = {"fps": 30.0, "up": PLACED.up, "scale": PLACED.scale, "rotation": PLACED.rotation.tolist()}
+        said = {"fps": 30.0, "up": PLACED.up, "scale": PLACED.scale, "quat": quats_of(PLACED.rotation).tolist()}
         (folder / "dance_export.json").write_text(json_text({**said, "files": [{"part": "all"}]}))
     return folder
 

@@ -316,11 +316,11 @@ def test_the_timeline_stands_before_the_log_until_it_is_asked_for(open_pilot: Op
 def test_an_imported_scene_says_that_nothing_was_trained(open_pilot: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     session, said = FakeSession(), list[str]()
     monkeypatch.setattr(training, "text_wrapped_dim", said.append)
-    open_pilot(session)
+    pilot = open_pilot(session)
     assert "This scene was imported; it has no training curves." not in said
     assert session.capture is not None
-    session.capture.has_pictures = False
+    session.capture = replace(session.capture, has_pictures=False)
     session.training = replace(session.training, next_clip_index=None)
-    open_pilot(session)
+    pilot.draw(3)
     assert "This scene was imported; it has no training curves." in said
     assert training.next_label(session).endswith("Imported from another program")  # type: ignore[arg-type]
