@@ -18,9 +18,8 @@ from engine.capture.files.places import place_in
 from engine.capture.formats.imported import Quat, ScenePlace
 from engine.capture.layout.format_checks import read_json_object
 from engine.errors import CaptureError, ProjectError
-from engine.export.formats.compressed_ply import read as read_compressed
 from engine.export.formats.damaged import damaged
-from engine.export.formats.table import FORMATS
+from engine.export.formats.table import read_file
 from engine.export.sequences.sequence import SequenceReader
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
@@ -224,11 +223,7 @@ class _Seen:
 
 
 def _read(path: Path, file: Any) -> Splats:
-    if path.suffix.lower() != ".ply":
-        return FORMATS[path.suffix.lower().removeprefix(".")].read(file)
-    head = file.read(1 << 12)
-    file.seek(0)
-    return read_compressed(file) if b"\nelement chunk " in head else FORMATS["ply"].read(file)
+    return read_file(path.suffix.lower(), file)
 
 
 def _frame_names(folder: Path) -> list[str]:
