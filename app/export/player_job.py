@@ -86,7 +86,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     clips, played = _clips(scene, job)
     scene.check(moment.frame for _, wanted in clips for one in wanted for moment in one.moments)
     n_frames = sum(len(wanted) for _, wanted in clips)
-    header: dict[str, Any] = scene_header(scene, clips[0][1][0].frame, step=job.frames.step if job.frames else 1)
+    header: dict[str, Any] = scene_header(scene, clips[0][1][0].frame, step=_step(job))
     header["stage"] = _stage(scene, clips[0][1][0], header["radius"])
     header["take"] = played
     header["folder"] = _relative_url(job.folder.name) if has_folder else None
@@ -202,7 +202,8 @@ def _scene(opened: TrainedProject, job: PlayerJob) -> SceneFrames:
 def _clips(scene: SceneFrames, job: PlayerJob) -> tuple[list[tuple[Clip, list[TakeFrame]]], list[int] | None]:
     """Clips with the frames of each that are wanted, and of a take which of all these each of its frames is; None as
     captured. A clip comes several times where different edits hold in it, so that still parts are still in each
-    stretch. What a take plays several times is there once. Raises ProjectError where one is not trained."""
+    stretch, and where frames are left out, so that the number of its first frame is enough to number all. What a take
+    plays several times is there once. Raises ProjectError where one is not trained."""
     frames = take_frames(scene, job.frames, has_timing=job.has_timing)
     played: list[int] | None = None
     if timing_of(scene, has_timing=job.has_timing) is not None:
@@ -212,12 +213,19 @@ def _clips(scene: SceneFrames, job: PlayerJob) -> tuple[list[tuple[Clip, list[Ta
         places = {one.moments: place for place, one in enumerate(frames)}
         played = [places[one.moments] for one in taken]
     clips: list[tuple[Clip, list[TakeFrame]]] = []
+    step, before = _step(job), None
     for one in frames:
         clip = scene.clip_at(one.frame)
-        if not clips or clips[-1][0] != clip or scene.effects(clips[-1][1][-1].frame) != scene.effects(one.frame):
+        is_next = before is not None and clips[-1][0] == clip and (played or one.number == before.number + step)
+        if before is None or not is_next or scene.effects(before.frame) != scene.effects(one.frame):
             clips.append((clip, []))
         clips[-1][1].append(one)
+        before = one
     return clips, played
+
+
+def _step(job: PlayerJob) -> int:
+    return job.frames.step if job.frames is not None else 1
 
 
 def _packed(

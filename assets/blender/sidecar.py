@@ -97,7 +97,7 @@ def _sequence(document: dict[str, Any], path: Path) -> Sequence:
             raise ValueError(f"its part {str(part)[:40]!r} is not known")
         if not name.endswith(".ply") or name.endswith(".compressed.ply"):
             raise SequenceProblem(f"Its files are not plain PLY files: {name[:80]}.", _EXPORT, path)
-        if Path(name).name != name or "\\" in name:
+        if Path(name).name != name or {"\\", "\0"} & set(name):
             raise ValueError("a file lies outside its folder")
         starts, paths = files.setdefault(part, ([], []))
         starts.append(row["frame"])

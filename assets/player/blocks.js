@@ -73,11 +73,11 @@ class Blocks {
           level++;
         }
       }
-      reader.cancel().catch(() => {});
     } catch (error) {
       if (error instanceof LoadError || signal.aborted) throw error;
       throw new LoadError(`${shown} cannot be read: ${stall.signal.aborted ? "the server does not answer" : error.message}.`, false);
     } finally {
+      stop(); // what was not read does not come any more
       clearTimeout(timer);
       signal.removeEventListener("abort", stop);
     }

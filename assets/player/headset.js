@@ -9,6 +9,7 @@ const EYE_HEIGHT_M = 1.6; // where the floor is not known
 const SORT_TURN = 0.01, SORT_WAY = 0.002; // radians, and of the scene's radius: less does not change the order visibly
 const SLOW_FRAMES = 30, LATE = 1.4, LEAST_SHARE = 0.5; // fewer lines are drawn after so many frames that come so late
 const BUTTON_A = 4, BUTTON_B = 5;
+const SAID_MS = 8000; // so long it is said why there is no session
 
 class Headset {
   constructor(player, button) {
@@ -35,10 +36,10 @@ class Headset {
       this.session = await navigator.xr.requestSession("immersive-vr", { optionalFeatures: ["local-floor"] });
       await this.start();
     } catch (error) {
-      button.title = `The headset did not start: ${error.message}`;
-      notify(button.title);
       if (this.session) await this.session.end().catch(() => {});
       this.session = null;
+      button.title = `The headset did not start: ${error.message}`;
+      player.pictures.interrupt(button.title, SAID_MS);
     }
     button.disabled = false;
   }
@@ -46,12 +47,13 @@ class Headset {
   async start() {
     const { session, player } = this;
     this.pageRenderer = player.renderer;
+    session.addEventListener("end", () => this.end());
     if (!(player.renderer instanceof Renderer)) { // sessions draw with WebGL
       player.renderer = new Renderer(document.createElement("canvas"), player.shaders, player.header.background, player.nLines);
+      player.followContext(player.renderer.canvas);
     }
     player.pictures.forget(); // the page may have been painted, or sorted elsewhere
     const { gl } = player.renderer;
-    session.addEventListener("end", () => this.end());
     session.addEventListener("select", (event) => this.select(event));
     session.addEventListener("squeeze", () => this.play());
     await gl.makeXRCompatible();
@@ -75,11 +77,16 @@ class Headset {
   }
 
   end() {
+    const { player } = this, { renderer } = player;
     this.session = null;
     this.isPlaced = false;
-    this.player.renderer = this.pageRenderer;
-    this.player.pictures.forget();
-    this.player.changed();
+    player.renderer = this.pageRenderer;
+    if (renderer !== this.pageRenderer) {
+      player.isLost = false; // if so, it was that one
+      renderer.gl.getExtension("WEBGL_lose_context")?.loseContext(); // gives its memory back
+    }
+    player.pictures.forget();
+    player.changed();
   }
 
   play() {
@@ -143,7 +150,7 @@ class Headset {
 
   /** A hand, or whatever has no thumbstick, goes where it points with its trigger; controllers play with it. */
   select({ inputSource, frame }) {
-    const target = hasStick(inputSource) ? null : this.aim(inputSource, frame);
+    const target = hasStick(inputSource) || !this.isPlaced ? null : this.aim(inputSource, frame);
     if (target) this.stage.go(target.point, this.head);
     else this.play();
   }

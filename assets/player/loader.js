@@ -40,10 +40,11 @@ class Loader {
 
   async start({ key, upTo }) {
     const failure = this.failure(key), wait = failure ? failure.againMs - performance.now() : 0;
-    const controller = new AbortController(), { signal } = controller, begunMs = performance.now(), nBefore = this.blocks.nReceived;
+    const controller = new AbortController(), { signal } = controller;
     this.running.set(key, controller);
     try {
       if (wait > 0) await waited(wait, signal);
+      const begunMs = performance.now(), nBefore = this.blocks.nReceived; // of all requests: they share the line
       await this.blocks.load(key, this.nArrived(key), upTo, signal, (first, data) => {
         if (signal.aborted) return;
         const n = typeof data === "string" ? this.blocks.about(key).parts.length : first + 1;
@@ -70,8 +71,9 @@ class Loader {
     this.onChange();
   }
 
-  /** The worker let go of a block. */
+  /** The worker does not have a block any more. */
   forget(key) {
+    this.running.get(key)?.abort(); // what it would bring belongs to what is gone
     this.levels.delete(key);
   }
 

@@ -1,7 +1,7 @@
 // Asks the worker for pictures, one at a time, the newest wish first, and says which blocks they need.
 
 const AHEAD_S = 6; // of playing are loaded beforehand where a server sends clips one by one
-const AHEAD_BYTES = 96 << 20; // unpacked, at most: half of what the worker keeps
+const AHEAD_BYTES = 96 << 20; // unpacked, at most: half of what the worker keeps, or what a larger clip that is shown leaves
 const COARSE = 2; // levels of the low quality
 const SHARE_OF_LINE = 0.8; // that playing may take
 
@@ -12,7 +12,7 @@ class Pictures {
    */
   constructor(header, blocks, workerSource, { upcoming, onPicture, onNotice }) {
     Object.assign(this, { header, blocks, upcoming, onPicture, onNotice });
-    this.isReady = this.isBusy = this.isStopped = false;
+    this.isReady = this.isBusy = this.isStopped = this.isInterrupted = false;
     this.wish = this.answered = null;
     this.epoch = 0; // another one after everything was forgotten
     this.nLevels = header.shared.parts.length;
@@ -59,8 +59,8 @@ class Pictures {
     wish.key = this.key(wish);
     loader.ask(this.needs(clipIndex));
     const failure = loader.failure("shared") || loader.failure(clipIndex);
-    if (failure) this.onNotice(failure.isFinal ? failure.message : `${failure.message} Trying again \u2026`, failure.isFinal);
-    else this.onNotice(isLoaded ? "" : "Loading \u2026", false);
+    if (failure) this.say(failure.isFinal ? failure.message : `${failure.message} Trying again \u2026`, failure.isFinal);
+    else this.say(isLoaded ? "" : "Loading \u2026", false);
     if (!this.isReady || !isLoaded || this.isBusy || wish.key === this.answered) return;
     this.isBusy = true;
     this.asked = wish.key;
@@ -75,10 +75,11 @@ class Pictures {
     const now = this.isPlaying ? Math.min(all, this.affordable(clipIndex, seconds(clipIndex))) : all;
     const needs = [["shared", 1, 0], [clipIndex, 1, 0], ["shared", all, 1], [clipIndex, now, 1]];
     const nBytes = (index) => clips[index].parts.reduce((sum, [, n]) => sum + n, 0);
+    const room = 2 * AHEAD_BYTES - Math.max(nBytes(clipIndex), AHEAD_BYTES);
     let ahead = 0, held = 0;
     for (const index of this.upcoming()) {
       if (index === clipIndex || (held > 0 && (ahead > AHEAD_S || !this.blocks.isStreamed))) continue;
-      if (held > 0 && held + nBytes(index) > AHEAD_BYTES) break;
+      if (held > 0 && held + nBytes(index) > room) break;
       needs.push([index, Math.min(all, this.affordable(index, seconds(index))), 2], [index, all, 3]);
       ahead += seconds(index);
       held += nBytes(index);
@@ -95,18 +96,32 @@ class Pictures {
     return Math.max(n, 1);
   }
 
+  say(text, canRetry) {
+    if (!this.isInterrupted) this.onNotice(text, canRetry);
+  }
+
+  /** Something else is said for so long. */
+  interrupt(text, ms) {
+    if (this.isStopped) return;
+    this.isInterrupted = true;
+    this.onNotice(text, false);
+    setTimeout(() => {
+      this.isInterrupted = false;
+      this.go();
+    }, ms);
+  }
+
   /** Nothing more can be shown. */
   stop(message) {
     this.isStopped = true;
     this.onNotice(message, false);
   }
 
-  /** Nothing of what was answered is there any more. */
+  /** Nothing of what was answered is there any more, and the next wish may be another kind of picture. */
   forget() {
     this.epoch++;
-    this.answered = null;
+    this.wish = this.answered = null;
     this.worker.postMessage({ kind: "forget" });
-    this.go();
   }
 
   receive(answer) {
@@ -121,8 +136,10 @@ class Pictures {
     }
     if (answer.kind === "failed") {
       const { key } = answer;
-      if (answer.of === "levels" && key !== "shared") this.loader.fail(key, `A clip is damaged: ${answer.message}`, true);
-      else this.stop(answer.message);
+      if (answer.of === "levels" && key !== "shared") {
+        this.loader.forget(key); // so that trying again asks for it again
+        this.loader.fail(key, `A clip is damaged: ${answer.message}`, true);
+      } else this.stop(answer.message);
     }
     if (answer.kind === "picture") {
       this.isBusy = false;

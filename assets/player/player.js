@@ -34,7 +34,7 @@ class Player {
     this.shaders = shaders;
     this.nLines = lines(nStill) + lines(nMoving);
     try {
-      this.renderer = device
+      this.renderer = device && GpuRenderer.canHold(device, this.nLines)
         ? new GpuRenderer(device, this.canvas, shaders["splats.wgsl"], header.background, this.nLines, (text) => this.pictures.stop(text))
         : new Renderer(this.canvas, shaders, header.background, this.nLines);
     } catch (error) {
@@ -48,7 +48,7 @@ class Player {
     const table = keyTable(this);
     fillKeySheet(table);
     followKeys(table);
-    this.followContext();
+    this.followContext(this.canvas);
     this.followSize();
     notify("Loading \u2026");
     this.changed();
@@ -102,7 +102,7 @@ class Player {
 
   tick(nowMs) {
     this.scheduled = 0;
-    if (this.headset.session) return; // which has its own pace
+    if (!this.renderer || this.headset.session) return; // which has its own pace
     this.passTime(nowMs);
     const isReady = this.renderer.isDone();
     if (isReady) {
@@ -120,7 +120,7 @@ class Player {
     if (isWanted && isReady) {
       this.renderer.draw(lens, this.header.near_plane, this.share === 1);
       this.isDrawn = true;
-      if (this.onScreen === null) document.getElementById("poster")?.remove();
+      document.getElementById("poster")?.remove();
       this.onScreen = this.shown;
     }
     this.tell();
@@ -254,13 +254,16 @@ class Player {
   }
 
   /** A driver may take the context away, as when a laptop wakes up; everything is sent again then. */
-  followContext() {
-    this.canvas.addEventListener("webglcontextlost", (event) => {
+  followContext(canvas) {
+    canvas.addEventListener("webglcontextlost", (event) => {
+      if (this.renderer.canvas !== canvas) return; // of a headset that was put down
       event.preventDefault();
       this.isLost = true;
       this.shown = this.onScreen = null;
+      if (this.headset.isPlaced) this.headset.session.end().catch(() => {}); // its pictures went with the context
     });
-    this.canvas.addEventListener("webglcontextrestored", () => {
+    canvas.addEventListener("webglcontextrestored", () => {
+      if (this.renderer.canvas !== canvas) return;
       this.isLost = false;
       this.renderer.begin();
       this.pictures.forget();

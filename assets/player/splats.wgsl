@@ -7,7 +7,9 @@ struct View {
     center_px: vec2f,
     size_px: vec2f,
     near: f32,
-    n: u32, // rows
+    n_still: u32, // rows that are seen of what stands still, from 0 on
+    first_moving: u32,
+    end: u32, // of the rows that are seen of what moves
 }
 
 struct Row {
@@ -67,7 +69,7 @@ fn project(@builtin(global_invocation_id) at: vec3u) {
         return;
     }
     pairs[id] = vec2u(NOT_SEEN, id);
-    if (id >= view.n) {
+    if (id >= view.end || (id >= view.n_still && id < view.first_moving)) {
         return;
     }
     let row = rows[id];

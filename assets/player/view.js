@@ -9,7 +9,7 @@ const sum = (a, b, share = 1) => [a[0] + share * b[0], a[1] + share * b[1], a[2]
 const scaled = (a, factor) => [factor * a[0], factor * a[1], factor * a[2]];
 
 class View {
-  /** header: up, cameras, focus, radius and home, as in docs/player_format.md. */
+  /** header: up, cameras, radius and home, as in docs/player_format.md. */
   constructor(header) {
     this.up = header.up;
     this.cameras = header.cameras;

@@ -2,36 +2,40 @@
 // asks nothing of the worker. As of Renderer from outside.
 
 const GROUP = 256, PAIR_BYTES = 8, ROW_BYTES = 16 * TEXELS_PER_ROW, ELLIPSE_BYTES = 48, STEP_BYTES = 256;
-const VIEW_FLOATS = 24;
+const VIEW_FLOATS = 28;
 
 /** A device of WebGPU, or null where there is none, or where the processor plays it, which is slower than to paint. */
 async function graphicsDevice() {
   const gl = navigator.gpu && document.createElement("canvas").getContext("webgl2");
   if (!gl || isSoftware(gl)) return null; // nothing is asked for in vain, which browsers warn about
   const adapter = await navigator.gpu.requestAdapter({ powerPreference: "high-performance" }).catch(() => null);
-  if (!adapter || adapter.info.isFallbackAdapter) return null;
+  if (!adapter || (adapter.info?.isFallbackAdapter ?? adapter.isFallbackAdapter)) return null; // older browsers have it there
   const { maxBufferSize, maxStorageBufferBindingSize } = adapter.limits;
   return adapter.requestDevice({ requiredLimits: { maxBufferSize, maxStorageBufferBindingSize } }).catch(() => null);
 }
 
 class GpuRenderer {
-  /** device: as of graphicsDevice; nLines: as of Renderer. Throws where that is too much for the card. onLost(text) */
+  /** Are textures of so many lines not too much for a device? */
+  static canHold({ limits }, nLines) {
+    const nRows = ROWS_PER_LINE * nLines;
+    return nRows * ROW_BYTES <= limits.maxStorageBufferBindingSize && pairsOf(nRows) <= GROUP * limits.maxComputeWorkgroupsPerDimension;
+  }
+
+  /** device: as of graphicsDevice; nLines: as of Renderer, so many that it can hold. onLost(text) */
   constructor(device, canvas, source, background, nLines, onLost) {
     const nRows = ROWS_PER_LINE * Math.max(nLines, 1);
-    if (nRows * ROW_BYTES > device.limits.maxStorageBufferBindingSize) throw new Error("There are more Gaussians than fit.");
     Object.assign(this, { device, canvas, background });
     this.sortsItself = true;
     this.isSoftware = this.isBusy = false;
-    this.fullMs = this.nRows = 0;
+    this.fullMs = this.nStill = this.firstMoving = this.nMoving = 0;
     this.size = [0, 0];
     this.context = canvas.getContext("webgpu");
     const format = navigator.gpu.getPreferredCanvasFormat();
     this.context.configure({ device, format, alphaMode: "opaque" });
-    this.nPairs = 2 * GROUP;
-    while (this.nPairs < nRows) this.nPairs *= 2;
+    this.nPairs = pairsOf(nRows);
     this.buffers(nRows);
     this.pipelines(device.createShaderModule({ code: source }), format);
-    device.lost.then(({ reason, message }) => reason !== "destroyed" && onLost(`The graphics card has gone away: ${message} Load the page again.`));
+    device.lost.then(({ reason }) => reason !== "destroyed" && onLost("The graphics card has gone away. Load the page again."));
   }
 
   buffers(nRows) {
@@ -96,13 +100,13 @@ class GpuRenderer {
   /** See Renderer. */
   take(answer) {
     const { queue } = this.device;
+    [this.nStill, this.nMoving] = answer.nSeen;
     if (!answer.movingGeometry) return;
-    const first = ROWS_PER_LINE * lines(answer.nStill);
+    const first = (this.firstMoving = ROWS_PER_LINE * lines(answer.nStill));
     if (answer.stillGeometry) queue.writeBuffer(this.rows, 0, answer.stillGeometry);
     if (answer.stillColors) queue.writeBuffer(this.colors, 0, answer.stillColors);
     queue.writeBuffer(this.rows, first * ROW_BYTES, answer.movingGeometry);
     queue.writeBuffer(this.colors, first * 16, answer.movingColors);
-    this.nRows = first + answer.nMoving;
   }
 
   resize() {
@@ -127,7 +131,7 @@ class GpuRenderer {
     const values = new Float32Array(VIEW_FLOATS), m = lens.worldToCamera;
     values.set([0, 1, 2, 3].flatMap((column) => [0, 1, 2, 3].map((row) => m[4 * row + column])));
     values.set([...lens.focal, ...lens.center, ...this.size, near], 16);
-    new Uint32Array(values.buffer)[VIEW_FLOATS - 1] = this.nRows;
+    new Uint32Array(values.buffer).set([this.nStill, this.firstMoving, this.firstMoving + this.nMoving], 23);
     device.queue.writeBuffer(this.view, 0, values);
     device.queue.writeBuffer(this.arguments, 0, new Uint32Array([4, 0, 0, 0]));
     const commands = device.createCommandEncoder(), compute = commands.beginComputePass();
@@ -164,4 +168,9 @@ class GpuRenderer {
     };
     device.queue.onSubmittedWorkDone().then(done, done); // refused where the card has gone away, which is said elsewhere
   }
+}
+
+/** So many are sorted to have so many rows in order: a power of two. */
+function pairsOf(nRows) {
+  return Math.max(2 * GROUP, 2 ** Math.ceil(Math.log2(nRows)));
 }

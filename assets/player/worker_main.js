@@ -35,9 +35,9 @@ const answers = {
     if (built.frame !== frame || built.clip !== clip || built.nLevels !== clip.levels.length) {
       build(clip, frame, frame - scene.header.clips[clipIndex].first, answer, Boolean(view));
     }
-    if (!row) return answer;
     const { still, moving, kept } = built, first = lines(still.n) * ROWS_PER_LINE;
     const seen = (shapes) => shapes.ends[Math.min(nLevels, shapes.ends.length) - 1];
+    if (!row) return { ...answer, nSeen: [seen(still), seen(moving)] };
     const parts = [{ means: still.means, n: seen(still), first: 0 }, { means: moving.means, n: seen(moving), first }];
     const order = sorter.order(parts, row, near, view ? 1 : CORNERS);
     if (!view) {
@@ -65,7 +65,6 @@ function build(clip, frame, inClip, answer, isKept) {
     return;
   }
   answer.nStill = built.still.n;
-  answer.nMoving = shapes.n;
   for (const [name, array] of Object.entries(made)) give(answer, name, array);
 }
 

@@ -7,10 +7,7 @@ class Scene {
     this.header = header;
     this.shared = []; // rows that clips share, by level
     this.clips = new Map(); // by number, the one asked for last comes last
-  }
-
-  get nShared() {
-    return this.shared.length;
+    this.shown = null; // number of the one that a picture was made of last
   }
 
   /** Packed bytes of levels of a block, one after the other, from level `first` on. */
@@ -20,15 +17,15 @@ class Scene {
       const [nPacked, nBytes] = parts[level];
       const bytes = await inflated(packed.subarray(at, at + nPacked), nBytes);
       at += nPacked;
-      if (key === "shared") this.addShared(level, new BlockReader(bytes));
-      else this.clipToFill(key).waiting[level] = bytes;
+      if (key === "shared") {
+        this.shared[level] = new BlockReader(bytes).rows(this.header.shared.levels[level]);
+        continue;
+      }
+      const clip = this.clipToFill(key);
+      if (level >= clip.levels.length) clip.waiting[level] = bytes; // some come again where others were damaged
     }
     for (const clip of this.clips.values()) this.settle(clip);
     return this.makeRoom(key);
-  }
-
-  addShared(level, reader) {
-    this.shared[level] = reader.rows(this.header.shared.levels[level]);
   }
 
   clipToFill(index) {
@@ -41,7 +38,7 @@ class Scene {
 
   /** Unpack what a clip has, as far as what clips share is there. */
   settle(clip) {
-    while (clip.levels.length < this.nShared && clip.waiting[clip.levels.length]) {
+    while (clip.levels.length < this.shared.length && clip.waiting[clip.levels.length]) {
       const level = clip.levels.length;
       clip.levels.push(this.unpacked(clip.index, level, new BlockReader(clip.waiting[level])));
       clip.waiting[level] = null;
@@ -65,7 +62,7 @@ class Scene {
     for (const clip of this.clips.values()) held += size(clip);
     for (const [index, clip] of this.clips) {
       if (held <= CLIPS_BYTES || this.clips.size <= 2) break;
-      if (index === newest) continue;
+      if (index === newest || index === this.shown) continue;
       this.clips.delete(index);
       gone.push(index);
       held -= size(clip);
@@ -75,6 +72,7 @@ class Scene {
 
   clip(index) {
     const clip = this.clips.get(index);
+    this.shown = index;
     if (clip) {
       this.clips.delete(index);
       this.clips.set(index, clip);

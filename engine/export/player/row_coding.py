@@ -161,11 +161,6 @@ def encoded_steps(steps: np.ndarray) -> bytes:
     return b"".join(np.ascontiguousarray(plane.T).tobytes() for plane in planes)
 
 
-def differences(values: np.ndarray) -> np.ndarray:
-    """Each row less the row before it, the first one less zero, with signs folded in. [N, k] uint8 or uint16"""
-    return folded(np.diff(values, axis=0, prepend=np.zeros_like(values[:1], shape=(1, *values.shape[1:]))))
-
-
 def folded(steps: np.ndarray) -> np.ndarray:
     """Steps modulo 256 or 65536 as 0, -1, 1, -2, 2 ... counted from 0, so that small ones are small. Same dtype"""
     signed = steps.view(np.int16 if steps.dtype == np.uint16 else np.int8)

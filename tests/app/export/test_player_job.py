@@ -14,7 +14,7 @@ import pytest
 from app.evaluation.headless import TrainedProject
 from app.export import player_job
 from app.export.export_progress import ExportProgress
-from app.export.picked_frames import PickedFrames
+from app.export.picked_frames import PickedFrames, picked_frames
 from app.export.player_job import PlayerJob, estimate, run
 from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
@@ -70,6 +70,11 @@ def test_clips_say_where_they_lie_in_the_capture(opened: TrainedProject, tmp_pat
         (1, 1, 3),
     ]
     assert header["fps"] == opened.capture.fps
+    run(opened, PlayerJob(tmp_path / "gap.html", picked_frames([(0, 1), (2, 5)], 1)), ignore)
+    places = [
+        (clip["clip_index"], clip["first"], clip["frame_index"]) for clip in header_of(tmp_path / "gap.html")["clips"]
+    ]
+    assert places == [(0, 0, 0), (0, 1, 2), (1, 2, 3)]
     assert [camera["name"] for camera in header["cameras"]] == list(opened.capture.rig.names)
 
 

@@ -101,6 +101,7 @@ def test_a_description_becomes_a_sequence(addon: Any, tmp_path: Path):
         ({"files": [{"file": "p.sog", "part": "all", "frame": 0}]}, "not plain PLY files: p.sog"),
         ({"files": [{"file": "p.compressed.ply", "part": "all", "frame": 0}]}, "not plain PLY files"),
         ({"files": [{"file": "../p.ply", "part": "all", "frame": 0}]}, "outside its folder"),
+        ({"files": [{"file": "p\0.ply", "part": "all", "frame": 0}]}, "outside its folder"),
         ({"files": [{"file": "p.ply", "part": "some", "frame": 0}]}, "'some' is not known"),
         ({"files": [{"file": "p.ply", "part": "all", "frame": 1 << 80}]}, "not a whole number"),
         ({"files": [{"file": 5, "part": "all", "frame": 0}]}, "not the description"),

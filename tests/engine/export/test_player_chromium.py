@@ -13,7 +13,9 @@ import pytest
 import torch
 
 from engine.backends.table import backend_called
-from engine.export.player.blocks import joined
+from engine.export.player.blocks import Packer, joined
+from engine.export.player.moving_rows import NamedRows
+from engine.export.player.page import page_writer
 from engine.raster.rasterize import rasterize
 from tests.browser import AS_A_CARD, AS_A_CARD_WITH_WEBGPU, WEBGPU_FLAGS, WITHOUT_WEBGPU, Browser, chromium
 from tests.player_scenes import (
@@ -154,6 +156,9 @@ def test_all_ways_of_drawing_make_the_same_picture(page: Path, tmp_path: Path):
             for view in range(3):
                 browser.value(f"void clipgstreamPlayer.go({3 * view}); void clipgstreamPlayer.look({view})")
                 pictures[way, view] = drawn(browser)
+            browser.value("void (clipgstreamPlayer.pictures.quality = 'low'); void clipgstreamPlayer.changed()")
+            pictures[way, "low"] = drawn(browser)
+            assert psnr(pictures[way, "low"], pictures[way, 2]) < LEAST_PSNR
             assert bool(state(browser, "renderer.painted instanceof WebGLTexture")) == (way == "painted")
             assert browser.console == []
     assert ("painted", 2) in pictures
@@ -308,6 +313,24 @@ def test_what_was_drawn_comes_back_after_the_context_was_lost(browser: Browser):
     browser.wait("!clipgstreamPlayer.isLost")
     assert psnr(drawn(browser), before) > 60.0
     browser.console[:] = [said for said in browser.console if "CONTEXT_LOST" not in said and "context lost" not in said]
+
+
+def test_a_single_frame_of_nothing_is_the_background(shared_browser: Browser, tmp_path: Path):
+    packer, about = Packer(), header()
+    nothing = still(0, 0)[:0]
+    block = packer.clip(1, lambda frame: nothing, lambda frame: NamedRows(nothing))
+    assert packer.shared is not None
+    about["shared"] = packer.shared.description
+    about["clips"].append({"clip_index": 0, "name": "one", "first": 0, "frame_index": 0, **block.description})
+    page = tmp_path / "nothing.html"
+    with page.open("w", encoding="utf-8") as stream, page_writer(stream, about) as writer:
+        writer.block("one", block)
+        writer.block("shared", packer.shared)
+    show(shared_browser, page)
+    shared_browser.key(" ", text=" ", code="Space")
+    assert np.abs(drawn(shared_browser) - np.array(BACKGROUND)).max() < 1.5 / 255
+    assert not state(shared_browser, "clock.isPlaying")
+    assert shared_browser.console == []
 
 
 def test_names_are_shown_as_they_are(shared_browser: Browser, tmp_path: Path):

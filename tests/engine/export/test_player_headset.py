@@ -234,6 +234,35 @@ def test_without_a_known_floor_it_is_below_the_head(browser: Browser):
     assert state(browser, "headset.head")[1] == pytest.approx(1.6, abs=0.02)
 
 
+def test_a_lost_context_ends_the_session_and_the_page_goes_on(browser: Browser):
+    browser.value("void (window.loss = clipgstreamPlayer.renderer.gl.getExtension('WEBGL_lose_context')).loseContext()")
+    browser.wait(f"clipgstreamPlayer.isLost && {HEADSET}.session === null")
+    browser.value("void loss.restoreContext()")
+    browser.wait("!clipgstreamPlayer.isLost && clipgstreamPlayer.isDrawn")
+    assert state(browser, "onScreen") == 0
+    known = ("CONTEXT_LOST", "context lost", "onDeviceFrame")  # the last is the emulator's own, which asks the context
+    browser.console[:] = [said for said in browser.console if not any(one in said for one in known)]
+
+
+def test_why_no_session_begins_can_be_read(tmp_path: Path):
+    page = write_page(tmp_path / "scene.html", header())
+    with Browser(tmp_path) as browser:
+        browser.before_pages(
+            "Object.defineProperty(Navigator.prototype, 'xr', {value: {isSessionSupported: async () => true,"
+            " requestSession: async () => { throw new Error('It sleeps.'); }}});"
+        )
+        browser.open(page)
+        browser.wait("window.clipgstreamPlayer && clipgstreamPlayer.isDrawn")
+        browser.wait("!document.getElementById('headset').hidden")
+        browser.value("clipgstreamPlayer.play(true)")
+        browser.value("document.getElementById('headset').click()")
+        browser.wait("!document.getElementById('headset').disabled")
+        browser.wait("clipgstreamPlayer.onScreen > 2")
+        words = browser.value("document.getElementById('notice').innerText")
+        assert words == "The headset did not start: It sleeps."
+        assert browser.console == []
+
+
 def test_the_button_is_there_where_a_headset_is(tmp_path: Path):
     page = write_page(tmp_path / "scene.html", header())
     with Browser(tmp_path) as browser:

@@ -15,7 +15,7 @@ from engine.conventions import ALPHA_MIN
 from engine.export.player.blocks import Packer, joined
 from engine.export.player.moving_rows import NamedRows
 from engine.export.player.page import json_for_html, web_shader
-from engine.export.player.row_coding import POSITION_SHARE, differences, fitting_rounding
+from engine.export.player.row_coding import POSITION_SHARE, encoded_steps, fitting_rounding, folded
 from engine.export.player.still_part import shared_rows, still_part
 from engine.export.splats import Splats
 from tests.player_scenes import LENGTHS, N_FRAMES, header, made_splats, moving, places, still, write_page
@@ -107,10 +107,11 @@ def test_shaders_are_those_of_the_window():
 
 
 def test_differences_wrap_around():
-    values = np.array([[0], [255], [0], [128], [0]], np.uint8)
-    assert differences(values).ravel().tolist() == [0, 1, 2, 255, 255]  # 0, -1, +1, -128, -128
-    assert differences(np.array([[65535], [0]], np.uint16)).ravel().tolist() == [1, 2]
-    assert differences(np.zeros((0, 3), np.uint8)).shape == (0, 3)
+    assert folded(np.array([0, 255, 1, 128, 127], np.uint8)).tolist() == [0, 1, 2, 255, 254]  # 0, -1, +1, -128, +127
+    assert folded(np.array([65535, 1], np.uint16)).tolist() == [1, 2]
+    steps = np.array([[65536] * 3 + [256] * 11, [-65537] * 3 + [-257] * 11])  # 0 and -1, once around
+    assert encoded_steps(steps) == bytes([0, 1] * 3 + [0, 0] * 3 + [0, 1] * 11)
+    assert encoded_steps(steps[:0]) == b""
 
 
 def test_rows_that_are_the_same_twice_are_two_rows():

@@ -153,6 +153,23 @@ def test_what_is_missing_is_said_until_it_is_there(browser: Browser, server: Ran
     assert len(asked(server, "clip2.bin")) > n
 
 
+def test_a_damaged_clip_is_asked_for_again(browser: Browser, server: RangeServer):
+    path = server.folder / "scene_data" / "clip1.bin"
+    data = path.read_bytes()
+    go_to(browser, server.url("scene.html"), until="window.clipgstreamPlayer?.header")
+    first = state(browser, "header.clips[1].parts[0][0]")
+    path.write_bytes(data[: first + 2] + b"\xff" * (len(data) - first - 2))  # all but what comes first
+    go_to(browser, server.url("scene.html"), until=SETTLED)
+    browser.value(f"void clipgstreamPlayer.go({LENGTHS[0]})")
+    browser.wait("document.getElementById('words').textContent.startsWith('A clip is damaged')")
+    path.write_bytes(data)
+    browser.value("document.getElementById('again').click()")
+    browser.wait(FULL)
+    assert browser.value("document.getElementById('notice').hidden")
+    assert label(browser).startswith(f"Frame {LENGTHS[0]} of")
+    assert browser.console == []
+
+
 def test_lengths_that_lie_are_found_before_memory_is_taken(browser: Browser, server: RangeServer):
     page = server.folder / "scene.html"
     text = page.read_text(encoding="utf-8")
