@@ -79,6 +79,42 @@ def test_a_turned_and_scaled_prim_lies_where_the_stage_has_it(path: Path):
     np.testing.assert_allclose(found.scales, 2.0 * live.scales, rtol=1e-4)
 
 
+def test_the_way_up_comes_from_the_stage(path: Path):
+    Usd, UsdGeom = modules("Usd", "UsdGeom")
+    assert usd.UsdReader(path).splats(0).up == (0.0, 1.0, 0.0)
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    turned = path.with_stem("turned")
+    stage.GetRootLayer().Export(str(turned))
+    assert usd.UsdReader(turned).splats(0).up == (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("radiance:sphericalHarmonicsDegree = 0", "radiance:sphericalHarmonicsDegree = -1"),
+        ("int radiance:sphericalHarmonicsDegree = 0", 'string radiance:sphericalHarmonicsDegree = "x"'),
+        ("point3f[] positions = [(0, 0, 0)]", 'string[] positions = ["a"]'),
+    ],
+)
+def test_values_of_another_type_are_refused(tmp_path: Path, name: str, value: str):
+    pytest.importorskip("pxr")
+    lines = (
+        "point3f[] positions = [(0, 0, 0)]",
+        "quatf[] orientations = [(1, 0, 0, 0)]",
+        "float3[] scales = [(1, 1, 1)]",
+        "float[] opacities = [0.5]",
+        "float3[] radiance:sphericalHarmonicsCoefficients = [(0, 0, 0)]",
+        "int radiance:sphericalHarmonicsDegree = 0",
+    )
+    text = "#usda 1.0\ndef ParticleField3DGaussianSplat \"a\" {\n" + "\n".join(lines) + "\n}\n"
+    (tmp_path / "good.usda").write_text(text)
+    assert len(usd.UsdReader(tmp_path / "good.usda").splats(0)) == 1
+    (tmp_path / "bad.usda").write_text(text.replace(name, value))
+    with pytest.raises(ProjectError, match="of another type"):
+        usd.UsdReader(tmp_path / "bad.usda").splats(0)
+
+
 def test_bad_files_are_refused(path: Path, tmp_path: Path):
     (Usd,) = modules("Usd")
     for name, data in (("cut.usdc", path.read_bytes()[:300]), ("no.usdc", b"no"), ("no.usda", b"#usda 9.0\n)")):
