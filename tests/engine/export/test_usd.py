@@ -19,7 +19,7 @@ from tests.engine.export.scenes import order_of
 
 
 def test_without_the_library_the_remedy_is_said(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.setitem(sys.modules, "pxr.Tf", None)
     with pytest.raises(ProjectError, match=r"pip install 'clipgstream\[usd\]'"):
         SEQUENCES["usd"].check()
 
@@ -107,7 +107,7 @@ def test_values_of_another_type_are_refused(tmp_path: Path, name: str, value: st
         "float3[] radiance:sphericalHarmonicsCoefficients = [(0, 0, 0)]",
         "int radiance:sphericalHarmonicsDegree = 0",
     )
-    text = "#usda 1.0\ndef ParticleField3DGaussianSplat \"a\" {\n" + "\n".join(lines) + "\n}\n"
+    text = '#usda 1.0\ndef ParticleField3DGaussianSplat "a" {\n' + "\n".join(lines) + "\n}\n"
     (tmp_path / "good.usda").write_text(text)
     assert len(usd.UsdReader(tmp_path / "good.usda").splats(0)) == 1
     (tmp_path / "bad.usda").write_text(text.replace(name, value))
