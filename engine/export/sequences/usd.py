@@ -21,7 +21,7 @@ from engine.export.player.blocks import joined
 from engine.export.sequences.sequence import SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
 from engine.export.splats import Splats, colors_of
-from engine.export.usd_library import usd_module
+from engine.export.usd_library import usd_module, writing_usd
 from engine.export.world import AXES, FileWorld
 
 LIMITS = (
@@ -81,10 +81,8 @@ class _UsdFile:
     def __init__(self, path: Path, timing: SequenceTiming) -> None:
         self._pxr = _library()
         usd, geom = self._pxr.Usd, self._pxr.UsdGeom
-        try:
+        with writing_usd():
             self._stage = usd.Stage.CreateNew(str(path))
-        except self._pxr.Tf.ErrorException as error:
-            raise OSError(f"USD cannot write here: {error}") from error
         self._n_frames, self._n_still = timing.n_frames, 0
         self._up: tuple[float, float, float] | None = None
         self._stage.SetDefaultPrim(geom.Xform.Define(self._stage, ROOT).GetPrim())
@@ -144,10 +142,8 @@ class _UsdFile:
 
     def save(self) -> None:
         """Put down what there is, so that memory stays free. Raises OSError."""
-        try:
+        with writing_usd():
             self._stage.Save()
-        except self._pxr.Tf.ErrorException as error:
-            raise OSError(f"USD cannot write here: {error}") from error
 
     def notes(self) -> tuple[str, ...]:
         """See `write`."""

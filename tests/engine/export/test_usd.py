@@ -14,6 +14,7 @@ from engine.errors import ProjectError
 from engine.export.sequences import usd
 from engine.export.sequences.sequence import SequenceTiming
 from engine.export.sequences.table import SEQUENCES
+from engine.export.usd_library import writing_usd
 from tests.engine.export.made_sequence import FPS, N_FRAMES, STRETCH_FRAMES, MadeSequence
 from tests.engine.export.scenes import order_of
 
@@ -113,6 +114,14 @@ def test_values_of_another_type_are_refused(tmp_path: Path, name: str, value: st
     (tmp_path / "bad.usda").write_text(text.replace(name, value))
     with pytest.raises(ProjectError, match="of another type"):
         usd.UsdReader(tmp_path / "bad.usda").splats(0)
+
+
+def test_where_nothing_can_be_written_the_reason_is_one_line(tmp_path: Path):
+    pytest.importorskip("pxr")
+    (tmp_path / "file").write_text("")
+    (Usd,) = modules("Usd")
+    with pytest.raises(OSError, match=r"^USD: [^\n]+$"), writing_usd():
+        Usd.Stage.CreateNew(str(tmp_path / "file" / "a.usda"))
 
 
 def test_bad_files_are_refused(path: Path, tmp_path: Path):
