@@ -134,7 +134,7 @@ def _fill(
         (clips / f"{index}").rename(clips / f"{clip_name(index, tuple(bounds), clip_length)}.safetensors")
     report(source.n_frames, source.n_frames)
     rig = contents.views(np.array(AXES[up] if up is not None else source.up or PLY_UP))
-    write_imported(scene, rig, n_frames=source.n_frames, fps=fps, source=name, notes=source.notes)
+    write_imported(scene, rig, n_frames=source.n_frames, fps=fps, source=name, notes=source.notes, place=source.place)
     settings = ProjectSettings(
         capture=str(scene.resolve()),
         fingerprint=open_capture(scene).fingerprint,

@@ -15,6 +15,7 @@ from msgspec import Meta, Struct
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed, natural_key
 from engine.capture.files.frame_runs import runs_of
 from engine.capture.files.places import place_in
+from engine.capture.formats.imported import Quat, ScenePlace
 from engine.capture.layout.format_checks import read_json_object
 from engine.errors import CaptureError, ProjectError
 from engine.export.formats.damaged import damaged
@@ -43,10 +44,12 @@ class SceneSource(Protocol):
     Attributes:
         fps: Frames per second; None where nothing says so.
         up: Which way is up; None where nothing says so.
+        place: Where an export of our own placed it; None where nothing says so.
     """
 
     fps: float | None
     up: Vector | None
+    place: ScenePlace | None
 
     @property
     def n_frames(self) -> int:
@@ -73,6 +76,13 @@ class _Sidecar(Struct, frozen=True):
     fps: Annotated[float, Meta(gt=0, lt=1e6)]
     up: Vector
     files: list[dict[str, Any]]
+    scale: float = 1.0
+    quat: Quat | None = None
+
+    @property
+    def place(self) -> ScenePlace | None:
+        """Where the scene lies. Raises ValueError."""
+        return None if self.quat is None else ScenePlace(self.quat, self.scale)
 
 
 def is_scene(path: Path) -> bool:
@@ -117,6 +127,7 @@ class SequenceScene:
     def __init__(self, reader: SequenceReader) -> None:
         self._reader = reader
         self.fps: float | None = reader.timing.fps
+        self.place: ScenePlace | None = None
         try:
             self.up: Vector | None = reader.splats(0).up
         except BaseException:
@@ -148,9 +159,15 @@ class FrameFiles:
     """A file per frame."""
 
     def __init__(
-        self, files: Sequence[Path], *, fps: float | None = None, up: Vector | None = None, notes: Sequence[str] = ()
+        self,
+        files: Sequence[Path],
+        *,
+        fps: float | None = None,
+        up: Vector | None = None,
+        place: ScenePlace | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
-        self.files, self.fps, self.up = tuple(files), fps, up
+        self.files, self.fps, self.up, self.place = tuple(files), fps, up, place
         self._notes, self._seen = tuple(notes), _Seen()
 
     @property
@@ -248,7 +265,7 @@ def _open_folder(folder: Path) -> FrameFiles:
             hint="Export the whole scene to import it.",
             path=folder,
         )
-    return FrameFiles(files, fps=sidecar.fps, up=sidecar.up, notes=_gaps(names))
+    return FrameFiles(files, fps=sidecar.fps, up=sidecar.up, place=sidecar.place, notes=_gaps(names))
 
 
 def _sidecar(folder: Path) -> _Sidecar | None:
@@ -258,8 +275,10 @@ def _sidecar(folder: Path) -> _Sidecar | None:
         return None
     path = place_in(folder, names[0], follow_links=False, named_in=folder)
     try:
-        return to_type(read_json_object(path), _Sidecar)
-    except EntryError as error:
+        found = to_type(read_json_object(path), _Sidecar)
+        _ = found.place
+        return found
+    except (EntryError, ValueError) as error:
         raise ProjectError(
             f"The description of the export is damaged ({error}).", hint="Remove it.", path=path
         ) from error
