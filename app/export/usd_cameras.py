@@ -14,7 +14,7 @@ import numpy as np
 
 from engine.camera.camera_path import CameraPath
 from engine.capture.layout.format_result import CameraEntry
-from engine.export.usd_library import usd_module
+from engine.export.usd_library import usd_module, writing_usd
 
 FILE = "cameras.usda"
 FILM = 36.0
@@ -48,9 +48,11 @@ def write_usd_cameras(
         Sentences about what USD does not hold.
     Raises:
         ProjectError: USD's library is missing.
+        OSError: The disk refused.
     """
     Usd, UsdGeom = usd_module("Usd"), usd_module("UsdGeom")
-    stage = Usd.Stage.CreateNew(str(folder / FILE))
+    with writing_usd():
+        stage = Usd.Stage.CreateNew(str(folder / FILE))
     axis, lines = _up_axis(up)
     UsdGeom.SetStageUpAxis(stage, axis)
     if meters_per_unit is not None:
@@ -68,11 +70,12 @@ def write_usd_cameras(
     frames = np.arange(n_frames, dtype=np.float64)
     for path, name in zip(moving, names[len(cameras) :], strict=True):
         _write_path(UsdGeom.Camera.Define(stage, f"/cameras/{name}"), path, frames)
-    stage.GetRootLayer().Save()
+    with writing_usd():
+        stage.GetRootLayer().Save()
     n_bent = sum(not entry.lens.is_pinhole for entry in cameras)
     if n_bent:
-        what = "1 camera bends" if n_bent == 1 else f"{n_bent} cameras bend"
-        lines += (f"The lens of {what} straight lines, which USD does not hold: remove it from footage first.",)
+        what = "The lens of 1 camera bends" if n_bent == 1 else f"The lenses of {n_bent} cameras bend"
+        lines += (f"{what} straight lines, which USD does not hold: take that out of footage first.",)
     empty = [path.name for path in paths if not path.keys]
     return (*lines, *(f"The camera path '{name}' has no keys and is left out." for name in empty))
 

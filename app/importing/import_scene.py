@@ -79,14 +79,17 @@ def import_scene(
         ProjectError: The scene or the folder cannot be used, or a value is not possible.
         DiskError: The disk refused.
     """
-    if fps is not None and not FPS_LIMITS[0] <= fps <= FPS_LIMITS[1]:
-        raise ProjectError(f"{fps:g} frames per second is not between {FPS_LIMITS[0]:g} and {FPS_LIMITS[1]:g}.")
     if folder.is_symlink() or folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise ProjectError("This name is already taken.", hint="Give a new or empty folder.", path=folder)
     source = open_scene(path)
     try:
+        rate = fps if fps is not None else source.fps or DEFAULT_FPS
+        if not FPS_LIMITS[0] <= rate <= FPS_LIMITS[1]:
+            what = f"{rate:g} frames per second is not between {FPS_LIMITS[0]:g} and {FPS_LIMITS[1]:g}."
+            raise ProjectError(what, hint="Give another number.", path=path)
+        name = path.resolve().name.encode("utf-8", "replace").decode()
         with atomic_folder(folder) as partial:
-            n_clips = _fill(partial, source, path.resolve().name, fps, up, meters_per_unit, report)
+            n_clips = _fill(partial, source, name, rate, up, meters_per_unit, report)
         return ImportedScene(folder, source.n_frames, n_clips, source.notes)
     except OSError as error:
         raise disk_error(error, what="The project", path=folder) from error
@@ -98,7 +101,7 @@ def _fill(
     folder: Path,
     source: SceneSource,
     name: str,
-    fps: float | None,
+    fps: float,
     up: str | None,
     meters_per_unit: float | None,
     report: Report,
@@ -131,8 +134,7 @@ def _fill(
         (clips / f"{index}").rename(clips / f"{clip_name(index, tuple(bounds), clip_length)}.safetensors")
     report(source.n_frames, source.n_frames)
     rig = contents.views(np.array(AXES[up] if up is not None else source.up or PLY_UP))
-    rate = fps or source.fps or DEFAULT_FPS
-    write_imported(scene, rig, n_frames=source.n_frames, fps=rate, source=name, notes=source.notes, place=source.place)
+    write_imported(scene, rig, n_frames=source.n_frames, fps=fps, source=name, notes=source.notes, place=source.place)
     settings = ProjectSettings(
         capture=str(scene.resolve()),
         fingerprint=open_capture(scene).fingerprint,

@@ -64,6 +64,8 @@ def read_stored(arrays: Mapping[str, np.ndarray], n_frames: int) -> StoredGaussi
     presence = arrays.get(_PRESENCE)
     if presence is None or presence.dtype != bool or presence.ndim != 2 or presence.shape[1] != n_frames:
         raise RecordError(f"its tracks do not say in which of {n_frames} frames they exist")
+    if not presence.any(1).all():
+        raise RecordError("a track exists in none of its frames")
     still, moving = _columns(arrays, _STILL, None), _columns(arrays, _MOVING, int(presence.sum()))
     return StoredGaussians(still, moving, presence)
 

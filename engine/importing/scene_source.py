@@ -23,7 +23,6 @@ from engine.export.formats.table import read_file
 from engine.export.sequences.sequence import SequenceReader
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
-from engine.export.world import AXES
 from engine.importing.suffixes import FRAME_SUFFIXES, SEQUENCE_SUFFIXES, is_scene_file
 from engine.storage.files import open_regular
 from engine.storage.typed_json import EntryError, to_type
@@ -112,7 +111,7 @@ def open_scene(path: Path) -> SceneSource:
             raise ProjectError("There is no such file or folder.", hint="Check the path.", path=path)
         for row in SEQUENCES.values():
             if path.suffix.lower() == row.suffix:
-                return SequenceScene(row.open(path), None if row.up is None else AXES[row.up])
+                return SequenceScene(row.open(path))
         if path.suffix.lower() in FRAME_SUFFIXES:
             return FrameFiles([path])
     except (OSError, CaptureError) as error:
@@ -123,13 +122,17 @@ def open_scene(path: Path) -> SceneSource:
 
 
 class SequenceScene:
-    """A file over time. usual_up: Which way is up in files of this format; None where each says it itself."""
+    """A file over time. reader: It is closed with this, or where its first frame cannot be read."""
 
-    def __init__(self, reader: SequenceReader, usual_up: Vector | None) -> None:
+    def __init__(self, reader: SequenceReader) -> None:
         self._reader = reader
         self.fps: float | None = reader.timing.fps
         self.place: ScenePlace | None = None
-        self.up: Vector | None = reader.splats(0).up if usual_up is None else usual_up
+        try:
+            self.up: Vector | None = reader.splats(0).up
+        except BaseException:
+            reader.close()
+            raise
         self._seen = _Seen()
 
     @property

@@ -11,6 +11,7 @@ from app.export.scene_frames import SceneFrames
 from app.export.take import TakeFrame
 from engine.editing.gaussian_rows import RowSet
 from engine.export.player.blocks import joined
+from engine.export.player.still_part import shapes
 from engine.export.sequences.sequence import MovingSplats, SequenceStretch
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
@@ -59,7 +60,7 @@ class SceneStretches:
             if len(other) != len(still):  # then row for row says nothing
                 still, is_same = still[:0], np.zeros(0, bool)
                 break
-            is_same &= _have_same_shape(still, other)
+            is_same &= (shapes(still) == shapes(other)).all(1)
             lowest, highest = np.minimum(lowest, other.colors), np.maximum(highest, other.colors)
         else:
             is_same &= (highest - lowest).max(1, initial=0.0) <= SAME_LIGHT
@@ -97,11 +98,3 @@ class SceneStretches:
         still = self._still(number)
         rows = np.setdiff1d(np.arange(len(still)), np.flatnonzero(is_still))
         return MovingSplats(joined(moving, still[rows]), np.concatenate([*ids, -1 - rows]))
-
-
-def _have_same_shape(one: Splats, other: Splats) -> np.ndarray:
-    """Which rows are the same but for their colours. [N] bool"""
-    is_same = np.ones(len(one), bool)
-    for name in ("means", "quats", "scales", "opacities"):
-        is_same &= (getattr(one, name) == getattr(other, name)).reshape(len(one), -1).all(1)
-    return is_same

@@ -64,8 +64,8 @@ def read(file: BinaryIO) -> Splats:
     n_chunks, n = elements["chunk"].n_rows, elements["vertex"].n_rows
     if n_chunks != -(-n // CHUNK):
         raise damaged(f"it has {n_chunks} chunks for {n} Gaussians")
-    chunks = np.tile(np.repeat([0.0, 1.0], 3), (n_chunks, 3)).reshape(n_chunks, 3, 2, 3)
     rows = read_rows(file, elements["chunk"])
+    chunks = np.tile(np.repeat([0.0, 1.0], 3), (n_chunks, 3)).reshape(n_chunks, 3, 2, 3)
     chunks.reshape(n_chunks, 18)[:, : len(limits)] = np.stack([rows[name] for name in limits], axis=1)
     packed = read_rows(file, elements["vertex"])
     position, rotation, scale, color = (packed[name] for name in _COLUMNS)

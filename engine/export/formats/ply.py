@@ -117,12 +117,13 @@ def read_header(file: BinaryIO) -> dict[str, PlyElement]:
     if file.readline(16).rstrip() != b"ply":
         raise damaged("it is not a PLY file")
     elements: dict[str, PlyElement] = {}
+    last = PlyElement(0, {})
     while file.tell() < _MAX_HEADER_BYTES:
         match file.readline(_MAX_HEADER_BYTES).decode("ascii", "replace").split():
-            case ["element", name, number] if number.isdecimal() and len(number) < _MAX_DIGITS:
-                elements[name] = PlyElement(int(number), {})
-            case ["property", kind, name] if elements and kind in _KINDS:
-                list(elements.values())[-1].columns[name] = _KINDS[kind]
+            case ["element", name, number] if number.isdecimal() and len(number) < _MAX_DIGITS and name not in elements:
+                elements[name] = last = PlyElement(int(number), {})
+            case ["property", kind, name] if elements and kind in _KINDS and name not in last.columns:
+                last.columns[name] = _KINDS[kind]
             case ["format", kind, *_] if kind != "binary_little_endian":
                 raise damaged(f"its format is {shown(kind)}, and only binary_little_endian is read")
             case ["end_header"]:

@@ -16,7 +16,13 @@ from engine.export.packing import morton_order
 from engine.export.splats import Splats
 
 _MOST_PIXELS = 1 << 27
+_MOST_META_BYTES = 4 << 20
 _MOST_MEMBER_BYTES = 1 << 31
+_FAULTS = (
+    *(zipfile.BadZipFile, zlib.error, OSError, EOFError),
+    *(ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError),
+)
+"""Whatever a file leads into; RuntimeError is what zipfile and json raise where they give up."""
 
 
 def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
@@ -31,7 +37,7 @@ def read(file: BinaryIO) -> Splats:
     """Read a file of `write`. Raises ProjectError where it is something else."""
     try:
         with zipfile.ZipFile(file) as archive:
-            meta: dict[str, Any] = json.loads(member(archive, "meta.json", _MOST_MEMBER_BYTES))
+            meta: dict[str, Any] = json.loads(member(archive, "meta.json", _MOST_META_BYTES))
             n = int(meta["count"])
 
             def pixels(name: str) -> np.ndarray:
@@ -39,5 +45,5 @@ def read(file: BinaryIO) -> Splats:
 
             degree = int(meta["shN"].get("bands", 3)) if "shN" in meta else 0
             return replace(splats_of(meta, pixels), sh_degree=degree)
-    except (zipfile.BadZipFile, OSError, EOFError, zlib.error, ValueError, KeyError, IndexError, TypeError) as error:
+    except _FAULTS as error:
         raise damaged(f"it is not a SOG file ({type(error).__name__})") from error

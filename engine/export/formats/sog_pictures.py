@@ -163,7 +163,15 @@ def webp_size(data: bytes) -> tuple[int, int]:
 
 
 def member(archive: zipfile.ZipFile, name: str, most_bytes: int) -> bytes:
-    """A file of the zip file. Raises KeyError where it is missing, ValueError where it is larger than the limit."""
-    if archive.getinfo(name).file_size > most_bytes:
+    """A file of the zip file.
+
+    Raises:
+        KeyError: It is missing.
+        ValueError: It is larger than the limit, or packed in a way that these formats do not have.
+    """
+    info = archive.getinfo(name)
+    if info.file_size > most_bytes:
         raise ValueError("too large")
-    return archive.read(name)
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError("packed in another way")
+    return archive.read(info)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import BinaryIO, NamedTuple
 
+import numpy as np
+
 from engine.export.formats import compressed_ply, glb, ply, sog, splat, spz
 from engine.export.splats import Splats
 
@@ -79,6 +81,8 @@ def read_file(suffix: str, file: BinaryIO) -> Splats:
     """
     head = file.read(1 << 12)
     file.seek(0)
+    read = next(kind.read for kind in FORMATS.values() if kind.suffix == suffix)
     if suffix == ".ply" and compressed_ply.is_compressed(head):
-        return compressed_ply.read(file)
-    return next(kind.read for kind in FORMATS.values() if kind.suffix == suffix)(file)
+        read = compressed_ply.read
+    with np.errstate(over="ignore"):  # what is too large cannot be drawn, and is left out by whoever draws
+        return read(file)

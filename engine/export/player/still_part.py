@@ -55,10 +55,10 @@ def _differs(some: np.ndarray, others: np.ndarray) -> bool:
 
 
 def _has_same_shapes(some: Splats, others: Splats) -> bool:
-    return len(some) == len(others) and np.array_equal(_shapes(some), _shapes(others))
+    return len(some) == len(others) and np.array_equal(shapes(some), shapes(others))
 
 
-def _shapes(splats: Splats) -> np.ndarray:
+def shapes(splats: Splats) -> np.ndarray:
     """All numbers of a row but its colour. [N, 11] float32"""
     return np.concatenate([splats.means, splats.quats, splats.scales, splats.opacities[:, None]], axis=1)
 
@@ -73,7 +73,7 @@ def shared_rows(shared: Splats, splats: Splats) -> tuple[np.ndarray, np.ndarray]
         For each row of `splats` its row in `shared`, each at most once and rising, or -1. [N] int64
         Which rows of `shared` are none of them. [S] bool
     """
-    ours, theirs = _shapes(shared), _shapes(splats)
+    ours, theirs = shapes(shared), shapes(splats)
     if np.array_equal(ours, theirs):
         return np.arange(len(theirs)), np.zeros(len(ours), bool)
     names = _names(np.concatenate([ours, theirs]))

@@ -70,7 +70,7 @@ class SequenceReader(Protocol):
         ...
 
     def splats(self, frame: int) -> Splats:
-        """All Gaussians of a frame of the file. Raises ProjectError where it is damaged there."""
+        """All Gaussians of a frame of the file, and which way is up. Raises ProjectError where it is damaged there."""
         ...
 
     def close(self) -> None:

@@ -32,10 +32,13 @@ from engine.export.sequences.tsog_meta import (
     TsogMotion,
 )
 from engine.export.splats import Splats
+from engine.export.world import AXES
 from engine.storage.files import open_regular
 
 _MOST_PIXELS = 2 * MAX_ROWS
 _MOST_PICTURE_BYTES = 5 * _MOST_PIXELS
+_UP = AXES["+y"]
+"""As the format has it; files do not say."""
 _FAINTEST = 1.0 / 255.0
 """Fainter Gaussians are not drawn."""
 _END = struct.Struct("<4s4H2LH")
@@ -126,7 +129,7 @@ class TsogReader:
         speeds = self._speeds(rows)
         if speeds is not None and self._frames is None:
             found = replace(found, means=(found.means + speeds * since[rows, None]).astype(np.float32))
-        return replace(found, opacities=opacities[rows])
+        return replace(found, opacities=opacities[rows], up=_UP)
 
     def close(self) -> None:
         """Nothing: the file is closed already."""

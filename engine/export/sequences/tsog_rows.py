@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.export.packing import morton_order
 from engine.export.player.blocks import joined
-from engine.export.player.still_part import shared_rows
+from engine.export.player.still_part import shapes, shared_rows
 from engine.export.sequences.sequence import MovingSplats, SequenceStretch
 from engine.export.splats import Splats
 
@@ -78,7 +78,7 @@ def stretch_rows(stretch: SequenceStretch, count: Callable[[int, int], None]) ->
     more, is_still = _standing_still(rows.splats, names[order], stretch.n_frames)
     moving = TimedRows(rows.frames[~is_still], rows.splats[~is_still], rows.speeds[~is_still])
     still = joined(stretch.still, more)
-    still = still[np.lexsort(_shapes(still).T)]
+    still = still[np.lexsort(shapes(still).T)]
     return StretchRows(stretch.first_frame, stretch.n_frames, still, moving, n_followed - int(is_still.sum()))
 
 
@@ -104,17 +104,12 @@ def _standing_still(splats: Splats, ids: np.ndarray, n_frames: int) -> tuple[Spl
     if n_frames == 1 or not len(first):
         return splats[:0], np.zeros(len(ids), bool)
     n_each = np.diff(first, append=len(ids))
-    shapes = _shapes(splats)
-    is_still = (n_each == n_frames) & (np.minimum.reduceat(shapes, first) == np.maximum.reduceat(shapes, first)).all(1)
+    values = shapes(splats)
+    is_still = (n_each == n_frames) & (np.minimum.reduceat(values, first) == np.maximum.reduceat(values, first)).all(1)
     low, high = np.minimum.reduceat(splats.colors, first), np.maximum.reduceat(splats.colors, first)
     is_still &= (high - low <= SAME_COLOR).all(1)
     found = replace(splats[first], colors=(low + high) / np.float32(2.0))[is_still]
     return found, np.repeat(is_still, n_each)
-
-
-def _shapes(splats: Splats) -> np.ndarray:
-    """All numbers of a row but its colour. [N, 11] float32"""
-    return np.concatenate([splats.means, splats.quats, splats.scales, splats.opacities[:, None]], axis=1)
 
 
 def shared_still(stretches: Sequence[StretchRows]) -> tuple[Splats, list[Splats]]:

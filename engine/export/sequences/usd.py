@@ -6,7 +6,9 @@ here when it is needed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,8 +21,8 @@ from engine.export.player.blocks import joined
 from engine.export.sequences.sequence import SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
 from engine.export.splats import Splats, colors_of
-from engine.export.usd_library import usd_module
-from engine.export.world import FileWorld
+from engine.export.usd_library import usd_module, writing_usd
+from engine.export.world import AXES, FileWorld
 
 ROOT = "/Scene"
 MAX_FRAMES = 1_000_000
@@ -74,10 +76,8 @@ class _UsdFile:
     def __init__(self, path: Path, timing: SequenceTiming) -> None:
         self._pxr = _library()
         usd, geom = self._pxr.Usd, self._pxr.UsdGeom
-        try:
+        with writing_usd():
             self._stage = usd.Stage.CreateNew(str(path))
-        except self._pxr.Tf.ErrorException as error:
-            raise OSError(f"USD cannot write here: {error}") from error
         self._n_frames, self._n_still = timing.n_frames, 0
         self._up: tuple[float, float, float] | None = None
         self._stage.SetDefaultPrim(geom.Xform.Define(self._stage, ROOT).GetPrim())
@@ -137,10 +137,8 @@ class _UsdFile:
 
     def save(self) -> None:
         """Put down what there is, so that memory stays free. Raises OSError."""
-        try:
+        with writing_usd():
             self._stage.Save()
-        except self._pxr.Tf.ErrorException as error:
-            raise OSError(f"USD cannot write here: {error}") from error
 
     def notes(self) -> tuple[str, ...]:
         """See `write`."""
@@ -178,6 +176,8 @@ class UsdReader:
         if not (fps > 0.0 and 1.0 <= n_frames <= MAX_FRAMES):
             raise _damaged(f"it has {n_frames:g} frames at {fps:g} per second", path)
         self._timing = SequenceTiming(int(n_frames), float(fps))
+        is_z_up = self._pxr.UsdGeom.GetStageUpAxis(stage) == self._pxr.UsdGeom.Tokens.z
+        self._up = AXES["+z" if is_z_up else "+y"]
 
     @property
     def timing(self) -> SequenceTiming:
@@ -201,15 +201,24 @@ class UsdReader:
         time = self._pxr.Usd.TimeCode(self._first + frame)
         invisible = self._pxr.UsdGeom.Tokens.invisible
         parts = [_NONE]
-        for field in self._fields:
-            if field.ComputeVisibility(time) != invisible:
-                found = self._columns(field, time)
-                parts.append(_moved(found, np.array(field.ComputeLocalToWorldTransform(time)), self._path))
-        if sum(map(len, parts)) > MAX_GAUSSIANS:
-            raise _damaged(
-                f"it has {sum(map(len, parts)):,} Gaussians in frame {frame}; {MAX_GAUSSIANS:,} are read", self._path
-            )
-        return joined(*parts)
+        with self._typed_errors(frame):
+            for field in self._fields:
+                if field.ComputeVisibility(time) != invisible:
+                    found = self._columns(field, time)
+                    parts.append(_moved(found, np.array(field.ComputeLocalToWorldTransform(time)), self._path))
+        n = sum(map(len, parts))
+        if n > MAX_GAUSSIANS:
+            raise _damaged(f"it has {n:,} Gaussians in frame {frame}; {MAX_GAUSSIANS:,} are read", self._path)
+        return replace(joined(*parts), up=self._up)
+
+    @contextmanager
+    def _typed_errors(self, frame: int) -> Iterator[None]:
+        """Values that cannot be read, or are of another type than the schema's, are an error of the file."""
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                yield
+        except (self._pxr.Tf.ErrorException, ValueError, TypeError, MemoryError) as error:
+            raise _damaged(f"values of frame {frame} are damaged, or of another type", self._path) from error
 
     def _columns(self, field: Any, time: Any) -> Splats:
         attributes = (

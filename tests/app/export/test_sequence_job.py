@@ -128,7 +128,7 @@ def test_wrong_wishes_are_refused_and_nothing_is_written(
             run(opened, job, quiet)
     with pytest.raises(CaptureError, match="its frames are image files"):
         run(opened, SequenceJob(tmp_path / "a.4dgs", sound=opened.capture.rig.names[0]), quiet)
-    monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.setitem(sys.modules, "pxr.Tf", None)
     with pytest.raises(ProjectError, match="usd-core"):
         estimate(opened, SequenceJob(tmp_path / "a.usdc", "usd"))
     assert list(tmp_path.glob("a*")) == []

@@ -105,6 +105,28 @@ def test_deleted_gaussians_can_be_taken_out_for_good(scene: Path, tmp_path: Path
         np.testing.assert_array_equal(values(shown(folder, frame)), before)
 
 
+@pytest.mark.parametrize("kind", ["4dgs", "tsog"])
+def test_a_scene_in_which_everything_moves_becomes_a_file_over_time(tmp_path: Path, frames: list[Splats], kind: str):
+    scene = tmp_path / "all"
+    scene.mkdir()
+    for number, splats in enumerate(frames[:3]):
+        with (scene / f"{number}.ply").open("wb") as file:
+            FORMATS["ply"].write(replace(splats, means=splats.means + np.float32(0.01 * number)), file)
+    with open_script(import_scene(scene, tmp_path / "p").folder, read_only=True) as project:
+        done = project.export(tmp_path / f"out.{kind}", format=kind)
+    assert done.psnr_db is not None
+    assert done.psnr_db > 40.0
+
+
+@pytest.mark.parametrize("fps", [0.0, float("nan"), None])
+def test_a_rate_that_no_camera_has_is_refused(scene: Path, tmp_path: Path, fps: float | None):
+    (scene / "dance_export.json").write_text('{"fps": 99999, "up": [0, 0, 1], "files": [{"part": "all"}]}')
+    with pytest.raises(ProjectError, match="frames per second is not between") as error:
+        import_scene(scene, tmp_path / "p", fps=fps)
+    assert error.value.path == scene
+    assert sorted(tmp_path.iterdir()) == [scene]
+
+
 def test_a_moment_between_frames_is_the_nearest_one(scene: Path, tmp_path: Path):
     folder = import_scene(scene, tmp_path / "p").folder
     np.testing.assert_array_equal(shown(folder, 1.4).means, shown(folder, 1).means)

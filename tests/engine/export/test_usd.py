@@ -14,12 +14,13 @@ from engine.errors import ProjectError
 from engine.export.sequences import usd
 from engine.export.sequences.sequence import SequenceTiming
 from engine.export.sequences.table import SEQUENCES
+from engine.export.usd_library import writing_usd
 from tests.engine.export.made_sequence import FPS, N_FRAMES, STRETCH_FRAMES, MadeSequence
 from tests.engine.export.scenes import order_of
 
 
 def test_without_the_library_the_remedy_is_said(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.setitem(sys.modules, "pxr.Tf", None)
     with pytest.raises(ProjectError, match=r"pip install 'clipgstream\[usd\]'"):
         SEQUENCES["usd"].check()
 
@@ -77,6 +78,50 @@ def test_a_turned_and_scaled_prim_lies_where_the_stage_has_it(path: Path):
     expected = 2.0 * live.means[:, [1, 0, 2]] * [-1, 1, 1] + [10, 0, 0]
     np.testing.assert_allclose(found.means, expected, atol=1e-4)
     np.testing.assert_allclose(found.scales, 2.0 * live.scales, rtol=1e-4)
+
+
+def test_the_way_up_comes_from_the_stage(path: Path):
+    Usd, UsdGeom = modules("Usd", "UsdGeom")
+    assert usd.UsdReader(path).splats(0).up == (0.0, 1.0, 0.0)
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    turned = path.with_stem("turned")
+    stage.GetRootLayer().Export(str(turned))
+    assert usd.UsdReader(turned).splats(0).up == (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("radiance:sphericalHarmonicsDegree = 0", "radiance:sphericalHarmonicsDegree = -1"),
+        ("int radiance:sphericalHarmonicsDegree = 0", 'string radiance:sphericalHarmonicsDegree = "x"'),
+        ("point3f[] positions = [(0, 0, 0)]", 'string[] positions = ["a"]'),
+    ],
+)
+def test_values_of_another_type_are_refused(tmp_path: Path, name: str, value: str):
+    pytest.importorskip("pxr")
+    lines = (
+        "point3f[] positions = [(0, 0, 0)]",
+        "quatf[] orientations = [(1, 0, 0, 0)]",
+        "float3[] scales = [(1, 1, 1)]",
+        "float[] opacities = [0.5]",
+        "float3[] radiance:sphericalHarmonicsCoefficients = [(0, 0, 0)]",
+        "int radiance:sphericalHarmonicsDegree = 0",
+    )
+    text = '#usda 1.0\ndef ParticleField3DGaussianSplat "a" {\n' + "\n".join(lines) + "\n}\n"
+    (tmp_path / "good.usda").write_text(text)
+    assert len(usd.UsdReader(tmp_path / "good.usda").splats(0)) == 1
+    (tmp_path / "bad.usda").write_text(text.replace(name, value))
+    with pytest.raises(ProjectError, match="of another type"):
+        usd.UsdReader(tmp_path / "bad.usda").splats(0)
+
+
+def test_where_nothing_can_be_written_the_reason_is_one_line(tmp_path: Path):
+    pytest.importorskip("pxr")
+    (tmp_path / "file").write_text("")
+    (Usd,) = modules("Usd")
+    with pytest.raises(OSError, match=r"^USD: [^\n]+$"), writing_usd():
+        Usd.Stage.CreateNew(str(tmp_path / "file" / "a.usda"))
 
 
 def test_bad_files_are_refused(path: Path, tmp_path: Path):

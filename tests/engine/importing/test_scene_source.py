@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import os
 import struct
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -147,8 +148,34 @@ def test_damaged_frames_are_refused_and_named(tmp_path: Path):
     assert "binary_big_endian" in refused(folder)
     path.write_bytes(whole.replace(b"rot_3", b"other"))
     assert "no column rot_3" in refused(folder)
+    path.write_bytes(whole.replace(b"property float x\n", b"property float x\n" * 2))  # rows would be shorter
+    assert "head is not complete" in refused(folder)
     path.write_bytes(b"ply\n")
     assert "head is not complete" in refused(folder)
+
+
+def test_a_compressed_frame_that_announces_too_much_takes_no_memory(tmp_path: Path):
+    folder = write_frames(tmp_path / "s", "compressed-ply", moving_frames(1))
+    (path,) = folder.iterdir()
+    data = path.read_bytes().replace(b"element chunk 1\n", b"element chunk 9999999999999\n")
+    path.write_bytes(data.replace(b"element vertex 60\n", b"element vertex 2559999999999744\n"))
+    assert "ends too early" in refused(folder)
+
+
+@pytest.mark.parametrize(
+    "document",
+    ['{"count": 1e999}', "[" * 100_000, '{"count": 60, "shN": [1]}', '{"count": 1}' + " " * (5 << 20)],
+    ids=["infinite", "deep", "list", "long"],
+)
+def test_a_hostile_document_of_a_sog_is_refused(tmp_path: Path, document: str):
+    folder = write_frames(tmp_path / "s", "sog", moving_frames(1))
+    (path,) = folder.iterdir()
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(name, document if name == "meta.json" else data)
+    assert "not a SOG file" in refused(folder)
 
 
 def test_every_format_over_time_is_known_by_its_name():

@@ -7,7 +7,9 @@ import pytest
 
 from engine.backends.table import backend_called
 from engine.capture.clip import Clip
+from engine.clip_files.anchor_record import RecordError
 from engine.clip_files.clip_state import ClipState
+from engine.clip_files.stored_gaussians import StoredGaussians, read_stored
 from engine.export.splats import Splats
 from engine.importing.stored_clip import stored_clip
 from engine.importing.stored_rows import stored_gaussians
@@ -61,6 +63,13 @@ def test_gaussians_that_lie_on_each_other_stay_two():
     doubled = splats[np.array([0, 0, 0, 1, 2, 3])]
     state, _ = check_bits([doubled, splats[np.array([0, 0, 4])], doubled])
     assert state.header.n_anchors["static"] == 2
+
+
+def test_a_track_that_is_nowhere_is_refused():
+    stored = stored_gaussians(moving_frames(3))
+    arrays = StoredGaussians(stored.still, stored.moving, np.pad(stored.presence, ((0, 1), (0, 0)))).arrays()
+    with pytest.raises(RecordError, match="in none of its frames"):
+        read_stored(arrays, 3)
 
 
 @pytest.mark.parametrize("n_empty", [1, 3])
