@@ -75,8 +75,8 @@ _USD = SequenceFormat(
     35.0,
     (
         "Of USD, programs need the schema ParticleField3DGaussianSplat (OpenUSD 26.03 or later); others see nothing.",
-        "Colours are as displays take them, although the schema means light. What moves is stored frame by frame: it does "
-        "not glide between frames.",
+        "Colours are as displays take them, although the schema means light. What moves is stored frame by frame: it "
+        "does not glide between frames.",
     ),
     _later("usd:write"),
     _later("usd:UsdReader"),
@@ -93,8 +93,8 @@ SEQUENCES: dict[str, SequenceFormat] = {
         2.2,
         (
             "Colours beyond the brightest white are cut off.",
-            "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an eighth of a "
-            "Gaussian's size.",
+            "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an eighth "
+            "of a Gaussian's size.",
         ),
         _later("fourdgs_writer:write"),
         _later("fourdgs_reader:FourdgsReader"),
@@ -109,8 +109,8 @@ SEQUENCES: dict[str, SequenceFormat] = {
         11.0,
         10.5,
         (
-            "Positions have 16 bits, rotations 8; scales and colours are of 256 values each. Light on still Gaussians that "
-            "changes by up to four levels of 255 becomes its mean.",
+            "Positions have 16 bits, rotations 8; scales and colours are of 256 values each. Light on still Gaussians "
+            "that changes by up to four levels of 255 becomes its mean.",
             "Between frames, moving Gaussians fade into the next frame on a straight path.",
         ),
         _later("tsog:write"),
