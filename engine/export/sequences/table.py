@@ -93,8 +93,8 @@ SEQUENCES: dict[str, SequenceFormat] = {
         2.2,
         (
             "Colours beyond the brightest white are cut off.",
-            "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an eighth "
-            "of a Gaussian's size.",
+            "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an "
+            "eighth of a Gaussian's size.",
         ),
         _later("fourdgs_writer:write"),
         _later("fourdgs_reader:FourdgsReader"),
