@@ -43,6 +43,8 @@ FIRST_LOOK = 0.7
 """Share of the time of a calibration that finds cameras near each other; of others it is about half."""
 N_FAR_MOMENTS = 30
 """For cameras far apart."""
+MIN_FAR_SHARE = 0.5
+"""Of all cameras, that have to be trusted: a few that happen to be near each other are no rig."""
 N_SEEDS = 3
 """Random numbers with which every focal length is tried: repeating patterns lead single trials astray."""
 N_TRIED_ON = 3
@@ -104,7 +106,7 @@ def calibrate_here(
 
 def calibrate_far(videos: list[PlainVideo], options: CalibrationOptions, progress: StageProgress) -> Calibration | None:
     """For cameras that are far apart, joined pair by pair: more moments, looked at closer. None where nothing moves, or
-    nothing can be joined."""
+    too few can be joined."""
     key_points = _key_points(videos, progress, n_moments=N_FAR_MOMENTS, is_thorough=True)
     if not any((points.moments > 0).any() for points in key_points):
         return None
@@ -140,7 +142,8 @@ def calibrate_far(videos: list[PlainVideo], options: CalibrationOptions, progres
     solution = solve(estimate, key_points, trusted, sizes, stages=FINE, **chosen)
     if not len(solution.tracks.points):
         return None
-    return finished(solution, videos, key_points, trusted, sizes, options, is_far=True)
+    found = finished(solution, videos, key_points, trusted, sizes, options, is_far=True)
+    return found if found.found.doubts.count("") >= MIN_FAR_SHARE * len(videos) else None
 
 
 def _key_points(

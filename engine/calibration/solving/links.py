@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, combinations
 
 import cv2
 import numpy as np
@@ -118,32 +119,42 @@ def linked_estimate(
 
 
 def is_held(agreed: MatchAgreement, tracks: Tracks) -> np.ndarray:
-    """Which cameras a closed chain of firm pairs holds, whose sizes are tied by points that three cameras see. [R]
+    """Which cameras a closed chain of firm pairs holds that is of one size. [R]
 
     Pairs say nothing about how far apart cameras are, and an open chain can turn at every link: only what closes, and
-    is of one size, is right.
+    is of one size, is right. Points that three cameras see tie the sizes of two pairs; parts of a chain that have two
+    cameras in common, as the two halves of a ring have, get one size from these, and five more equations have to hold.
     """
     firm = agreed.is_firm
     pairs = [(int(a), int(b)) for a, b in np.argwhere(np.triu(firm))]
-    if not pairs:
-        return np.zeros(len(firm), dtype=bool)
-    sees = np.zeros((len(firm), len(tracks.points)), dtype=np.int64)
-    sees[tracks.seen.cameras, tracks.seen.points] = 1
-    tied = np.zeros((len(pairs), len(pairs)))
-    for i, first in enumerate(pairs):
-        for j, second in enumerate(pairs[:i]):
-            three = sorted({*first, *second})
-            tied[i, j] = len(three) == 3 and sees[three].all(0).sum() >= MIN_IN_THREE
-    groups = connected_components(csr_matrix(tied), directed=False)[1]
-    of_one_size = [pair for pair, group in zip(pairs, groups, strict=True) if group == np.bincount(groups).argmax()]
     held = np.zeros(len(firm), dtype=bool)
-    for pair in of_one_size:  # a pair is part of a closed chain if its cameras hang together without it
-        rest = np.array([other for other in of_one_size if other != pair]).reshape(-1, 2)
+    if not pairs:
+        return held
+    largest = max(_of_one_size(pairs, tracks, len(firm)), key=lambda part: len({*chain.from_iterable(part)}))
+    for pair in largest:  # a pair is part of a closed chain if its cameras hang together without it
+        rest = np.array([other for other in largest if other != pair]).reshape(-1, 2)
         graph = csr_matrix((np.ones(len(rest)), rest.T), shape=firm.shape)
         labels = connected_components(graph, directed=False)[1]
         if labels[pair[0]] == labels[pair[1]]:
             held[list(pair)] = True
     return held
+
+
+def _of_one_size(pairs: Sequence[Pair], tracks: Tracks, n_cameras: int) -> list[list[Pair]]:
+    """Pairs in parts whose sizes relative to each other are known."""
+    sees = np.zeros((n_cameras, len(tracks.points)), dtype=np.int64)
+    sees[tracks.seen.cameras, tracks.seen.points] = 1
+    parts = [[pair] for pair in pairs]
+
+    def are_tied(first: Sequence[Pair], second: Sequence[Pair]) -> bool:
+        if len({*chain.from_iterable(first)} & {*chain.from_iterable(second)}) >= 2:
+            return True
+        threes = ({*one, *other} for one in first for other in second)
+        return any(len(three) == 3 and sees[sorted(three)].all(0).sum() >= MIN_IN_THREE for three in threes)
+
+    while tied := next(((a, b) for a, b in combinations(parts, 2) if are_tied(a, b)), None):
+        parts = [part for part in parts if part not in tied] + [tied[0] + tied[1]]
+    return parts
 
 
 def _geometry(
