@@ -90,7 +90,7 @@ def other_markers(board: Board, pictures: Sequence[np.ndarray]) -> str:
         for grey in greys:
             _, numbers, _ = detector.detectMarkers(grey)
             if numbers is not None and len(numbers) >= MIN_MARKERS:
-                found.append(numbers.reshape(-1))
+                found.append(np.asarray(numbers, dtype=np.int64).reshape(-1))
         return np.concatenate(found)
 
     families: dict[str, list[str]] = {}

@@ -12,10 +12,9 @@ from app.cli.cli import main
 from app.lab.synthetic.writing import write_video
 from engine.assets import asset_path
 from engine.calibration.boards.board import Board
-from engine.calibration.solving.cameras import Cameras
 from engine.capture.capture import open_capture
-from tests.engine.calibration.made_boards import BoardPictures, held_boards, ring
-from tests.engine.calibration.made_rigs import off_truth
+from tests.engine.calibration.made_boards import film_board, ring
+from tests.engine.calibration.made_rigs import cameras_of, off_truth
 
 N_CAMERAS, N_FRAMES, SIZE = 4, 90, (640, 480)
 BOARD = Board(7, 5, 0.14, 0.105, "4X4_50")
@@ -26,11 +25,7 @@ TRUTH = ring(N_CAMERAS, size=SIZE)
 def filmed(tmp_path_factory) -> Path:
     """A board in front of four cameras at right angles, whose lenses bend straight lines."""
     folder = tmp_path_factory.mktemp("board")
-    boards = list(zip(*held_boards(N_FRAMES, board=BOARD, reach=0.5), strict=True))
-    for row in range(N_CAMERAS):
-        pictures = BoardPictures(TRUTH, row, BOARD, SIZE)
-        frames = (pictures.picture(*place, seed=number) for number, place in enumerate(boards))
-        write_video(folder / f"cam{row}.mp4", frames, fps=30, crf=16)
+    film_board(folder, TRUTH, BOARD, SIZE, N_FRAMES)
     return folder
 
 
@@ -51,16 +46,7 @@ def test_a_filmed_board_makes_a_capture_of_a_recording(filmed: Path, tmp_path: P
     capture = open_capture(recording)
     assert (capture.n_frames, capture.fps) == (6, 25)
     rig = capture.native_rig
-    ones = np.ones(N_CAMERAS)
-    found = Cameras(
-        "pinhole",
-        rig.world_to_camera[:, :3, :3],
-        rig.world_to_camera[:, :3, 3],
-        rig.Ks[:, 0, 0],
-        ones,
-        rig.Ks[:, :2, 2],
-        np.zeros((N_CAMERAS, 0)),
-    )
+    found = cameras_of(rig)
     angle_deg, distance = off_truth(found, TRUTH)
     assert angle_deg < 0.15
     assert distance < 0.003

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from app.lab.synthetic.rigs import looking_at
+from app.lab.synthetic.writing import write_video
 from engine.calibration.boards.board import Board, charuco_board
 from engine.calibration.boards.detection import BoardView
 from engine.calibration.solving.cameras import Cameras, rotation_of
@@ -94,6 +96,15 @@ def views_of(
     return moments
 
 
+def film_board(folder: Path, cameras: Cameras, board: Board, size: tuple[int, int], n_frames: int) -> None:
+    """Videos cam0.mp4 and so on of a board that is carried through the scene."""
+    places = list(zip(*held_boards(n_frames, board=board, reach=0.5), strict=True))
+    for row in range(len(cameras)):
+        pictures = BoardPictures(cameras, row, board, size)
+        frames = (pictures.picture(*place, seed=number) for number, place in enumerate(places))
+        write_video(folder / f"cam{row}.mp4", frames, fps=30, crf=16)
+
+
 class BoardPictures:
     """Pictures of one camera.
 
@@ -144,7 +155,9 @@ class BoardPictures:
     def _box(self, turn: np.ndarray, shift: np.ndarray) -> tuple[int, int, int, int]:
         """Left, top, right and bottom of what the board can cover; all of the picture where it is behind in part."""
         width, height = self._size
-        across, along = np.meshgrid(*(np.linspace(-MARGIN, n + MARGIN, 9) for n in (self._board.columns, self._board.rows)))
+        across, along = np.meshgrid(
+            *(np.linspace(-MARGIN, n + MARGIN, 9) for n in (self._board.columns, self._board.rows))
+        )
         sheet = np.stack([across.reshape(-1), along.reshape(-1), np.zeros(81)], axis=-1) * self._board.square_m
         at_camera = sheet @ turn.T + shift
         if at_camera[:, 2].min() < 0.05:
