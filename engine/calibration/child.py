@@ -43,8 +43,6 @@ FIRST_LOOK = 0.7
 """Share of the time of a calibration that finds cameras near each other; of others it is about half."""
 N_FAR_MOMENTS = 30
 """For cameras far apart."""
-MIN_FAR_SHARE = 0.5
-"""Of all cameras, that have to be trusted: a few that happen to be near each other are no rig."""
 N_SEEDS = 3
 """Random numbers with which every focal length is tried: repeating patterns lead single trials astray."""
 N_TRIED_ON = 3
@@ -106,7 +104,7 @@ def calibrate_here(
 
 def calibrate_far(videos: list[PlainVideo], options: CalibrationOptions, progress: StageProgress) -> Calibration | None:
     """For cameras that are far apart, joined pair by pair: more moments, looked at closer. None where nothing moves, or
-    too few can be joined."""
+    nothing can be joined."""
     key_points = _key_points(videos, progress, n_moments=N_FAR_MOMENTS, is_thorough=True)
     if not any((points.moments > 0).any() for points in key_points):
         return None
@@ -142,8 +140,7 @@ def calibrate_far(videos: list[PlainVideo], options: CalibrationOptions, progres
     solution = solve(estimate, key_points, trusted, sizes, stages=FINE, **chosen)
     if not len(solution.tracks.points):
         return None
-    found = finished(solution, videos, key_points, trusted, sizes, options, is_far=True)
-    return found if found.found.doubts.count("") >= MIN_FAR_SHARE * len(videos) else None
+    return finished(solution, videos, key_points, trusted, sizes, options, is_far=True)
 
 
 def _key_points(

@@ -25,9 +25,11 @@ WEAK_SIGHTINGS = 60
 MAX_DOUBTFUL = 0.25
 """Share of the cameras that were found. Where matches contradict more, whole groups of cameras have been found in wrong
 places, and those that agree may be such a group."""
+MIN_FAR_SHARE = 0.5
+"""Of all cameras far apart, that have to hold together: a few that happen to be near each other are no rig."""
 FAR = (
-    "Neighbouring cameras are far apart; they were found from what moves, pair by pair. Directions may be off by 2 "
-    "degrees and positions by 3 % of the rig's radius; a board finds them exactly."
+    "Neighbouring cameras are far apart; they were found from what moves, pair by pair. Directions may be off by 3 "
+    "degrees and positions by 4 % of the rig's radius; a board finds them exactly."
 )
 LENS_MODEL: dict[str, LensModel] = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
 """Names of engine.camera.lens."""
@@ -73,7 +75,8 @@ def finished(
         up=up_from,
     )
     missing = tuple(_missing(row, rows, videos, key_points, verified) for row in _absent(rows, len(videos)))
-    return Calibration(found, missing, tuple(warnings), _failure(agreed), _pairs(names, agreed))
+    n_least = max(MIN_CAMERAS, MIN_FAR_SHARE * len(videos)) if is_far else MIN_CAMERAS
+    return Calibration(found, missing, tuple(warnings), _failure(agreed, n_least), _pairs(names, agreed))
 
 
 def _doubts(names: list[str], n_sightings: np.ndarray, agreed: MatchAgreement, strained: np.ndarray) -> list[str]:
@@ -102,11 +105,13 @@ def _strongest(row: int, names: list[str], agreed: MatchAgreement) -> str:
     return f"{n_explained} of its {n} matches with {names[other]} are explained"
 
 
-def _failure(agreed: MatchAgreement) -> str:
-    """Why nothing of it can be trusted; empty where most cameras hold together."""
+def _failure(agreed: MatchAgreement, n_least: float = MIN_CAMERAS) -> str:
+    """Why nothing of it can be trusted; empty where most cameras hold together, and at least so many."""
     n, n_placed = len(agreed.is_placed), int(agreed.is_placed.sum())
-    if n_placed >= max(MIN_CAMERAS, (1 - MAX_DOUBTFUL) * n):
+    if n_placed >= max(n_least, (1 - MAX_DOUBTFUL) * n):
         return ""
+    if n_placed >= (1 - MAX_DOUBTFUL) * n:
+        return f"Only {n_placed} cameras hold together, so none of them can be trusted."
     return f"Matches contradict the positions of {n - n_placed} of {n} cameras, so none of them can be trusted."
 
 
