@@ -12,7 +12,7 @@ from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import FEW_MATCHES, PairCounts
 from engine.calibration.solving.agreement import MIN_AGREEING, MatchAgreement, agreement
 from engine.calibration.solving.cameras import Cameras
-from engine.calibration.solving.links import is_held
+from engine.calibration.solving.links import is_held, surrounds
 from engine.calibration.solving.solving import CalibrationSolution
 from engine.calibration.solving.strain import is_strained
 from engine.calibration.solving.world import find_up, known_scale, unit_scale, upright
@@ -57,7 +57,8 @@ def finished(
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
     agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
     if is_far:
-        agreed = replace(agreed, held=is_held(agreed, tracks))
+        held = is_held(agreed, tracks)
+        agreed = replace(agreed, held=held & surrounds(cameras.rotations[held]) if held.any() else held)
         warnings.append(FAR)
     strained = is_strained(rows, solution.cameras, key_points, verified, sizes, agreed.is_firm)
     doubts = _doubts(names, n_sightings, agreed, strained)

@@ -29,6 +29,7 @@ CLOSES_DEG = 30.0
 NEAR_PX = 8.0
 """At a width of 640: key points that near each other, at one moment, are about as far away."""
 MIN_NEAR = 8
+MAX_GAP_DEG = 90.0
 MIN_IN_CHAIN = 100
 """Matches of a pair that counts in a closed chain. Right neighbours 36 degrees apart have 180 and more; cameras 72
 degrees apart, whose 64 matches closed a ring that was off by 7 %, have fewer."""
@@ -135,13 +136,32 @@ def is_held(agreed: MatchAgreement, tracks: Tracks) -> np.ndarray:
     if not pairs:
         return held
     largest = max(_of_one_size(pairs, tracks, len(firm)), key=lambda part: len({*chain.from_iterable(part)}))
+    closed = []
     for pair in largest:  # a pair is part of a closed chain if its cameras hang together without it
-        rest = np.array([other for other in largest if other != pair]).reshape(-1, 2)
-        graph = csr_matrix((np.ones(len(rest)), rest.T), shape=firm.shape)
-        labels = connected_components(graph, directed=False)[1]
+        labels = _groups([other for other in largest if other != pair], len(firm))
         if labels[pair[0]] == labels[pair[1]]:
-            held[list(pair)] = True
-    return held
+            closed.append(pair)
+    if not closed:
+        return held
+    labels = _groups(closed, len(firm))  # two closed chains that one pair joins can turn against each other
+    return labels == np.bincount(labels).argmax()
+
+
+def surrounds(rotations: np.ndarray) -> bool:
+    """Whether cameras look at a place from all around, so that the turns between them add up to a whole one.
+
+    Only then do the pairs say how long focal lengths are. Cameras on one side hold together with wrong ones, too.
+    """
+    axes = rotations[:, 2]
+    plane = np.linalg.svd(axes, full_matrices=False)[2][:2]
+    angles = np.sort(np.degrees(np.arctan2(*(axes @ plane.T).T)))
+    return float(np.diff(angles, append=angles[0] + 360).max()) < MAX_GAP_DEG
+
+
+def _groups(pairs: Sequence[Pair], n: int) -> np.ndarray:
+    """A number for each of n cameras, the same for those that pairs join."""
+    ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return connected_components(csr_matrix((np.ones(len(ends)), ends.T), shape=(n, n)), directed=False)[1]
 
 
 def _of_one_size(pairs: Sequence[Pair], tracks: Tracks, n_cameras: int) -> list[list[Pair]]:

@@ -14,7 +14,7 @@ from engine.calibration.matching.motions import AgreedMotion, agreed_motions
 from engine.calibration.solving.agreement import MatchAgreement, agreement
 from engine.calibration.solving.bundle import Observations
 from engine.calibration.solving.cameras import Cameras
-from engine.calibration.solving.links import is_held, linked_estimate, linked_pairs
+from engine.calibration.solving.links import is_held, linked_estimate, linked_pairs, surrounds
 from engine.calibration.solving.mapping import FirstEstimate
 from engine.calibration.solving.solving import ROUGH, solve
 from engine.calibration.solving.tracks import Tracks
@@ -142,8 +142,20 @@ RING = [(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (0, 5)]
         (RING, [(0, 1, 2), (2, 3, 4)], []),  # four parts of a ring can have many sizes
         (RING, [(0, 1, 2), (1, 2, 3), (2, 3, 4), (3, 4, 5)], []),  # a single pair closes it
         (RING[:5], [(0, 1, 2), (1, 2, 3), (2, 3, 4), (3, 4, 5)], []),  # of one size, but open
+        (
+            [(0, 1), (1, 2), (0, 2), (2, 3), (3, 4), (4, 5), (3, 5)],
+            [(0, 1, 2), (1, 2, 3), (2, 3, 4), (3, 4, 5)],
+            [0, 1, 2],
+        ),
         ([(0, 1), (1, 2), (0, 2), (2, 3)], [(0, 1, 2), (1, 2, 3)], [0, 1, 2]),  # the last one hangs loose
     ],
 )
 def test_what_is_held_closes_and_is_of_one_size(pairs, threes, held) -> None:
     assert np.flatnonzero(is_held(made_agreement(pairs), seen_by(threes))).tolist() == held
+
+
+def test_only_cameras_all_around_surround() -> None:
+    rotations = scene()[0].rotations
+    assert surrounds(rotations)
+    assert surrounds(rotations[::2])
+    assert not surrounds(rotations[:7])
