@@ -132,7 +132,7 @@ def _fill(
     report(source.n_frames, source.n_frames)
     rig = contents.views(np.array(AXES[up] if up is not None else source.up or PLY_UP))
     rate = fps or source.fps or DEFAULT_FPS
-    write_imported(scene, rig, n_frames=source.n_frames, fps=rate, source=name, notes=source.notes)
+    write_imported(scene, rig, n_frames=source.n_frames, fps=rate, source=name, notes=source.notes, place=source.place)
     settings = ProjectSettings(
         capture=str(scene.resolve()),
         fingerprint=open_capture(scene).fingerprint,

@@ -180,7 +180,7 @@ class FrameDecoder:
         self._files = ClipFiles()
         self._copier: Copier | None = None
         self._loading: ModelKey | None = None
-        self._last: ShownFrame | None = None
+        self._last: dict[int, ShownFrame] = {}  # of the open project, and of one that it is compared with
         self._frame_bytes = 0  # of the newest one
         self.on_frame: Callable[[], None] = nothing
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
@@ -192,19 +192,19 @@ class FrameDecoder:
         self._cache.max_bytes = CACHE_BYTES if megabytes is None else megabytes << 20
 
     def frame(self, request: FrameRequest) -> ShownFrame | None:
-        """The frame if it is ready; otherwise it is asked for and the newest finished one is returned.
+        """The frame if it is ready; otherwise it is asked for and the newest finished one of the project is returned.
 
         The result states its frame and clip.
         """
-        known = self._cache.get(request.key)
+        project, known = request.generation, self._cache.get(request.key)
+        if known is None:
+            self.worker.request(request)
+            newest = self.worker.newest
+            known = newest[1] if newest is not None and newest[0].generation == project else self._last.get(project)
         if known is not None:
-            self._last = known
-            return known
-        self.worker.request(request)
-        newest = self.worker.newest
-        if newest is not None:
-            self._last = newest[1]
-        return self._last
+            self._last.pop(project, None)
+            self._last = dict([*self._last.items()][-1:]) | {project: known}
+        return known
 
     def known(self, key: FrameKey) -> ShownFrame | None:
         """A frame that is ready; nothing is asked for."""
@@ -279,7 +279,7 @@ class FrameDecoder:
         self._cache.clear()
         self._models = OrderedDict()
         self._files, self._copier = ClipFiles(), None
-        self._last = None
+        self._last = {}
 
     def close(self) -> None:
         """End the thread."""

@@ -4,23 +4,22 @@ is trained, captured pictures, and pictures drawn on the processor.
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
 from app.playback.ahead import Ahead, AskedLook, RequestOf, n_ahead
 from app.playback.capture_pictures import CapturedPictures, PictureRequest
+from app.playback.clip_requests import ClipRequests, StateOf
 from app.playback.clouds import CloudRequest, Clouds
-from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame, changes_digest
+from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame
 from app.playback.modes.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.modes.coverage import CoverageFinder, CoveredSpace
 from app.playback.modes.mode_arrays import ModeArrays
 from app.playback.modes.trails import TrailMaker, TrailRequest, Trails, trail_frames
-from app.playback.modes.view_modes import PLAIN, ShownAs, decoded_as
+from app.playback.modes.view_modes import PLAIN, ShownAs
 from app.playback.prefetch_order import Course
 from app.playback.render import Renderer, RenderView
 from app.playback.timeline import Timeline
@@ -30,12 +29,7 @@ from app.status import WantedFrame
 from app.training.clip_run import ShownState
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
-from engine.editing.copies.copy_moments import CopyMoments, FrameCopies
-from engine.editing.effects import EditStack
 from engine.images.rendition import Rendition
-
-StateOf = Callable[[int], ShownState | None]
-"""The state of a clip to look at; None where it has none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +63,9 @@ class Playback:
         self.ahead = Ahead(self.decoder, self.renderer)
         self._modes, self._coverage, self._trails = ModeArrays(), CoverageFinder(), TrailMaker()
         self._opened: OpenedProject | None = None
-        self._copies = CopyMoments(EditStack())
+        self._requests = ClipRequests(state_of)
         self._state_of = state_of
         self._n_ahead_seen = 0
-        self._inherited: dict[int, Path | None] = {}
         self._compared: dict[tuple[int, int], bool] = {}  # camera and width, asked for since the last turn
         self._planned_compared: object = None
         self._rig: tuple[object, CameraRig] | None = None
@@ -90,7 +83,8 @@ class Playback:
         if self._opened is not None and self._opened.generation != opened.generation:
             for store in (*self._stores, self.ahead, self._modes):
                 store.clear()
-        self._opened, self._inherited = opened, {}
+        self._opened = opened
+        self._requests.take_up(opened)
 
     def build_first_cloud(self, jobs: Jobs) -> None:
         """Make something to look at until the reference clip has a state, unless there is one."""
@@ -129,7 +123,7 @@ class Playback:
         loaded = None if request is None else self.decoder.loaded(request)
         if request is None or loaded is None:
             return None
-        effects = tuple(map(self._edits().at, trail_frames(request.clip, request.frame_index)))
+        effects = tuple(map(self._requests.edits().at, trail_frames(request.clip, request.frame_index)))
         return self._trails.trails(TrailRequest(request.model_key, request.frame_index, effects, loaded.parts))
 
     def is_loaded(self, timeline: Timeline) -> bool:
@@ -193,8 +187,21 @@ class Playback:
         full = look if full_size is None else look.in_size(view, *full_size)
         if state_of is None:  # playing does not show others next
             self.ahead.note(view_id, AskedLook(look, full))
+        return self.draw(request, (full, look), view_id=view_id, is_other=state_of is not None)
+
+    def draw(
+        self, request: FrameRequest, looks: tuple[RenderView, RenderView], *, view_id: Hashable, is_other: bool = True
+    ) -> Picture | None:
+        """The rasterizer's picture of a request; None before the first.
+
+        Args:
+            looks: At it: in full size, and as it is to be drawn.
+            view_id: Of the place where it is shown.
+            is_other: Whether the frame is of another state or project than the one at the playhead.
+        """
+        look = looks[1]
         shown: ShownFrame | None = None
-        picture = self._known_picture(request.key, (full, look), view_id)
+        picture = self._known_picture(request.key, looks, view_id)
         if picture is None:
             shown = self.decoder.frame(request)
         if shown is None:
@@ -204,10 +211,10 @@ class Playback:
             return self.renderer.picture(request.key, shown, look, view_id=view_id)
         # Until the frame was decoded, the newest one there is, drawn from the view as it is now.
         assert isinstance(key, tuple)
-        is_of_another = key[-2] != request.shown_as or (state_of is not None and key[1] != str(request.path))
+        is_of_another = key[-2] != request.shown_as or (is_other and key[1] != str(request.path))
         if is_of_another:  # of another view, which shows another part or another state
             return self.renderer.newest(view_id)
-        picture = self._known_picture(key, (full, look), view_id)
+        picture = self._known_picture(key, looks, view_id)
         if picture is None:
             picture = self.renderer.picture(key, shown, look, view_id=view_id)
         return None if picture is None else replace(picture, is_stale=True)
@@ -269,21 +276,14 @@ class Playback:
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
-        states = self._states() if self._edits().copies else ()
-        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), self._edits(), states), self._is_current)
+        requests, edits = self._requests, self._requests.edits()
+        states = self._states() if edits.copies else ()
+        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), edits, states), requests.is_current)
 
     def _states(self) -> tuple[ShownState | None, ...]:
         """Of all clips: copies may come from any of them."""
         clips = () if self._opened is None else self._opened.clips
         return tuple(self._state_of(clip.clip_index) for clip in clips)
-
-    def _is_current(self, key: FrameKey) -> bool:
-        generation, path, clip_index, revision, digest, _, frame_index = key
-        state = self._state_of(clip_index)
-        is_open = self._opened is not None and self._opened.generation == generation
-        effects, copies = self._edits().at(frame_index), self._copies.at(frame_index)
-        is_edited_so = digest == changes_digest(effects, copies, self._sources(copies))
-        return is_open and is_edited_so and state is not None and (str(state.file), state.revision) == (path, revision)
 
     def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
         """The request for the playhead; None where nothing is trained."""
@@ -293,72 +293,11 @@ class Playback:
         self, timeline: Timeline, frame_index: int, shown_as: ShownAs = PLAIN, state_of: StateOf | None = None
     ) -> FrameRequest | None:
         clip = timeline.clip_of(frame_index)
-        return None if clip is None else self.request(clip, frame_index, shown_as, state_of)
+        return None if clip is None else self._requests.request(clip, frame_index, shown_as, state_of)
 
-    def request(
-        self, clip: Clip, frame_index: int, shown_as: ShownAs = PLAIN, state_of: StateOf | None = None
-    ) -> FrameRequest | None:
-        """The file and frame to load and decode for a frame of a clip; None where the clip has no state.
-
-        Args:
-            state_of: Other states than those of the project.
-        """
-        opened = self._opened
-        state = None if opened is None else (state_of or self._state_of)(clip.clip_index)
-        if opened is None or state is None:
-            return None
-        effects, copies = self._edits().at(frame_index), self._copies.at(frame_index)
-        bare = self._bare(opened, clip, state)
-        return replace(
-            bare,
-            frame_index=frame_index,
-            shown_as=decoded_as(shown_as),
-            effects=effects,
-            copies=copies,
-            sources=self._sources(copies),
-        )
-
-    def _sources(self, copies: FrameCopies) -> tuple[FrameRequest, ...]:
-        """The clips that copies come from, as far as they have a state."""
-        opened = self._opened
-        if opened is None or not copies:
-            return ()
-        places = {bisect_right(opened.clips, frame, key=lambda clip: clip.start) - 1 for frame in copies.frames}
-        wanted = (opened.clips[place] for place in sorted(places) if place >= 0)
-        found = ((clip, self._state_of(clip.clip_index)) for clip in wanted)
-        return tuple(self._bare(opened, clip, state) for clip, state in found if state is not None)
-
-    def _bare(self, opened: OpenedProject, clip: Clip, state: ShownState) -> FrameRequest:
-        """The first frame of a clip as it was trained."""
-        return FrameRequest(
-            clip_index=clip.clip_index,
-            revision=state.revision,
-            frame_index=clip.start,
-            path=state.file,
-            generation=opened.generation,
-            reference_path=state.reference_file or self._inherited_path(opened, clip.clip_index),
-            clip=clip,
-            is_live=state.is_live,
-        )
-
-    def _edits(self) -> EditStack:
-        """Those of the document as it is now; frames that a change of them leaves alone stay as they are."""
-        document = None if self._opened is None else self._opened.project.document
-        known = self._copies.stack
-        if document is None:
-            wanted: tuple[object, ...] = ((), (), (), ())
-        else:
-            wanted = (document.edits, document.objects, document.copies, document.camera_paths)
-        if any(one is not other for one, other in zip(wanted, known.parts, strict=True)):
-            known = EditStack() if document is None else document.stack()
-            self._copies = CopyMoments(known)
-        return known
-
-    def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:
-        """Kept: it is asked for many times in every turn of the loop, and follows from all settings."""
-        if clip_index not in self._inherited:
-            self._inherited[clip_index] = opened.inherited_path(clip_index)
-        return self._inherited[clip_index]
+    def request(self, clip: Clip, frame_index: int, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
+        """The file and frame to load and decode for a frame of a clip; None where the clip has no state."""
+        return self._requests.request(clip, frame_index, shown_as)
 
     # ---------------------------------------------------------------- other contents
 
@@ -447,9 +386,13 @@ class Playback:
             failure = worker.take_error()
             if failure is not None:
                 request, error = failure
-                is_of_clip = isinstance(request, FrameRequest | CloudRequest)
+                is_of_clip = isinstance(request, FrameRequest | CloudRequest) and self._is_own(request)
                 found.append(Failure(title, error, is_of_clip, is_of_clip and request.is_live))
         return found
+
+    def _is_own(self, request: FrameRequest | CloudRequest) -> bool:
+        """Whether it is of the open project, not of one that it is compared with."""
+        return self._opened is not None and request.generation == self._opened.generation
 
     def close(self) -> None:
         """End the threads."""

@@ -18,6 +18,7 @@ from app.session.objects.object_commands import ObjectCommand
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import AskStartOver, StartOver
 from app.session.projects.setting_commands import SetClipLength, SetHoldout, SetPreset, SetTrainSetting
+from app.session.showing.look_commands import CompareProject
 from app.session.training.train_commands import (
     AskTrainSettings,
     JoinCluster,
@@ -71,6 +72,7 @@ TITLES: dict[type, str] = {
     **dict.fromkeys((*TIME_EDITS.values(), ChangeSegment), "The take cannot be changed"),
     FillBehind: "Nothing can be filled",
     **dict.fromkeys(get_args(PathCommand), "The camera path cannot be changed"),
+    CompareProject: "The project cannot be compared",
     AskStartOver: "Training cannot start over",
     StartOver: "Training cannot start over",
     CorrectCapture: "The capture cannot be corrected",

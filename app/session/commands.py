@@ -28,7 +28,7 @@ from app.session.objects.object_commands import ObjectCommand
 from app.session.paths.path_commands import PathCommand
 from app.session.projects.project_commands import ProjectCommand
 from app.session.projects.setting_commands import SettingCommand
-from app.session.showing.look_commands import LookCommand
+from app.session.showing.look_commands import CompareProject, LookCommand
 from app.session.training.train_commands import ClusterCommand, HoldCommand, TrainCommand
 
 
@@ -62,6 +62,7 @@ Command = (
     | ExclusionCommand
     | MendCommand
     | LookCommand
+    | CompareProject
     | SelectionCommand
     | EditCommand
     | ObjectCommand

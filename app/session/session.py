@@ -67,7 +67,8 @@ from app.session.projects.setting_commands import SettingCommand
 from app.session.projects.settings import Settings
 from app.session.questions import Asked
 from app.session.session_face import SessionFace
-from app.session.showing.look_commands import LookCommand
+from app.session.showing.look_commands import CompareProject, LookCommand
+from app.session.showing.other_project import OtherProject
 from app.session.showing.showing import Showing
 from app.session.timing.time_edits import apply_time_edit
 from app.session.training.clip_versions import Versions
@@ -90,6 +91,7 @@ class Session(SessionFace):
             nothing is left to train.
         projects: The open project, and those opened lately.
         showing: The shown picture, and everything that prepares it.
+        other: A second project to compare with.
         live_training, versions: The training, and earlier versions of clips.
         joining: The cluster that clips train on, if any.
         document: The edited document, and the way back.
@@ -166,6 +168,7 @@ class Session(SessionFace):
             )
         )
         parts.add(showing)
+        self.other = parts.add(OtherProject(jobs, self.notices, showing, lambda: self.projects.opener.projects))
         self.selecting = parts.add(ProjectSelecting(ShownToSelect(showing)))
         self.camera_paths = parts.add(CameraPaths(self.document))
         self.joining = parts.add(ClusterJoining(connect, live, jobs, self.notices))
@@ -246,6 +249,8 @@ class Session(SessionFace):
                 self.asked.put(self.clip_work.obey(command))
             case _ if isinstance(command, LookCommand):
                 self.showing.obey(command)
+            case CompareProject():
+                self.other.choose(command)
             case _ if isinstance(command, EditCommand):
                 self.editing.apply(command)
             case FillBehind():

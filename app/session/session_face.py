@@ -32,12 +32,15 @@ from app.session.editing.selecting import ProjectSelecting
 from app.session.projects.projects import Projects
 from app.session.projects.recent_projects import RecentProjects
 from app.session.questions import Asked, Question
+from app.session.showing.other_project import OtherProject
 from app.session.showing.showing import Showing
 from app.session.training.clip_versions import Versions
 from app.session.training.live_training import LiveTraining
 from app.status import (
+    PROJECT,
     DependencyStatus,
     JobStatus,
+    OtherStatus,
     Overlays,
     RecordingStatus,
     ResidualStatus,
@@ -61,6 +64,7 @@ class SessionFace:
 
     projects: Projects
     showing: Showing
+    other: OtherProject
     training: TrainingStatus
     document: KeptDocument
     doctor: CaptureDoctor
@@ -151,6 +155,11 @@ class SessionFace:
     def overlays(self) -> Overlays:
         """Overlays of the current view."""
         return self.showing.overlays
+
+    @property
+    def other_project(self) -> OtherStatus | None:
+        """The project that the open one can be compared with; None where none is chosen."""
+        return self.other.status
 
     @property
     def playback(self) -> Playback:
@@ -287,13 +296,16 @@ class SessionFace:
     def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture that the rendered one is compared with; None where that is a captured one."""
         other, state_of = self.overlays.compare_with, None
+        view_id = ("other", self.views.current_index)
+        if other == PROJECT:
+            shown_as = self.showing.shown_as
+            return self.other.picture(width, height, full_size=full_size, shown_as=shown_as, view_id=view_id)
         version = version_number(other)
         if version is not None:
             other, state_of = self.overlays.mode, lambda clip_index: self.version_state(clip_index, version)
         if other not in MODES:
             return None
         shown_as = ShownAs(other, self.overlays.content)
-        view_id = ("other", self.views.current_index)
         return self.playback.render(
             self.timeline,
             self.view,

@@ -44,6 +44,7 @@ from app.status import (
     DependencyStatus,
     JobStatus,
     OpeningForecast,
+    OtherStatus,
     Overlays,
     PlanStatus,
     ProjectStatus,
@@ -81,6 +82,8 @@ class CaptureFacts(Protocol):
     def n_frames(self) -> int: ...
     @property
     def fps(self) -> float: ...
+    @property
+    def has_pictures(self) -> bool: ...
 
 
 class PageView(Protocol[P]):
@@ -181,6 +184,8 @@ class SessionView(Protocol):
     def overlays(self) -> Overlays: ...
     @property
     def bookmarks(self) -> Bookmarks: ...
+    @property
+    def other_project(self) -> OtherStatus | None: ...
 
     # ---- edits
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from pathlib import Path
 
 OVERLAY_NAMES = (
     "show_frusta",
@@ -19,6 +20,8 @@ OVERLAY_NAMES = (
 COMPARE_MODES = ("off", "wipe", "side", "blink")
 CAPTURED = "captured"
 """Of Overlays.compare_with: the camera's picture."""
+PROJECT = "project"
+"""Of Overlays.compare_with: the other project, see OtherStatus."""
 _VERSION = "version "
 BLINK_HZ = (0.25, 3.0)
 """Slowest and fastest blinking. More than three flashes a second can cause seizures."""
@@ -46,8 +49,8 @@ class Overlays:
         show_trails: The ways that Gaussians took over the last frames.
         show_paths: The chosen camera path and its keys.
         compare: "off", "wipe", "side" or "blink": another picture over, next to or in turn with the rendered one.
-        compare_with: The other picture: CAPTURED, the name of a mode (see view_modes), or that of an earlier version of
-            the clip, see `version_name`.
+        compare_with: The other picture: CAPTURED, PROJECT, the name of a mode (see view_modes), or that of an earlier
+            version of the clip, see `version_name`.
         wipe_position: Share of the width that shows the other picture, 0..1.
         blink_hz: How often a second each of the two pictures is seen.
         mode, content: Meaning of colours and the drawn part of a clip, by name; see app.playback.modes.view_modes.
@@ -77,6 +80,22 @@ class Overlays:
     heat_opacity: float = 0.75
     mark_size: float = 1.0
     mark_opacity: float = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class OtherStatus:
+    """Another project that the open one is compared with.
+
+    Attributes:
+        name: As shown to the user.
+        n_frames: Past the end, its last frame is shown.
+        missing: Why there is no picture of it; empty where one is there, or on its way.
+    """
+
+    name: str
+    folder: Path
+    n_frames: int
+    missing: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ class Part:
 
     def __init__(self, data: bytes, n_bytes: int) -> None:
         unpacker = zlib.decompressobj(wbits=-15)
-        self.data = unpacker.decompress(data, n_bytes + 1)  # never more than it is said to have
+        self.data = unpacker.decompress(data, n_bytes + 1)  # never more than the header claims
         self.at = 0
         assert len(self.data) == n_bytes, f"a part has {len(self.data)} bytes instead of {n_bytes}"
 
@@ -153,4 +153,4 @@ if __name__ == "__main__":
     page, number = Page(Path(sys.argv[1])), int(sys.argv[2])
     arrays = page.frame(number)
     arrays.pop("levels")
-    np.savez(page.path.with_name(f"{page.path.stem}_{number}.npz"), **arrays)
+    np.savez(page.path.with_name(f"{page.path.stem}_{number}.npz"), allow_pickle=False, **arrays)

@@ -26,7 +26,7 @@ MAX_DOUBTFUL = 0.25
 """Share of the cameras that were found. Where matches contradict more, whole groups of cameras have been found in wrong
 places, and those that agree may be such a group."""
 MIN_FAR_SHARE = 0.5
-"""Of all cameras far apart, that have to hold together: a few that happen to be near each other are no rig."""
+"""Of all cameras far apart, that have to hold together: a few neighbours do not make a rig."""
 FAR = (
     "Neighbouring cameras are far apart; they were found from what moves, pair by pair. Directions may be off by 3 "
     "degrees and positions by 4 % of the rig's radius; a board finds them exactly."

@@ -55,6 +55,14 @@ class FileWorld:
         poses[:, :3, 3] *= self.scale
         return poses
 
+    def placed_view(self, world_to_camera: np.ndarray) -> np.ndarray:
+        """The same picture from there, of the scene as it lies in the file: rigid, units of the file. [4, 4]"""
+        return np.linalg.inv(self.placed_cameras(world_to_camera[None])[0])
+
+    def seen_from(self, other: FileWorld) -> FileWorld:
+        """From the coordinates of another file of the same scene to those of this one."""
+        return FileWorld(self.rotation @ other.rotation.T, self.scale / other.scale, self.up)
+
     @staticmethod
     def _moved(splats: Splats, rotation: np.ndarray, scale: float) -> Splats:
         if scale == 1.0 and np.array_equal(rotation, np.eye(3)):

@@ -15,11 +15,11 @@ from msgspec import Meta, Struct
 from engine.capture.files.frame_files import VIDEO_SUFFIXES, listed, natural_key
 from engine.capture.files.frame_runs import runs_of
 from engine.capture.files.places import place_in
+from engine.capture.formats.imported import Quat, ScenePlace
 from engine.capture.layout.format_checks import read_json_object
 from engine.errors import CaptureError, ProjectError
-from engine.export.formats.compressed_ply import read as read_compressed
 from engine.export.formats.damaged import damaged
-from engine.export.formats.table import FORMATS
+from engine.export.formats.table import read_file
 from engine.export.sequences.sequence import SequenceReader
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
@@ -45,10 +45,12 @@ class SceneSource(Protocol):
     Attributes:
         fps: Frames per second; None where nothing says so.
         up: Which way is up; None where nothing says so.
+        place: Where an export of our own placed it; None where nothing says so.
     """
 
     fps: float | None
     up: Vector | None
+    place: ScenePlace | None
 
     @property
     def n_frames(self) -> int:
@@ -75,6 +77,13 @@ class _Sidecar(Struct, frozen=True):
     fps: Annotated[float, Meta(gt=0, lt=1e6)]
     up: Vector
     files: list[dict[str, Any]]
+    scale: float = 1.0
+    quat: Quat | None = None
+
+    @property
+    def place(self) -> ScenePlace | None:
+        """Where the scene lies. Raises ValueError."""
+        return None if self.quat is None else ScenePlace(self.quat, self.scale)
 
 
 def is_scene(path: Path) -> bool:
@@ -119,6 +128,7 @@ class SequenceScene:
     def __init__(self, reader: SequenceReader, usual_up: Vector | None) -> None:
         self._reader = reader
         self.fps: float | None = reader.timing.fps
+        self.place: ScenePlace | None = None
         self.up: Vector | None = reader.splats(0).up if usual_up is None else usual_up
         self._seen = _Seen()
 
@@ -146,9 +156,15 @@ class FrameFiles:
     """A file per frame."""
 
     def __init__(
-        self, files: Sequence[Path], *, fps: float | None = None, up: Vector | None = None, notes: Sequence[str] = ()
+        self,
+        files: Sequence[Path],
+        *,
+        fps: float | None = None,
+        up: Vector | None = None,
+        place: ScenePlace | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
-        self.files, self.fps, self.up = tuple(files), fps, up
+        self.files, self.fps, self.up, self.place = tuple(files), fps, up, place
         self._notes, self._seen = tuple(notes), _Seen()
 
     @property
@@ -207,11 +223,7 @@ class _Seen:
 
 
 def _read(path: Path, file: Any) -> Splats:
-    if path.suffix.lower() != ".ply":
-        return FORMATS[path.suffix.lower().removeprefix(".")].read(file)
-    head = file.read(1 << 12)
-    file.seek(0)
-    return read_compressed(file) if b"\nelement chunk " in head else FORMATS["ply"].read(file)
+    return read_file(path.suffix.lower(), file)
 
 
 def _frame_names(folder: Path) -> list[str]:
@@ -250,7 +262,7 @@ def _open_folder(folder: Path) -> FrameFiles:
             hint="Export the whole scene to import it.",
             path=folder,
         )
-    return FrameFiles(files, fps=sidecar.fps, up=sidecar.up, notes=_gaps(names))
+    return FrameFiles(files, fps=sidecar.fps, up=sidecar.up, place=sidecar.place, notes=_gaps(names))
 
 
 def _sidecar(folder: Path) -> _Sidecar | None:
@@ -260,8 +272,10 @@ def _sidecar(folder: Path) -> _Sidecar | None:
         return None
     path = place_in(folder, names[0], follow_links=False, named_in=folder)
     try:
-        return to_type(read_json_object(path), _Sidecar)
-    except EntryError as error:
+        found = to_type(read_json_object(path), _Sidecar)
+        _ = found.place
+        return found
+    except (EntryError, ValueError) as error:
         raise ProjectError(
             f"The description of the export is damaged ({error}).", hint="Remove it.", path=path
         ) from error

@@ -74,10 +74,12 @@ from app.session.showing.look_commands import (
 from app.session.training.train_commands import TrainClip
 from app.status import (
     CELL_RANGES,
+    PROJECT,
     ClipStatus,
     DependencyStatus,
     JobStatus,
     OpeningForecast,
+    OtherStatus,
     Overlays,
     PlanStatus,
     ProjectStatus,
@@ -135,6 +137,7 @@ class FakeCapture:
     format: str = "sample"
     n_frames: int = 30
     fps: float = 30.0
+    has_pictures: bool = True
 
 
 @dataclass
@@ -310,6 +313,7 @@ class FakeSession:
         self.recording_status = RecordingStatus()
         self.timeline, self.views = Timeline(), Views()
         self.bookmarks = Bookmarks()
+        self.other_project: OtherStatus | None = None
         if has_capture:
             self._open(FakeCapture(make_rig()))
 
@@ -592,13 +596,16 @@ class FakeSession:
         )
 
     def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """The same in green, in the mode that is compared with; None for a captured picture."""
-        if self.overlays.compare_with not in MODES:
-            return None
+        """The same in green, in the mode that is compared with, or of the other project; None for a captured one."""
+        other, project = self.overlays.compare_with, self.other_project
         picture = self.request_render(width, height, full_size=full_size)
-        if picture is None:
+        if picture is None or other not in (PROJECT, *MODES):
             return None
-        source = replace(picture.source, shown_as=ShownAs(self.overlays.compare_with))
+        source = replace(picture.source, shown_as=ShownAs(other if other in MODES else self.overlays.mode))
+        if other == PROJECT and project is not None:
+            if project.missing:
+                return None
+            source = replace(source, frame_index=min(self.timeline.frame_index, project.n_frames - 1))
         return replace(
             picture, image=picture.image * np.array([0, 1, 0], np.uint8), key=("other", picture.key), source=source
         )

@@ -173,7 +173,7 @@ def test_help_says_what_each_command_does(capsys: pytest.CaptureFixture[str]) ->
     assert ended.value.code == 0
     lines = [line.split(maxsplit=2) for line in capsys.readouterr().out.splitlines()]
     said = {line[1]: line[2] for line in lines if line[:1] == ["clipgstream"]}
-    assert said.keys() == {*COMMANDS, "demo"}
+    assert said.keys() == {*COMMANDS, "sample", "demo", "completion"}
     assert all(said[name] == command.summary for name, command in COMMANDS.items())
 
 

@@ -16,6 +16,7 @@ class UiRequests:
         is_palette: Open the palette.
         preferences_page: Open the preferences at the page of this title; None for no wish, empty for the last one.
         is_read_only: Ask for a project to look at only.
+        is_comparison: Ask for a project to compare the open one with.
         relocated_project: Ask where the capture of the project in this folder lies; None for no wish.
         is_calibration: Ask for a folder of plain videos to calibrate.
         is_fullscreen: Fill the screen, or go back to a window.
@@ -31,6 +32,7 @@ class UiRequests:
     is_fullscreen: bool = False
     is_calibration: bool = False
     is_read_only: bool = False
+    is_comparison: bool = False
     relocated_project: Path | None = None
     layout: str | None = None
     is_layout_name: bool = False

@@ -19,7 +19,12 @@ from engine.user_folders import data_dir
 
 ENTRY = Path("applications", "clipgstream.desktop")
 ICON = Path("icons", "hicolor", "scalable", "apps", "clipgstream.svg")
+KINDS = Path("mime", "packages", "clipgstream.xml")
+"""Kinds of files that the program opens and hardly another one."""
+MIME_TYPES = ("application/x-4dgs", "application/x-tsog")
+"""Those that it declares."""
 _REFRESHING = (
+    ("update-mime-database", "mime"),
     ("update-desktop-database", "applications"),
     ("gtk-update-icon-cache", "-q", "-t", "icons/hicolor"),
 )
@@ -34,8 +39,11 @@ def install() -> list[Path]:
         ProjectError: This is not Linux.
         DiskError: The disk refuses.
     """
-    icon = asset_path("desktop", "clipgstream.svg").read_bytes()
-    contents = {ENTRY: desktop_entry(program_words()).encode(), ICON: icon}
+    contents = {
+        ENTRY: desktop_entry(program_words()).encode(),
+        ICON: asset_path("desktop", "clipgstream.svg").read_bytes(),
+        KINDS: asset_path("desktop", "clipgstream.xml").read_bytes(),
+    }
     written = []
     for place, content in contents.items():
         path = _data_home() / place
@@ -57,7 +65,7 @@ def remove() -> list[Path]:
         DiskError: The disk refuses.
     """
     removed = []
-    for place in (ENTRY, ICON):
+    for place in (ENTRY, ICON, KINDS):
         path = _data_home() / place
         try:
             path.unlink()
@@ -85,6 +93,7 @@ Icon={ICON.stem}
 Terminal=false
 StartupNotify=false
 Categories=Graphics;3DGraphics;
+MimeType={"".join(f"{name};" for name in MIME_TYPES)}
 Keywords=gaussian;splatting;capture;volumetric;video;
 """
 

@@ -17,6 +17,7 @@ from app.export.gaussians.read_back import ReadBack
 from app.export.scene_frames import SceneFrames
 from app.export.take import TakeFrame
 from engine.camera.rig import CameraRig
+from engine.camera.rotations import quats_of
 from engine.export.formats.table import Format
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
@@ -161,6 +162,7 @@ class GaussianSequence:
             "axes": self._placement.text,
             "up": [round(value, 6) for value in self._placement.up],
             "scale": self._placement.scale,
+            "quat": quats_of(self._placement.rotation).tolist(),
             "meters_per_unit": None if meters_per_unit is None else meters_per_unit / self._placement.scale,
             "psnr_db": self.psnr_db,
             "min_psnr_db": self._kind.min_psnr_db,

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from app.background.jobs import JobContext, Jobs
 from app.project.opening.opening import Opened, open_for_window
-from app.project.opening.project_access import is_project
 from app.project.projects_folder import projects_dir
 from app.project.recents import RecentProject
 from app.session.notices import Notice, Notices
@@ -118,17 +117,9 @@ class ProjectOpener:
         this, chosen, projects = self._newest, self.project_dir, self.projects
 
         def work(context: JobContext) -> Path:
-            from app.importing.import_scene import import_scene
-            from app.importing.importable import imported_dir
+            from app.importing.importable import imported_dir, project_of_scene
 
-            folder = imported_dir(path, projects) if chosen is None else chosen
-
-            def report(n_done: int, n: int) -> None:
-                context.report(n_done / n, f"{n_done} of {n} frames")
-
-            if not is_project(folder):
-                import_scene(path, folder, report=report)
-            return folder
+            return project_of_scene(path, imported_dir(path, projects) if chosen is None else chosen, context)
 
         def done(folder: Path) -> None:
             if this is self._newest:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from app.session.clips.clip_commands import CompareVersion
 
@@ -45,6 +46,13 @@ class SetCompareWith:
     """Choose the picture to compare with. other: See Overlays.compare_with."""
 
     other: str
+
+
+@dataclass(frozen=True, slots=True)
+class CompareProject:
+    """Compare with another project; a scene of another program is imported first, unless that was done before."""
+
+    path: Path
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from app.session.showing.look_commands import (
     ToggleOverlay,
     TogglePlay,
 )
-from app.status import CAPTURED, COMPARE_MODES, OVERLAY_NAMES, version_number
+from app.status import CAPTURED, COMPARE_MODES, OVERLAY_NAMES, PROJECT, version_number
 
 
 def look(command: LookCommand, timeline: Timeline, views: Views, playback: Playback) -> None:
@@ -59,8 +59,8 @@ def look(command: LookCommand, timeline: Timeline, views: Views, playback: Playb
                 raise ValueError(f"heat maps are {', '.join(HEAT_KINDS)}, not {kind!r}")
             overlays.heat = kind
         case SetCompareWith(other=other):
-            if other != CAPTURED and other not in MODES and version_number(other) is None:
-                known = f"{CAPTURED}, {', '.join(MODES)} and versions"
+            if other not in (CAPTURED, PROJECT, *MODES) and version_number(other) is None:
+                known = f"{CAPTURED}, {PROJECT}, {', '.join(MODES)} and versions"
                 raise ValueError(f"pictures to compare with are {known}, not {other!r}")
             overlays.compare_with = other
         case SetMode(mode=mode):

@@ -240,9 +240,9 @@ def _ratios(
         places.append(np.concatenate([key_points[camera].pixels[rows], moments], axis=1))
         depths.append(geometries[one].depths[:, end])
     reach_px = NEAR_PX * float(sizes[camera].max()) / 640
-    off, nearest = KDTree(places[0]).query(places[1], distance_upper_bound=reach_px)
-    is_near = np.isfinite(off)
-    return np.log(depths[0][np.asarray(nearest)[is_near]] / depths[1][is_near])
+    off, found = KDTree(places[0]).query(places[1], distance_upper_bound=reach_px)
+    is_near, nearest = np.isfinite(off), np.asarray(found)
+    return np.log(depths[0][nearest[is_near]] / depths[1][is_near])
 
 
 def _angle_deg(rotation: np.ndarray) -> float:

@@ -6,6 +6,7 @@ exported like any other. Its Gaussians lie in the clips of the project.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,8 +36,11 @@ FORMAT = "imported scene"
 LAYOUT = "imported.json, the views of a scene from another program, which has no pictures"
 """The layout in words."""
 FILE = "imported.json"
+MAX_SCALE = 1e9
+QUAT_TOLERANCE = 1e-4
 NO_PICTURES = "This scene was imported and has no pictures."
 
+Quat = tuple[float, float, float, float]
 _Side = Annotated[int, Meta(ge=1, le=MAX_SIDE)]
 
 
@@ -50,6 +54,26 @@ class ImportedView(Struct, frozen=True, forbid_unknown_fields=True):
     world_to_camera: list[list[float]]
 
 
+class ScenePlace(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where an export of our own placed a scene: a rotation and a scale away from the capture that it was made of.
+
+    Attributes:
+        quat: wxyz, unit length.
+        scale: Units of the scene per unit of that capture, > 0.
+    """
+
+    quat: Quat
+    scale: float
+
+    def __post_init__(self) -> None:
+        """Raises ValueError where it is no such thing."""
+        length = math.hypot(*self.quat)
+        if not abs(length - 1.0) < QUAT_TOLERANCE:
+            raise ValueError(f"its quat has length {length:g}, not 1")
+        if not 0.0 < self.scale < MAX_SCALE:
+            raise ValueError(f"its scale is {self.scale:g}")
+
+
 class ImportedDocument(Struct, frozen=True, forbid_unknown_fields=True):
     """The whole file.
 
@@ -58,6 +82,7 @@ class ImportedDocument(Struct, frozen=True, forbid_unknown_fields=True):
         source: File or folder that it was read from, as a name for people.
         views: At least one.
         notes: What of the scene is not kept, as sentences.
+        place: None where it is not known.
     """
 
     schema: Literal[1]
@@ -66,6 +91,7 @@ class ImportedDocument(Struct, frozen=True, forbid_unknown_fields=True):
     source: str
     views: list[ImportedView]
     notes: list[str] = []
+    place: ScenePlace | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +125,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     Raises:
         CaptureError: Listing every problem found.
     """
-    path = folder / FILE
-    try:
-        document = to_type(read_json_object(path), ImportedDocument)
-    except EntryError as error:
-        raise CaptureError(f"The file cannot be used ({error}).", hint="Import the scene again.", path=path) from error
+    path, document = folder / FILE, _document(folder)
     problems = check_fps(document.fps, path) + check_names([view.name for view in document.views], path)
     cameras, source = [], NoFrames(path, document.n_frames)
     for view in document.views:
@@ -125,8 +147,28 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     )
 
 
+def _document(folder: Path) -> ImportedDocument:
+    path = folder / FILE
+    try:
+        return to_type(read_json_object(path), ImportedDocument)
+    except EntryError as error:
+        raise CaptureError(f"The file cannot be used ({error}).", hint="Import the scene again.", path=path) from error
+
+
+def read_place(folder: Path) -> ScenePlace | None:
+    """Where the scene of a capture folder was placed; None where that is not known. Raises CaptureError."""
+    return _document(folder).place if (folder / FILE).is_file() else None
+
+
 def write_imported(
-    folder: Path, rig: CameraRig, *, n_frames: int, fps: float, source: str, notes: Sequence[str]
+    folder: Path,
+    rig: CameraRig,
+    *,
+    n_frames: int,
+    fps: float,
+    source: str,
+    notes: Sequence[str],
+    place: ScenePlace | None = None,
 ) -> None:
     """Write the file into a folder. Inverse of `read`. Raises OSError."""
     views = [
@@ -136,6 +178,6 @@ def write_imported(
         )
         for i, name in enumerate(rig.names)
     ]  # fmt: skip
-    document = ImportedDocument(1, n_frames, fps, source, views, list(notes))
+    document = ImportedDocument(1, n_frames, fps, source, views, list(notes), place)
     with atomic_path(folder / FILE) as partial:
         partial.write_text(json_text(to_builtins(document), indent=1) + "\n", encoding="utf-8")

@@ -48,6 +48,11 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
     return ()
 
 
+def is_compressed(head: bytes) -> bool:
+    """Whether a .ply that begins so is of this kind."""
+    return b"\nelement chunk " in head
+
+
 def read(file: BinaryIO) -> Splats:
     """Read a file of `write`, or one of another program, which may lack limits of colours and have colours of higher
     degrees. Raises ProjectError where it is something else."""

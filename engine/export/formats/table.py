@@ -66,3 +66,19 @@ FORMATS: dict[str, Format] = {
 """By the name that the command line has for it, in the order in which they are offered."""
 FULL_PLY = FORMATS["ply"]._replace(bytes_each=248.0, write=ply.write_full)
 """For programs that read rows of 248 bytes only."""
+
+
+def read_file(suffix: str, file: BinaryIO) -> Splats:
+    """Read a file of any of the formats; a .ply may be compressed, whatever it is called.
+
+    Args:
+        suffix: Of its name, in lower case, with its point: the last one where it has several.
+        file: At its beginning.
+    Raises:
+        ProjectError: It is something else.
+    """
+    head = file.read(1 << 12)
+    file.seek(0)
+    if suffix == ".ply" and compressed_ply.is_compressed(head):
+        return compressed_ply.read(file)
+    return next(kind.read for kind in FORMATS.values() if kind.suffix == suffix)(file)

@@ -33,11 +33,6 @@ FAINTEST = 5.0 / 255.0
 """Fainter Gaussians are left out: they are many, and all together nobody sees them."""
 NEAREST_AXIS = 0.999
 """Cosine of the angle up to which an axis counts as up: 2.5 degrees."""
-LIMITS = (
-    "Colours beyond the brightest white are cut off.",
-    "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an eighth of a "
-    "Gaussian's size.",
-)
 PRODUCER = "ClipGStream Studio"
 FPS_KEY = "clipgstream_fps"
 """Attribute with the frames per second of the take that was written; the format itself knows seconds only."""

@@ -4,10 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from engine.export.sequences import fourdgs_reader, fourdgs_writer, tsog, tsog_reader, usd
 from engine.export.sequences.sequence import SequenceReader, SequenceStretch, SequenceTiming
+from engine.own_modules import import_own
+
+
+def _later(place: str) -> Callable[..., Any]:
+    """A function or class of a codec, which is imported when it is called: the window lists formats before its first
+    picture. place: "module:name"."""
+    module, _, name = place.partition(":")
+
+    def call(*arguments: Any) -> Any:
+        return getattr(import_own(f"engine.export.sequences.{module}"), name)(*arguments)
+
+    return call
 
 
 def _can_always() -> None:
@@ -62,11 +73,15 @@ _USD = SequenceFormat(
     45.0,
     56.0,
     35.0,
-    usd.LIMITS,
-    usd.write,
-    usd.UsdReader,
+    (
+        "Of USD, programs need the schema ParticleField3DGaussianSplat (OpenUSD 26.03 or later); others see nothing.",
+        "Colours are as displays take them, although the schema means light. What moves is stored frame by frame: it does "
+        "not glide between frames.",
+    ),
+    _later("usd:write"),
+    _later("usd:UsdReader"),
     up="+y",
-    check=usd.check,
+    check=_later("usd:check"),
 )
 SEQUENCES: dict[str, SequenceFormat] = {
     "4dgs": SequenceFormat(
@@ -76,11 +91,15 @@ SEQUENCES: dict[str, SequenceFormat] = {
         45.0,
         8.5,
         2.2,
-        fourdgs_writer.LIMITS,
-        fourdgs_writer.write,
-        fourdgs_reader.FourdgsReader,
+        (
+            "Colours beyond the brightest white are cut off.",
+            "Gaussians of less than 2 % opacity are left out, and paths are straight over a few frames within an eighth of a "
+            "Gaussian's size.",
+        ),
+        _later("fourdgs_writer:write"),
+        _later("fourdgs_reader:FourdgsReader"),
         has_sound=True,
-        problems=fourdgs_reader.problems,
+        problems=_later("fourdgs_reader:problems"),
     ),
     "tsog": SequenceFormat(
         "TSOG",
@@ -89,9 +108,13 @@ SEQUENCES: dict[str, SequenceFormat] = {
         45.0,
         11.0,
         10.5,
-        tsog.LIMITS,
-        tsog.write,
-        tsog_reader.open_tsog,
+        (
+            "Positions have 16 bits, rotations 8; scales and colours are of 256 values each. Light on still Gaussians that "
+            "changes by up to four levels of 255 becomes its mean.",
+            "Between frames, moving Gaussians fade into the next frame on a straight path.",
+        ),
+        _later("tsog:write"),
+        _later("tsog_reader:open_tsog"),
         has_sound=True,
         up="+y",
     ),

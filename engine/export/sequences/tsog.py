@@ -48,11 +48,6 @@ _SPEED_QUANTILE = 0.999
 _PLAYER_ROWS = 1_000_000
 _EFFORT = 50
 _SOUND = "audio/track.wav"
-LIMITS = (
-    "Positions have 16 bits, rotations 8; scales and colours are of 256 values each. Light on still Gaussians that "
-    "changes by up to four levels of 255 becomes its mean.",
-    "Between frames, moving Gaussians fade into the next frame on a straight path.",
-)
 
 
 def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:

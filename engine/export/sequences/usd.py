@@ -22,11 +22,6 @@ from engine.export.splats import Splats, colors_of
 from engine.export.usd_library import usd_module
 from engine.export.world import FileWorld
 
-LIMITS = (
-    "Of USD, programs need the schema ParticleField3DGaussianSplat (OpenUSD 26.03 or later); others see nothing.",
-    "Colours are as displays take them, although the schema means light. What moves is stored frame by frame: it does "
-    "not glide between frames.",
-)
 ROOT = "/Scene"
 MAX_FRAMES = 1_000_000
 MAX_GAUSSIANS = 1 << 22

@@ -15,6 +15,7 @@ from app.export.jobs.gaussians import GaussiansJob
 from app.export.jobs.job import ExportJob
 from app.export.jobs.metrics import MetricsJob
 from app.export.jobs.player import PlayerJob
+from app.export.jobs.sequence import SequenceJob
 from app.export.jobs.table import KINDS
 from app.export.jobs.video import Turntable, VideoJob
 from app.export.picked_frames import PickedFrames
@@ -151,6 +152,7 @@ EVERY_KIND = [
     PlayerJob(Path("/a.html"), has_folder=False),
     MetricsJob(Path("/m.json"), "json", PickedFrames.of(range(20))),
     CamerasJob(Path("/cameras")),
+    SequenceJob(Path("/s.4dgs"), "4dgs", PickedFrames.of(range(3)), up="+y", sound="cam"),
 ]
 
 

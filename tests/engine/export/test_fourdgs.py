@@ -7,6 +7,7 @@ import tracemalloc
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import fourdgs
 import numpy as np
@@ -135,7 +136,8 @@ def test_nothing_at_all_is_a_file_too(tmp_path: Path):
 def test_what_does_not_fit_is_said(tmp_path: Path):
     usual = chance_splats(20)
     odd = [one_splat(means=[[1e12, 0.0, 0.0]]), one_splat(colors=[[1.5, 0.5, 0.5]])]
-    still = Splats(*(np.concatenate([getattr(one, name) for one in (usual, *odd)]) for name in NAMES))
+    columns: list[Any] = [np.concatenate([getattr(one, name) for one in (usual, *odd)]) for name in NAMES]
+    still = Splats(*columns)
     moving = MovingSplats(still[:0], np.zeros(0, np.int64))
     notes = write([SequenceStretch(0, 1, still, lambda frame: moving)], SequenceTiming(1, 30.0), tmp_path / "o.4dgs")
     assert ["too far away" in notes[0], "brighter than white" in notes[1]] == [True, True]
@@ -206,7 +208,8 @@ def one_chunk(streams: bytes, n_rows: int, **header: object) -> bytes:
     about = {"duration_sec": 1.0, "gaussian_count": n_rows, "aabb": [0.0] * 6, **header}
     grid = [steps.pos, steps.scale_log, steps.rot, steps.rgb, steps.alpha, steps.motion, steps.time, steps.sigma_log]
     front = MAGIC + records.Header(**about).encode()  # type: ignore[arg-type]
-    front += records.Quantization("uniform-v1", [0.0] * 3, *grid, 1, bounds.as_strings()).encode()
+    entries: list[Any] = ["uniform-v1", [0.0] * 3, *grid, 1, bounds.as_strings()]
+    front += records.Quantization(*entries).encode()
     front += records.WindowTable([(0.0, 1.0)]).encode()
     chunk = records.encode_chunk(0.0, 1.0, 0, n_rows, streams)
     entry = records.ChunkIndexEntry(0.0, 1.0, len(front), len(chunk), n_rows)

@@ -95,8 +95,9 @@ def test_what_is_hidden_weighs_nothing_and_is_left_out():
     rig = CameraRig(("a", "b"), np.stack(matrices), np.stack(Ks), np.array([SIZE, SIZE]))
     weigh = SeenWeights.of(rig, NEAR, backend_called("cpu"))
     centre = np.zeros((1, 3))
-    wall = Splats.from_arrays(centre, [[1, 0, 0, 0]], [[0.5, 0.5, 0.5]], [1.0], [[1, 0, 0]])
-    inside = Splats.from_arrays(centre + 1e-3, [[1, 0, 0, 0]], [[0.001] * 3], [0.004], [[0, 1, 0]])
+    upright, red, green = np.array([[1.0, 0, 0, 0]]), np.array([[1.0, 0, 0]]), np.array([[0, 1.0, 0]])
+    wall = Splats.from_arrays(centre, upright, np.full((1, 3), 0.5), np.ones(1), red)
+    inside = Splats.from_arrays(centre + 1e-3, upright, np.full((1, 3), 0.001), np.full(1, 0.004), green)
     weights = weigh(joined(wall, inside))
     assert weights[0] > 0.05
     assert weights[1] < 1e-4

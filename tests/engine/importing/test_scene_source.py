@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engine.capture.formats.imported import ScenePlace
 from engine.errors import ProjectError
 from engine.export.formats.ply import COLUMNS
 from engine.export.formats.table import FORMATS, FULL_PLY
@@ -100,6 +101,19 @@ def test_an_export_of_our_own_says_rate_and_up(tmp_path: Path):
     assert "parts of a scene" in refused(folder)
     (folder / "p_export.json").write_text('{"fps": "x"}')
     assert "description of the export is damaged" in refused(folder)
+
+
+@pytest.mark.parametrize(
+    ("quat", "scale", "cause"),
+    [("[2, 0, 0, 0]", "1", "length 2"), ("[1, 0, 0]", "1", "quat"), ("[1, 0, 0, 0]", "0", "scale is 0")],
+)
+def test_a_place_that_is_not_possible_is_refused(tmp_path: Path, quat: str, scale: str, cause: str):
+    folder = write_frames(tmp_path / "s", "ply", moving_frames(2))
+    said = '{"fps": 24, "up": [0, 0, 1], "files": [{"part": "all"}], '
+    (folder / "p_export.json").write_text(f'{said}"quat": [1, 0, 0, 0], "scale": 2}}')
+    assert open_scene(folder).place == ScenePlace((1.0, 0.0, 0.0, 0.0), 2.0)
+    (folder / "p_export.json").write_text(f'{said}"quat": {quat}, "scale": {scale}}}')
+    assert cause in refused(folder)
 
 
 def test_missing_numbers_are_said(tmp_path: Path):

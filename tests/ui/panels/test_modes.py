@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,26 @@ from pyglet.window import key
 
 import ui.panels.picture.comparison as comparison
 from app.playback.modes.view_modes import CONTENTS, MODES
-from app.session.showing.look_commands import LookThrough, SetCompare, SetCompareWith, SetContent, SetMode, ShowHeat
-from app.status import BLINK_HZ, CAPTURED, ClipStatus, Overlays, VersionStatus, version_name, version_number
+from app.session.showing.look_commands import (
+    CompareProject,
+    LookThrough,
+    SetCompare,
+    SetCompareWith,
+    SetContent,
+    SetMode,
+    ShowHeat,
+)
+from app.status import (
+    BLINK_HZ,
+    CAPTURED,
+    PROJECT,
+    ClipStatus,
+    OtherStatus,
+    Overlays,
+    VersionStatus,
+    version_name,
+    version_number,
+)
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import SHIFT, Pilot
 from ui.panels.actions.table import ACTIONS
@@ -208,6 +227,41 @@ def test_a_held_key_covers_everything_and_a_wipe_its_share() -> None:
     assert covered_share(session, ui, is_held=False) == 0.3  # type: ignore[arg-type]
     assert covered_share(session, ui, is_held=True) == 1.0  # type: ignore[arg-type]
     assert ui.redraw_in_s is None
+
+
+def test_another_project_is_chosen_where_versions_are(
+    trained: Pilot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ui.shell.dialogs.dialogs.has_native_dialog", lambda: False)
+    scene = tmp_path / "dance.4dgs"
+    scene.touch()
+    dialog = trained.studio.frame.dialog
+    dialog._start, dialog._text = tmp_path, str(scene)
+    for place in ("recent.0", "choose"):
+        trained.click("viewport.compare")
+        trained.draw(3)
+        trained.click(f"viewport.other.{place}")
+        trained.draw(3)
+    trained.click("open.accept")
+    recent = trained.session.recent.entries[0].folder
+    assert trained.sent(CompareProject) == [CompareProject(recent), CompareProject(scene)]
+
+
+def test_a_shorter_project_says_so_and_holds_nothing_up(trained: Pilot) -> None:
+    session, pane = trained.session, trained.studio.frame.viewport
+    session.dispatch(SetCompare("wipe"))
+    session.dispatch(SetCompareWith(PROJECT))
+    trained.draw(3)
+    assert comparison.shown_compare(session) == "off", "no other project is chosen"
+    session.other_project = OtherStatus("dance", Path("/projects/dance"), 2)
+    session.timeline.seek(3)
+    trained.draw(3)
+    assert comparison.shown_compare(session) == "wipe"
+    assert comparison.frame_to_compare(session) == 1
+    assert pane.shows_playhead(session), "playing every frame waits for no frame that does not exist"
+    missing = OtherStatus("dance", Path("/projects/dance"), 2, missing="dance cannot be shown")
+    assert missing_words(session.overlays, [], missing) == "dance cannot be shown"
+    assert missing_words(session.overlays, [], session.other_project) == "dance is being drawn"
 
 
 def test_an_earlier_version_that_is_not_there_says_so() -> None:

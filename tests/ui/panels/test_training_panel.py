@@ -37,6 +37,7 @@ from app.status import (
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.panels.state import LOG
+from ui.panels.training import training
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 Open = Callable[..., Pilot]
@@ -310,3 +311,16 @@ def test_the_timeline_stands_before_the_log_until_it_is_asked_for(open_pilot: Op
     pilot.studio.frame.ui.wanted_panel = LOG
     pilot.draw(3)
     assert "log.lines" in pilot.rects
+
+
+def test_an_imported_scene_says_that_nothing_was_trained(open_pilot: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    session, said = FakeSession(), list[str]()
+    monkeypatch.setattr(training, "text_wrapped_dim", said.append)
+    pilot = open_pilot(session)
+    assert "This scene was imported; it has no training curves." not in said
+    assert session.capture is not None
+    session.capture = replace(session.capture, has_pictures=False)
+    session.training = replace(session.training, next_clip_index=None)
+    pilot.draw(3)
+    assert "This scene was imported; it has no training curves." in said
+    assert training.next_label(session).endswith("Imported from another program")  # type: ignore[arg-type]

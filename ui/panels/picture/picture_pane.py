@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from app.playback.modes.view_modes import MODES
 from app.playback.views.pointing import point_beside
 from app.session.session_view import SessionView
-from app.status import version_number
 from ui.panels.editing.edit_grip import EditGrip
 from ui.panels.editing.edit_subject import subject_of
 from ui.panels.editing.handle_drawing import draw_edit_hint, draw_handles, draw_points
@@ -20,7 +20,15 @@ from ui.panels.editing.selecting.select_grip import DRAG as SELECT
 from ui.panels.editing.selecting.select_grip import SelectGrip
 from ui.panels.excluding.excluded_drawing import ExcludedDrawing
 from ui.panels.excluding.mask_grip import follow_brush
-from ui.panels.picture.comparison import covered_share, is_held, kind_words, missing_words, other_label, shown_compare
+from ui.panels.picture.comparison import (
+    covered_share,
+    frame_to_compare,
+    is_held,
+    kind_words,
+    missing_words,
+    other_label,
+    shown_compare,
+)
 from ui.panels.picture.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.picture.heat_overlay import HeatOverlay
 from ui.panels.picture.hud import BELOW_NAME, Hud
@@ -62,7 +70,8 @@ class PicturePane:
     def shows_playhead(self, session: SessionView) -> bool:
         """Is the frame under the playhead on screen, in every picture that is compared?"""
         wanted = session.wanted_frame()
-        return wanted is None or (self.scene.shown.is_of(wanted) and self._captured_frame in (None, wanted.frame_index))
+        is_other_there = self._captured_frame in (None, frame_to_compare(session))
+        return wanted is None or (self.scene.shown.is_of(wanted) and is_other_there)
 
     def draw(
         self, session: SessionView, dispatch: Dispatch, ui: UiState, area: Rect, *, is_active: bool = True
@@ -288,13 +297,18 @@ class PicturePane:
         if other is None:
             clip = session.timeline.clip
             versions = () if clip is None else session.clip_versions(clip.clip_index)
-            words = missing_words(session.overlays, versions)
+            words = missing_words(session.overlays, versions, session.other_project)
         elif other.shown_as is None:
             words = pane_text(captured_words(other.has_scene_colors), *frames)
         else:
-            is_version = version_number(session.overlays.compare_with) is not None
-            kind = other_label(session.overlays) if is_version else kind_words(RENDERED, other.shown_as.label)
-            words = pane_text(kind, *frames)
+            overlays = session.overlays
+            is_own = overlays.compare_with in MODES
+            kind = (
+                kind_words(RENDERED, other.shown_as.label) if is_own else other_label(overlays, session.other_project)
+            )
+            last = frame_to_compare(session)
+            is_past_end = frames == (last, session.timeline.frame_index) and frames[0] != frames[1]
+            words = f"{kind} has no such frame, {last} is its last" if is_past_end else pane_text(kind, *frames)
         rendered_words = pane_text(kind_words(shown.kind, shown.source.shown_as.label), *frames[::-1])
         color = ON_PICTURE.yellow if None not in frames and frames[0] != frames[1] else ON_PICTURE.text
         compare = session.overlays.compare

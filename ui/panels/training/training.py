@@ -55,7 +55,9 @@ def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
     imgui.set_next_item_open(True, imgui.Cond_.once)
     is_open = imgui.collapsing_header("Curves")
     ui.mark("curves.header")
-    if is_open:
+    if is_open and is_imported(session):
+        text_wrapped_dim("This scene was imported; it has no training curves.")
+    elif is_open:
         draw_curves(session, ui)
     draw_clip_quality(session.clip_states, ui)
     draw_clip_section(session, dispatch, ui)
@@ -63,11 +65,18 @@ def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
     _draw_clips(session, dispatch, ui)
 
 
+def is_imported(session: SessionView) -> bool:
+    """Is the open scene one of another program, which nothing was trained for?"""
+    return session.capture is not None and not session.capture.has_pictures
+
+
 def next_label(session: SessionView) -> str:
     """Label for starting the next clip, with its icon: a clip that was stopped resumes where that was."""
     index, step = session.training.next_clip_index, session.training.resume_step
     if index is None:
         is_all = all(state.state == "trained" for state in session.clip_states)
+        if is_imported(session):
+            return f"{Icon.CHECK}  Imported from another program"
         return f"{Icon.CHECK}  Every clip is trained" if is_all else f"{Icon.WARNING}  No clip can be trained next"
     if session.queue.is_held:
         return f"{Icon.PLAY}  Resume with clip {index}"

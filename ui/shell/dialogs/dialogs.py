@@ -17,24 +17,27 @@ from imgui_bundle import portable_file_dialogs as native
 from app.project.opening.project_choices import ProjectChoices
 from app.session.captures.capture_commands import LookAtVideos
 from app.session.projects.project_commands import OpenCapture, OpenProject
+from app.session.showing.look_commands import CompareProject
 from engine.importing.suffixes import is_scene_file
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
-OPEN, CALIBRATE, READ_ONLY, RELOCATE = "open", "calibrate", "read only", "relocate"
+OPEN, CALIBRATE, READ_ONLY, RELOCATE, COMPARE = "open", "calibrate", "read only", "relocate", "compare"
 """Purposes of asking for a folder."""
 _TITLES = {
     OPEN: "Open a capture or project folder",
     CALIBRATE: "Calibrate a folder of plain videos",
     READ_ONLY: "Open a project read-only",
     RELOCATE: "Choose the capture of this project",
+    COMPARE: "Compare with another project",
 }
 _HINTS = {
-    OPEN: "Folder with the cameras and their videos or pictures, or of a project",
+    OPEN: "Folder with the cameras, or of a project; or a file of Gaussians, such as .4dgs or .ply",
     CALIBRATE: "Folder with one video, or one folder of pictures, per camera",
     READ_ONLY: "Folder of a project, or of a capture that has one; nothing in it is changed",
     RELOCATE: "Folder with the cameras and their videos or pictures",
+    COMPARE: "Folder of a project; or a file of Gaussians, or a folder of them, which is imported",
 }
 _MAX_LISTED = 500
 
@@ -91,10 +94,13 @@ class OpenFolderDialog:
         wishes = ui.wishes
         if wishes.relocated_project is not None:
             self.open(purpose=RELOCATE, project=wishes.relocated_project)
+        elif wishes.is_comparison:
+            self.open(purpose=COMPARE)
         elif wishes.is_read_only or wishes.is_calibration or ui.is_open_requested:
             self.open(purpose=READ_ONLY if wishes.is_read_only else CALIBRATE if wishes.is_calibration else OPEN)
         wishes.relocated_project = None
         ui.is_open_requested = wishes.is_calibration = wishes.is_read_only = False
+        wishes.is_comparison = False
 
     def open(self, start: Path | None = None, *, purpose: str = OPEN, project: Path | None = None) -> None:
         """Ask, for one of the purposes above. A second call while a question is up does nothing.
@@ -133,9 +139,11 @@ class OpenFolderDialog:
     def _popup(self) -> str:
         return f"{_TITLES[self._purpose]}###folder"
 
-    def _answer(self, folder: Path) -> OpenCapture | OpenProject | LookAtVideos:
+    def _answer(self, folder: Path) -> OpenCapture | OpenProject | LookAtVideos | CompareProject:
         if self._purpose == RELOCATE and self._project is not None:
             return OpenProject(self._project, ProjectChoices(capture=folder))
+        if self._purpose == COMPARE:
+            return CompareProject(folder)
         if self._purpose == READ_ONLY:
             return OpenCapture(folder, choices=ProjectChoices(is_read_only=True))
         return LookAtVideos(folder) if self._purpose == CALIBRATE else OpenCapture(folder, is_asking=True)
@@ -160,7 +168,7 @@ class OpenFolderDialog:
         ui.mark("open.path")
         folder = typed_path(self._text)
         is_folder = folder is not None and folder.is_dir()
-        is_scene = folder is not None and self._purpose == OPEN and is_scene_file(folder)
+        is_scene = folder is not None and self._purpose in (OPEN, COMPARE) and is_scene_file(folder)
         if imgui.begin_child("folders", ImVec2(0, -46), imgui.ChildFlags_.borders):
             self._draw_folders(self._start if folder is None else folder if is_folder else folder.parent)
         imgui.end_child()

@@ -33,6 +33,7 @@ def measure_exports(opened: TrainedProject) -> list[Trade]:
     frame = scene.trained_frames[0]
     live = scene.gaussians(frame)
     splats = Splats.of(live)
+    check = ReadBack(scene, FileWorld())
     try:
         with tempfile.TemporaryDirectory() as folder:
             paths = {name: Path(folder, f"{index}{kind.suffix}") for index, (name, kind) in enumerate(KINDS.items())}
@@ -45,12 +46,17 @@ def measure_exports(opened: TrainedProject) -> list[Trade]:
                     setting=name,
                     seconds=timings[name][0].median_ms / 1e3,
                     n_bytes=paths[name].stat().st_size,
-                    psnr_db=min(ReadBack(scene, kind.read, FileWorld()).psnr_db(paths[name], frame, live).values()),
+                    psnr_db=min(check.psnr_db(_read(kind, paths[name]), frame, live).values()),
                 )
                 for name, kind in KINDS.items()
             ]
     except OSError as error:
         raise DiskError(f"No file could be written to be measured ({error.strerror}).") from error
+
+
+def _read(kind: Format, path: Path) -> Splats:
+    with path.open("rb") as stream:
+        return kind.read(stream)
 
 
 def _write(kind: Format, splats: Splats, path: Path) -> tuple[float]:

@@ -13,6 +13,7 @@ import pytest
 from app.cli.installing import desktop
 from engine.assets import asset_path
 from engine.errors import DiskError, ProjectError
+from engine.importing.suffixes import SEQUENCE_SUFFIXES
 from ui import main as window
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="entries of a Linux desktop")
@@ -45,8 +46,9 @@ def test_installing_twice_leaves_one_entry_and_removing_nothing(
             "applications/other.desktop",
             "applications/clipgstream.desktop",
             "icons/hicolor/scalable/apps/clipgstream.svg",
+            "mime/packages/clipgstream.xml",
         }
-    assert capsys.readouterr().out.count("wrote ") == 4
+    assert capsys.readouterr().out.count("wrote ") == 6
     assert window.main(["desktop", "remove"]) == 0
     assert files_below(data_home) == {"applications/other.desktop"}
     assert window.main(["desktop", "remove"]) == 0
@@ -65,6 +67,25 @@ def test_the_validator_accepts_the_entry(tmp_path: Path) -> None:
     path.write_text(desktop.desktop_entry(["/opt/a $b/clipgstream"]))
     done = subprocess.run(["desktop-file-validate", path], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+def test_the_entry_opens_the_kinds_that_are_declared() -> None:
+    tree = ElementTree.parse(asset_path("desktop", "clipgstream.xml"))
+    names = [kind.get("type") for kind in tree.iter() if kind.tag.endswith("mime-type")]
+    assert tuple(names) == desktop.MIME_TYPES
+    ends = [glob.get("pattern", "").removeprefix("*") for glob in tree.iter() if glob.tag.endswith("glob")]
+    assert set(ends) <= set(SEQUENCE_SUFFIXES)
+    assert f"MimeType={';'.join(desktop.MIME_TYPES)};\n" in desktop.desktop_entry(["clipgstream"])
+
+
+@pytest.mark.skipif(shutil.which("update-mime-database") is None, reason="update-mime-database is not installed")
+def test_a_desktop_recognises_the_files_until_they_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    desktop.install()
+    globs = tmp_path / "mime" / "globs2"
+    assert "application/x-4dgs:*.4dgs" in globs.read_text()
+    desktop.remove()
+    assert not globs.exists() or "4dgs" not in globs.read_text()
 
 
 def test_the_program_is_named_so_that_it_starts_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from app.playback.modes.view_modes import MODES
 from app.session.session_view import SessionView
 from app.session.showing.look_commands import LookThrough, SetCompare, SetCompareWith, ToggleOverlay
-from app.status import CAPTURED, COMPARE_MODES
+from app.status import CAPTURED, COMPARE_MODES, PROJECT
 from ui.panels.actions.action import COMPARE, Action, Run
 from ui.panels.actions.viewing.view import nearest_camera
 from ui.panels.picture.comparison import shown_compare
@@ -21,7 +21,11 @@ MARK_NAMES = ("show_frusta", "show_inherited", "show_residual")
 
 def set_compare(session: SessionView, dispatch: Dispatch, mode: str) -> None:
     """Compare with another picture; a captured one needs a camera, so the nearest one is taken from a free view."""
-    if mode != "off" and session.overlays.compare_with == CAPTURED and session.view.look_through is None:
+    other = session.overlays.compare_with
+    if other == PROJECT and session.other_project is None:  # it was left together with the project that was open
+        other = CAPTURED
+        dispatch(SetCompareWith(other))
+    if mode != "off" and other == CAPTURED and session.view.look_through is None:
         dispatch(LookThrough(nearest_camera(session)))
     dispatch(SetCompare(mode))
 
@@ -43,6 +47,10 @@ def _set_other(other: str) -> Run:
         set_other(session, dispatch, other)
 
     return choose
+
+
+def _choose_project(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_comparison = True
 
 
 def _has_other(other: str) -> Callable[[Any], bool]:
@@ -128,6 +136,13 @@ ACTIONS = (
             is_on=_has_other(mode.name),
         )
         for mode in MODES.values()
+    ),
+    Action(
+        "compare.project",
+        "Compare with another project ...",
+        COMPARE,
+        _choose_project,
+        is_on=_has_other(PROJECT),
     ),
     Action(
         "show.marks",

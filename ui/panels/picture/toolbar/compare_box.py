@@ -6,7 +6,8 @@ from imgui_bundle import imgui
 
 from app.playback.modes.view_modes import COLOR, MODES
 from app.session.session_view import SessionView
-from app.status import BLINK_HZ, CAPTURED, version_name
+from app.session.showing.look_commands import CompareProject
+from app.status import BLINK_HZ, CAPTURED, PROJECT, version_name
 from ui.panels.actions.viewing.compare import COMPARE_WORDS, set_compare, set_other
 from ui.panels.picture.comparison import shown_compare
 from ui.panels.pieces.slider import slider
@@ -15,6 +16,8 @@ from ui.panels.state import Dispatch, UiState
 from ui.panels.training.clip_versions import version_text
 
 SLIDER_WIDTH = 120.0
+MOST_RECENT = 3
+"""Projects opened lately that are offered."""
 
 
 def compare_words(session: SessionView) -> str:
@@ -50,6 +53,7 @@ def _draw_others(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
             set_other(session, dispatch, other)
         ui.mark(f"viewport.other.{other}")
     _draw_versions(session, dispatch, ui)
+    _draw_projects(session, dispatch, ui)
     imgui.separator()
     imgui.set_next_item_width(SLIDER_WIDTH)
     slowest, fastest = BLINK_HZ
@@ -71,6 +75,29 @@ def _draw_versions(session: SessionView, dispatch: Dispatch, ui: UiState) -> Non
         if imgui.selectable(f"{version.number}: {version_text(version)}", overlays.compare_with == other)[0]:
             set_other(session, dispatch, other)
         ui.mark(f"viewport.other.{other}")
+
+
+def _draw_projects(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
+    """The other project, those opened lately, and any other."""
+    open_one, other, overlays = session.project_status, session.other_project, session.overlays
+    if open_one is None:
+        return
+    imgui.separator()
+    imgui.text_disabled("Another project")
+    known = {open_one.folder}
+    if other is not None:
+        known.add(other.folder)
+        if imgui.selectable(f"{other.name}##other", overlays.compare_with == PROJECT)[0]:
+            set_other(session, dispatch, PROJECT)
+        ui.mark(f"viewport.other.{PROJECT}")
+    recent = [one for one in session.recent.entries if one.project and one.folder not in known]
+    for row, one in enumerate(recent[:MOST_RECENT]):
+        if imgui.selectable(f"{one.name}##recent{row}", False)[0]:
+            dispatch(CompareProject(one.folder))
+        ui.mark(f"viewport.other.recent.{row}")
+    if imgui.selectable("Choose ...", False)[0]:
+        ui.wishes.is_comparison = True
+    ui.mark("viewport.other.choose")
 
 
 _CLAMPED = imgui.SliderFlags_.always_clamp
