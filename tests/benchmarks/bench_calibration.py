@@ -31,7 +31,9 @@ def errors_of(videos: Path, options: CalibrationOptions, truth: Cameras) -> tupl
     """Cameras that are found, and the largest errors of these; the truth is in the order of the videos."""
     try:
         calibration = calibrate(videos, options, report=lambda _: None)
-    except PreparationError:
+    except PreparationError as error:
+        if error.__cause__ is not None:  # the process broke down: not a refusal
+            raise
         return "refused", "", "", ""
     if calibration.failure:
         return "refused", "", "", ""
