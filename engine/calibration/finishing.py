@@ -12,7 +12,7 @@ from engine.calibration.options import CalibrationOptions
 from engine.calibration.pair_lines import FEW_MATCHES, PairCounts
 from engine.calibration.solving.agreement import MIN_AGREEING, MatchAgreement, agreement
 from engine.calibration.solving.cameras import Cameras
-from engine.calibration.solving.links import is_held
+from engine.calibration.solving.links import is_held, surrounds
 from engine.calibration.solving.solving import CalibrationSolution
 from engine.calibration.solving.strain import is_strained
 from engine.calibration.solving.world import find_up, known_scale, unit_scale, upright
@@ -25,9 +25,11 @@ WEAK_SIGHTINGS = 60
 MAX_DOUBTFUL = 0.25
 """Share of the cameras that were found. Where matches contradict more, whole groups of cameras have been found in wrong
 places, and those that agree may be such a group."""
+MIN_FAR_SHARE = 0.5
+"""Of all cameras far apart, that have to hold together: a few neighbours do not make a rig."""
 FAR = (
-    "Neighbouring cameras are far apart; they were found from what moves, pair by pair. Directions may be off by 2 "
-    "degrees and positions by 3 % of the rig's radius; a board finds them exactly."
+    "Neighbouring cameras are far apart; they were found from what moves, pair by pair. Directions may be off by 3 "
+    "degrees and positions by 4 % of the rig's radius; a board finds them exactly."
 )
 LENS_MODEL: dict[str, LensModel] = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
 """Names of engine.camera.lens."""
@@ -55,7 +57,8 @@ def finished(
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
     agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
     if is_far:
-        agreed = replace(agreed, held=is_held(agreed, tracks))
+        held = is_held(agreed, tracks)
+        agreed = replace(agreed, held=held & surrounds(cameras.rotations[held]) if held.any() else held)
         warnings.append(FAR)
     strained = is_strained(rows, solution.cameras, key_points, verified, sizes, agreed.is_firm)
     doubts = _doubts(names, n_sightings, agreed, strained)
@@ -73,7 +76,8 @@ def finished(
         up=up_from,
     )
     missing = tuple(_missing(row, rows, videos, key_points, verified) for row in _absent(rows, len(videos)))
-    return Calibration(found, missing, tuple(warnings), _failure(agreed), _pairs(names, agreed))
+    n_least = max(MIN_CAMERAS, MIN_FAR_SHARE * len(videos)) if is_far else MIN_CAMERAS
+    return Calibration(found, missing, tuple(warnings), _failure(agreed, n_least), _pairs(names, agreed))
 
 
 def _doubts(names: list[str], n_sightings: np.ndarray, agreed: MatchAgreement, strained: np.ndarray) -> list[str]:
@@ -102,11 +106,13 @@ def _strongest(row: int, names: list[str], agreed: MatchAgreement) -> str:
     return f"{n_explained} of its {n} matches with {names[other]} are explained"
 
 
-def _failure(agreed: MatchAgreement) -> str:
-    """Why nothing of it can be trusted; empty where most cameras hold together."""
+def _failure(agreed: MatchAgreement, n_least: float = MIN_CAMERAS) -> str:
+    """Why nothing of it can be trusted; empty where most cameras hold together, and at least so many."""
     n, n_placed = len(agreed.is_placed), int(agreed.is_placed.sum())
-    if n_placed >= max(MIN_CAMERAS, (1 - MAX_DOUBTFUL) * n):
+    if n_placed >= max(n_least, (1 - MAX_DOUBTFUL) * n):
         return ""
+    if n_placed >= (1 - MAX_DOUBTFUL) * n:
+        return f"Only {n_placed} cameras hold together, so none of them can be trusted."
     return f"Matches contradict the positions of {n - n_placed} of {n} cameras, so none of them can be trusted."
 
 

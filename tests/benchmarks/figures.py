@@ -206,6 +206,7 @@ TABLES: dict[str, Clips | Printed] = {
     "synchronisation": Printed(
         "offsets in time", ("python -m tests.benchmarks.bench_synchronisation SAMPLE BASKETBALL",), seeds=(0, 1)
     ),
+    "calibration": Printed("cameras found", ("python -m tests.benchmarks.bench_calibration OUT SAMPLE",), seeds=(0,)),
     "gl": Printed("OpenGL against the rasterizer", (_TRAIN_SAMPLE, "python -m tests.benchmarks.bench_gl DIR")),
     "splat4d": Printed(
         "files over time and .splat4d",

@@ -14,6 +14,8 @@ MIN_CORNERS = 6
 """Of a view; fewer hardly say how the board is held."""
 MIN_MARKERS = 3
 """Of another dictionary in one picture, for it to be on the board: single ones are found in noise."""
+N_ASKED = 3
+"""Pictures in which markers of all dictionaries are looked for."""
 MIN_SPREAD = 0.02
 """Least width of a view's corners divided by their length: a line says nothing about how the board is held."""
 
@@ -77,32 +79,62 @@ def find_style(board: Board, pictures: Sequence[np.ndarray]) -> BoardStyle | Non
 def other_markers(board: Board, pictures: Sequence[np.ndarray]) -> str:
     """What is seen in pictures that do not show the board, in a sentence; empty where there are no markers at all.
 
-    The markers of a small dictionary are those that larger ones with as many fields begin with: the smallest is named.
+    Only pictures with most squares are asked, and of dictionaries that begin with the same markers the smallest first:
+    large ones take seconds. Of those that see as many markers, the board's own is named, else the smallest.
     """
-    best, best_numbers = "", np.zeros(0, np.int64)
     known = {name: cv2.aruco.getPredefinedDictionary(number) for name, number in dictionaries().items()}
-    others = sorted(known, key=lambda name: (name != board.dictionary, len(known[name].bytesList)))
-    for name in others:
-        detector = cv2.aruco.ArucoDetector(known[name])
-        found: list[np.ndarray] = []
-        for picture in pictures:
-            for is_inverted in (False, True):
-                _, numbers, _ = detector.detectMarkers(_grey(picture, is_inverted=is_inverted))
-                if numbers is not None and len(numbers) >= MIN_MARKERS:
-                    found.append(numbers.reshape(-1))
-        numbers = np.concatenate(found) if found else best_numbers[:0]
-        if len(numbers) > 1.2 * len(best_numbers):
-            best, best_numbers = name, numbers
-    if not best:
+    greys = _with_most_squares(cv2.aruco.ArucoDetector(known[board.dictionary]), pictures)
+
+    def seen_of(name: str) -> np.ndarray:
+        detector, found = cv2.aruco.ArucoDetector(known[name]), [np.zeros(0, np.int64)]
+        for grey in greys:
+            _, numbers, _ = detector.detectMarkers(grey)
+            if numbers is not None and len(numbers) >= MIN_MARKERS:
+                found.append(np.asarray(numbers, dtype=np.int64).reshape(-1))
+        return np.concatenate(found)
+
+    families: dict[str, list[str]] = {}
+    for name in sorted(known, key=lambda name: len(known[name].bytesList)):
+        families.setdefault(_family(name), []).append(name)
+    family, numbers = "", np.zeros(0, np.int64)
+    for one in sorted(families, key=lambda one: one != _family(board.dictionary)):
+        found = seen_of(families[one][0])
+        if len(found) > len(numbers):
+            family, numbers = one, found
+        if len(np.unique(numbers)) >= 2 * MIN_MARKERS:  # the largest come last
+            break
+    if not len(numbers):
         return ""
-    if best != board.dictionary:
+    best = families[family][0]
+    for name in families[family][1:]:
+        found = seen_of(name)
+        if len(found) > 1.2 * len(numbers):
+            best, numbers = name, found
+    if family != _family(board.dictionary) or len(known[best].bytesList) > len(known[board.dictionary].bytesList):
         return f"the markers in the pictures are of the dictionary {best}"
-    n_own, highest = board.columns * board.rows // 2, int(best_numbers.max())
+    n_own, highest = board.columns * board.rows // 2, int(numbers.max())
     if highest >= n_own:
         return f"markers up to number {highest} are seen, but {board.columns} x {board.rows} squares have {n_own}"
     return (
-        f"markers of {best} are seen, but not as {board.columns} x {board.rows} squares have them; columns come first"
+        f"markers of {board.dictionary} are seen, but not as {board.columns} x {board.rows} squares have them; columns "
+        "come first"
     )
+
+
+def _family(dictionary: str) -> str:
+    """Of dictionaries that begin with the same markers, as 4X4 of 4X4_50."""
+    return dictionary.split("_")[0] if dictionary[0].isdigit() else dictionary
+
+
+def _with_most_squares(detector: cv2.aruco.ArucoDetector, pictures: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Of all pictures, also inverted, the few with most squares, whatever is in them. [H, W] each"""
+    counted = []
+    for picture in pictures:
+        for is_inverted in (False, True):
+            grey = _grey(picture, is_inverted=is_inverted)
+            found, _, rejected = detector.detectMarkers(grey)
+            counted.append((len(found) + len(rejected), grey))
+    return [grey for _, grey in sorted(counted, key=lambda one: -one[0])[:N_ASKED]]
 
 
 def _grey(picture: np.ndarray, *, is_inverted: bool) -> np.ndarray:

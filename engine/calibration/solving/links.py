@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, combinations
 
 import cv2
 import numpy as np
@@ -28,6 +29,10 @@ CLOSES_DEG = 30.0
 NEAR_PX = 8.0
 """At a width of 640: key points that near each other, at one moment, are about as far away."""
 MIN_NEAR = 8
+MAX_GAP_DEG = 90.0
+MIN_IN_CHAIN = 100
+"""Matches of a pair that counts in a closed chain. Right neighbours 36 degrees apart have 180 and more; cameras 72
+degrees apart, whose 64 matches closed a ring that was off by 7 %, have fewer."""
 MIN_IN_THREE = 8
 """Points that three cameras see, for two pairs to hold each other's sizes."""
 REACH_PX = 4.0
@@ -118,32 +123,63 @@ def linked_estimate(
 
 
 def is_held(agreed: MatchAgreement, tracks: Tracks) -> np.ndarray:
-    """Which cameras a closed chain of firm pairs holds, whose sizes are tied by points that three cameras see. [R]
+    """Which cameras a closed chain of firm pairs holds that is of one size. [R]
 
     Pairs say nothing about how far apart cameras are, and an open chain can turn at every link: only what closes, and
-    is of one size, is right.
+    is of one size, is right. Points that three cameras see tie the sizes of two pairs; parts of a chain that have two
+    cameras in common, as the two halves of a ring have, get one size from these, and five more equations have to hold.
+    A single pair that nothing else ties closes no ring: it can be off without being noticed.
     """
-    firm = agreed.is_firm
+    firm = agreed.is_firm & (agreed.n_matches >= MIN_IN_CHAIN)
     pairs = [(int(a), int(b)) for a, b in np.argwhere(np.triu(firm))]
-    if not pairs:
-        return np.zeros(len(firm), dtype=bool)
-    sees = np.zeros((len(firm), len(tracks.points)), dtype=np.int64)
-    sees[tracks.seen.cameras, tracks.seen.points] = 1
-    tied = np.zeros((len(pairs), len(pairs)))
-    for i, first in enumerate(pairs):
-        for j, second in enumerate(pairs[:i]):
-            three = sorted({*first, *second})
-            tied[i, j] = len(three) == 3 and sees[three].all(0).sum() >= MIN_IN_THREE
-    groups = connected_components(csr_matrix(tied), directed=False)[1]
-    of_one_size = [pair for pair, group in zip(pairs, groups, strict=True) if group == np.bincount(groups).argmax()]
     held = np.zeros(len(firm), dtype=bool)
-    for pair in of_one_size:  # a pair is part of a closed chain if its cameras hang together without it
-        rest = np.array([other for other in of_one_size if other != pair]).reshape(-1, 2)
-        graph = csr_matrix((np.ones(len(rest)), rest.T), shape=firm.shape)
-        labels = connected_components(graph, directed=False)[1]
+    if not pairs:
+        return held
+    largest = max(_of_one_size(pairs, tracks, len(firm)), key=lambda part: len({*chain.from_iterable(part)}))
+    closed = []
+    for pair in largest:  # a pair is part of a closed chain if its cameras hang together without it
+        labels = _groups([other for other in largest if other != pair], len(firm))
         if labels[pair[0]] == labels[pair[1]]:
-            held[list(pair)] = True
-    return held
+            closed.append(pair)
+    if not closed:
+        return held
+    labels = _groups(closed, len(firm))  # two closed chains that one pair joins can turn against each other
+    return labels == np.bincount(labels).argmax()
+
+
+def surrounds(rotations: np.ndarray) -> bool:
+    """Whether cameras look at a place from all around, so that the turns between them add up to a whole one.
+
+    Only then do the pairs say how long focal lengths are. Cameras on one side hold together with wrong ones, too.
+    """
+    axes = rotations[:, 2]
+    plane = np.linalg.svd(axes, full_matrices=False)[2][:2]
+    angles = np.sort(np.degrees(np.arctan2(*(axes @ plane.T).T)))
+    return float(np.diff(angles, append=angles[0] + 360).max()) < MAX_GAP_DEG
+
+
+def _groups(pairs: Sequence[Pair], n: int) -> np.ndarray:
+    """A number for each of n cameras, the same for those that pairs join."""
+    ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return connected_components(csr_matrix((np.ones(len(ends)), ends.T), shape=(n, n)), directed=False)[1]
+
+
+def _of_one_size(pairs: Sequence[Pair], tracks: Tracks, n_cameras: int) -> list[list[Pair]]:
+    """Pairs in parts whose sizes relative to each other are known."""
+    sees = np.zeros((n_cameras, len(tracks.points)), dtype=np.int64)
+    sees[tracks.seen.cameras, tracks.seen.points] = 1
+    parts = [[pair] for pair in pairs]
+
+    def are_tied(first: Sequence[Pair], second: Sequence[Pair]) -> bool:
+        members = [{*chain.from_iterable(part)} for part in (first, second)]
+        if len(members[0] & members[1]) >= 2 and min(map(len, members)) >= 3:
+            return True
+        threes = ({*one, *other} for one in first for other in second)
+        return any(len(three) == 3 and sees[sorted(three)].all(0).sum() >= MIN_IN_THREE for three in threes)
+
+    while tied := next(((a, b) for a, b in combinations(parts, 2) if are_tied(a, b)), None):
+        parts = [part for part in parts if part not in tied] + [tied[0] + tied[1]]
+    return parts
 
 
 def _geometry(

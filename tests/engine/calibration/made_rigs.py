@@ -9,6 +9,7 @@ import numpy as np
 from app.lab.synthetic.rigs import looking_at
 from engine.calibration.solving.bundle import Observations
 from engine.calibration.solving.cameras import N_LENS, Cameras, rotation_of
+from engine.camera.rig import CameraRig
 
 SIZE = (640, 480)
 LENS_PARAMS = {
@@ -77,6 +78,13 @@ def rough(truth: Cameras, lens: str, *, seed: int = 2) -> Cameras:
         np.tile(np.array(SIZE) / 2.0, (n, 1)),
         np.zeros((n, N_LENS[lens])),
     )
+
+
+def cameras_of(rig: CameraRig) -> Cameras:
+    """The cameras of a capture, without their lenses."""
+    poses, n = rig.world_to_camera, len(rig)
+    focals, aspects = rig.Ks[:, 0, 0], rig.Ks[:, 1, 1] / rig.Ks[:, 0, 0]
+    return Cameras("pinhole", poses[:, :3, :3], poses[:, :3, 3], focals, aspects, rig.Ks[:, :2, 2], np.zeros((n, 0)))
 
 
 def off_truth(found: Cameras, truth: Cameras) -> tuple[float, float]:

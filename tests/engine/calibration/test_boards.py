@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
-from engine.calibration.boards.board import Board, read_board
+from engine.calibration.boards import detection
+from engine.calibration.boards.board import Board, dictionaries, read_board
 from engine.calibration.boards.calibrating import _finished
 from engine.calibration.boards.detection import BoardStyle, BoardView, find_style, finder, other_markers
 from engine.calibration.boards.printing import draw_board, write_board
@@ -145,6 +147,23 @@ def test_another_board_is_named() -> None:
     assert other_markers(other, [picture]) == "the markers in the pictures are of the dictionary 4X4_50"
     assert "up to number 16" in other_markers(replace(BOARD, columns=5, rows=3), [picture])
     assert other_markers(other, [np.full((200, 200, 3), 90, np.uint8)]) == ""
+
+
+def test_few_pictures_are_searched_for_other_boards(monkeypatch) -> None:
+    searched, real = [], cv2.aruco.ArucoDetector
+
+    class Counting:
+        def __init__(self, dictionary) -> None:
+            self._detector = real(dictionary)
+
+        def detectMarkers(self, picture):
+            searched.append(1)
+            return self._detector.detectMarkers(picture)
+
+    monkeypatch.setattr(detection.cv2.aruco, "ArucoDetector", Counting)
+    grey = np.full((40, 40, 3), 90, np.uint8)
+    assert other_markers(BOARD, [grey] * 24) == ""
+    assert len(searched) < 2 * 24 + detection.N_ASKED * len(dictionaries())
 
 
 @cache

@@ -42,5 +42,11 @@ def test_a_smaller_group_stands_apart_and_makes_it_fail() -> None:
     assert _failure(agreed).startswith("Matches contradict the positions of 3 of 8 cameras")
 
 
+def test_it_fails_where_too_few_of_a_large_rig_hold_together() -> None:
+    agreed = made_up([(a, b) for a in range(8) for b in range(a)], [])
+    assert _failure(agreed, 8) == ""
+    assert _failure(agreed, 9) == "Only 8 cameras hold together, so none of them can be trusted."
+
+
 def test_it_fails_where_nothing_holds_together() -> None:
     assert "8 of 8 cameras" in _failure(made_up([(0, 1), (2, 3)], []))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -10,11 +11,13 @@ import pytest
 from app.lab.synthetic.rigs import looking_at
 from engine.calibration.matching.matching import KeyPoints, Pair, all_pairs
 from engine.calibration.matching.motions import AgreedMotion, agreed_motions
-from engine.calibration.solving.agreement import agreement
+from engine.calibration.solving.agreement import MatchAgreement, agreement
+from engine.calibration.solving.bundle import Observations
 from engine.calibration.solving.cameras import Cameras
-from engine.calibration.solving.links import is_held, linked_estimate, linked_pairs
+from engine.calibration.solving.links import is_held, linked_estimate, linked_pairs, surrounds
 from engine.calibration.solving.mapping import FirstEstimate
 from engine.calibration.solving.solving import ROUGH, solve
+from engine.calibration.solving.tracks import Tracks
 from tests.engine.calibration.made_rigs import off_truth
 
 N_CAMERAS, N_MOMENTS, FOCAL = 10, 6, 512.0
@@ -112,3 +115,47 @@ def test_a_chain_that_does_not_close_is_not_held() -> None:
     found, held = placed(chain)
     assert len(found.rows) == N_CAMERAS
     assert not held.any()
+
+
+def made_agreement(pairs: Sequence[Pair]) -> MatchAgreement:
+    """Of six cameras; these pairs explain all of their matches."""
+    n = np.zeros((6, 6), dtype=np.int64)
+    for a, b in pairs:
+        n[a, b] = n[b, a] = 100
+    return MatchAgreement(n, n)
+
+
+def seen_by(threes: Sequence[tuple[int, int, int]]) -> Tracks:
+    """Ten points for every three cameras."""
+    cameras = np.repeat(np.array(threes, dtype=np.int64).reshape(-1, 3), 10, axis=0)
+    points = np.repeat(np.arange(len(cameras)), 3)
+    return Tracks(np.zeros((len(cameras), 3)), Observations(cameras.reshape(-1), points, np.zeros((cameras.size, 2))))
+
+
+RING = [(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (0, 5)]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "threes", "held"),
+    [
+        (RING, [(0, 1, 2), (1, 2, 3), (3, 4, 5), (0, 4, 5)], [0, 1, 2, 3, 4, 5]),  # two halves meet in two cameras
+        (RING, [(0, 1, 2), (2, 3, 4)], []),  # four parts of a ring can have many sizes
+        (RING, [(0, 1, 2), (1, 2, 3), (2, 3, 4), (3, 4, 5)], []),  # a single pair closes it
+        (RING[:5], [(0, 1, 2), (1, 2, 3), (2, 3, 4), (3, 4, 5)], []),  # of one size, but open
+        (
+            [(0, 1), (1, 2), (0, 2), (2, 3), (3, 4), (4, 5), (3, 5)],
+            [(0, 1, 2), (1, 2, 3), (2, 3, 4), (3, 4, 5)],
+            [0, 1, 2],
+        ),
+        ([(0, 1), (1, 2), (0, 2), (2, 3)], [(0, 1, 2), (1, 2, 3)], [0, 1, 2]),  # the last one hangs loose
+    ],
+)
+def test_what_is_held_closes_and_is_of_one_size(pairs, threes, held) -> None:
+    assert np.flatnonzero(is_held(made_agreement(pairs), seen_by(threes))).tolist() == held
+
+
+def test_only_cameras_all_around_surround() -> None:
+    rotations = scene()[0].rotations
+    assert surrounds(rotations)
+    assert surrounds(rotations[::2])
+    assert not surrounds(rotations[:7])
