@@ -6,8 +6,9 @@ from pathlib import Path
 
 FRAME_SUFFIXES = (".ply", ".spz", ".splat", ".sog")
 """Of files that hold one frame; those of .compressed.ply are among them."""
-SEQUENCE_SUFFIXES = (".4dgs", ".usda", ".usdc", ".tsog")
-"""Of files over time, those of engine.export.sequences.table.SEQUENCES."""
+SEQUENCE_SUFFIXES = (".4dgs", ".tsog")
+"""Of files over time. USD is only written: a stage opens whatever other files it names, and a damaged one takes memory
+without a bound."""
 
 
 def is_scene_file(path: Path) -> bool:
