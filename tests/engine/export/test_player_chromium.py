@@ -370,6 +370,7 @@ def test_a_damaged_clip_is_said(shared_browser: Browser, tmp_path: Path):
     shared_browser.console.clear()
     shared_browser.open(page)
     shared_browser.wait("document.getElementById('notice')?.textContent.startsWith('A clip is damaged')")
+    assert shared_browser.value("clipgstreamPlayer.onScreen === null"), "nothing of a damaged clip is drawn"
 
 
 @pytest.mark.parametrize(
