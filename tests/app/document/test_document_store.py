@@ -233,10 +233,11 @@ def test_any_other_damage_of_the_journal_is_named_with_its_line(tmp_path: Path) 
 
 def test_no_step_waits_while_the_document_is_written_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(document_store, "MAX_EVENTS", 3)
-    may_write = threading.Event()
+    is_writing, may_write = threading.Event(), threading.Event()
     write = document_store.write_document_text
 
     def slowly(folder: Path, text: KeptText, **options: bool) -> None:
+        is_writing.set()
         assert may_write.wait(60.0)
         write(folder, text, **options)
 
@@ -248,6 +249,7 @@ def test_no_step_waits_while_the_document_is_written_anew(tmp_path: Path, monkey
             kept = DocumentStore(tmp_path / "p")
             same(kept.read(), history)
             assert (kept.notes, kept.n_replayed) == ((), frame + 1)
+        assert is_writing.wait(60.0)  # history.json is there, so that nothing moves below the copy
         shutil.copytree(tmp_path / "p", tmp_path / "killed")
     finally:
         may_write.set()
