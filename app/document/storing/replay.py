@@ -65,12 +65,12 @@ def replayed(folder: Path) -> Replayed:
         ProjectError: Something is damaged or missing; nothing was changed.
     """
     while True:
-        stored = read_stored(folder)
+        stored, steps = read_stored(folder), journal_steps(folder)
         found = replayed_from(folder, stored)
         if found.damage is None:
             return found
-        if read_stored(folder).step == stored.step:  # else the files changed while they were read
-            raise found.damage
+        if read_stored(folder).step == stored.step and journal_steps(folder) == steps:
+            raise found.damage  # else files came or went while they were read
 
 
 def replayed_from(folder: Path, stored: StoredDocument) -> Replayed:

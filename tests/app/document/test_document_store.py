@@ -11,7 +11,7 @@ import pytest
 
 from app.document.history import Changed, DocumentHistory, Event, Placed, Redone, Undone
 from app.document.project_document import Marker
-from app.document.storing import document_store, journal_file
+from app.document.storing import document_store, journal_file, replay
 from app.document.storing.document_store import DocumentStore
 from app.document.storing.journal_file import read_journal
 from app.document.storing.kept_json import KeptText
@@ -406,6 +406,29 @@ def test_a_damaged_project_file_names_the_command_that_says_what_is_left(tmp_pat
     with pytest.raises(ProjectError) as caught:
         DocumentStore(tmp_path / "p").read()
     assert caught.value.hint == f'"clipgstream repair {tmp_path / "p"}" shows what can be kept.'
+
+
+def test_who_reads_while_a_file_of_the_journal_begins_sees_no_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, history = made(tmp_path)
+    read = replay.read_journal
+
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    def late(path: Path) -> object:
+        nonlocal history
+        while len(journal_steps(tmp_path)) == 1:  # files are listed by now; the first one is left for another
+            history = happen(store, history, marked(history, len(history.past)))
+        return read(path)
+
+    monkeypatch.setattr(document_store, "MAX_EVENTS", 3)
+    monkeypatch.setattr(document_store, "write_document_text", refuse)  # project.json stays as it is
+    monkeypatch.setattr(replay, "read_journal", late)
+    again = DocumentStore(tmp_path)
+    same(again.read(), history)
+    assert again.notes == ()
 
 
 def test_who_reads_while_events_are_written_sees_no_damage(tmp_path: Path) -> None:
