@@ -35,7 +35,7 @@ from app.session.training.train_commands import StopTraining, TrainClip, TrainNe
 from engine.capture.capture import open_capture
 from engine.capture.writers.capture_json import capture_document, write_capture_json
 from engine.user_folders import data_dir
-from tests.app.conftest import inline, poll_until
+from tests.app.conftest import DEADLINE_S, inline, poll_until
 from tests.app.fakes import make_fake, make_slow, write_capture
 
 
@@ -82,7 +82,7 @@ def test_of_two_captures_the_one_asked_for_last_is_opened_however_long_the_other
     go_on = threading.Event()
 
     def opener(path: Path, **options: Any) -> Opened:
-        assert path != first or go_on.wait(20)
+        assert path != first or go_on.wait(DEADLINE_S)
         return open_for_window(path, **options)
 
     session = Session(settings=Settings(tmp_path / "settings.json"), opener=opener, is_preloading=False)
@@ -325,7 +325,7 @@ def test_what_taking_up_a_result_raises_ends_with_the_job():
 
     taken: list[int] = []
     for job in (jobs.start("Bad", lambda context: 1, take, take), jobs.start("Good", lambda _: 2, taken.append, take)):
-        job.join(10.0)
+        job.join(DEADLINE_S)
     assert jobs.poll()
     assert [(name, str(error)) for name, error in faults] == [("Bad", "1")]
     assert taken == [2]

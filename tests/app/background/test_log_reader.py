@@ -9,7 +9,7 @@ from app.background.log_reader import MAX_LINES, LogView, parse_log
 
 def read(view: LogView, clip_log: Path | None = None) -> list[tuple[str, str]]:
     view.lines(3, clip_log)
-    assert view.worker.wait_idle(20.0)
+    assert view.worker.wait_idle(300.0)
     return [(line.source, line.text) for line in view.lines(3, clip_log)]
 
 

@@ -24,6 +24,7 @@ from engine.camera.lens import Lens
 from engine.capture.capture import open_capture
 from engine.errors import CaptureError
 from engine.progress import Progress
+from tests.app.conftest import DEADLINE_S
 
 NAMES = ("cam00", "cam01", "cam02", "cam03")
 
@@ -163,7 +164,7 @@ def test_a_calibration_that_matches_contradict_writes_nothing_and_ends_with_1(
 def test_a_job_hands_over_its_outcome_and_tells_how_far_it_is(videos: Path, made_up: Calibration) -> None:
     jobs, done, errors = Jobs(), [], []
     started = jobs.start("Calibrating", calibration_work(CalibrationRequest(videos)), done.append, errors.append)
-    started.join(10)
+    started.join(DEADLINE_S)
     assert started.context.status.done == 0.5
     assert started.context.status.message.startswith("Matching")
     jobs.poll()
@@ -181,7 +182,7 @@ def test_a_cancelled_job_writes_nothing(videos: Path, monkeypatch) -> None:
     jobs, done, errors = Jobs(), [], []
     started = jobs.start("Calibrating", calibration_work(CalibrationRequest(videos)), done.append, errors.append)
     started.context.cancel()
-    started.join(10)
+    started.join(DEADLINE_S)
     jobs.poll()
     assert not started.is_running
     assert not done

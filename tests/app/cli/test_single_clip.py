@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +28,7 @@ from app.project.claims.holder_record import HolderRecord, write_holder
 from app.project.lock import this_process
 from app.project.opening.project_access import open_project, read_settings
 from engine.clip_files.clip_state import read_clip_header
+from tests.app.conftest import DEADLINE_S
 from tests.app.fakes import N_STEPS, make_fake, make_slow, write_capture
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -325,13 +327,13 @@ def test_a_scheduler_that_ends_the_whole_group_loses_nothing(capture_folder: Pat
     )
     curves = tmp_path / "p" / "metrics" / "0000.unfinished.jsonl"
     try:
-        for _ in range(900):
-            if curves.is_file() and "train_psnr" in curves.read_text():
-                break
+        until_s = time.monotonic() + DEADLINE_S
+        while not (curves.is_file() and "train_psnr" in curves.read_text()):
+            assert time.monotonic() < until_s
             with pytest.raises(subprocess.TimeoutExpired):
                 process.wait(0.1)
         os.killpg(process.pid, signal.SIGTERM)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=DEADLINE_S)
     finally:
         process.kill()
     assert process.returncode == 130, err

@@ -17,7 +17,7 @@ from engine.capture.capture import Capture, open_capture
 from engine.images.rendition import Rendition
 from tests.app.fakes import write_capture
 
-WAIT_S = 20.0
+WAIT_S = 300.0
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from engine.clip_files.clip_state import ClipState, write_clip_state
 from tests.app.fakes import anchor_arrays, decoder_arrays
 from tests.clip_headers import make_header
 
-WAIT_S = 30.0
+WAIT_S = 300.0
 
 
 def write_clip(path: Path, *, shift: float, step: int = 1) -> Path:

@@ -12,7 +12,7 @@ from engine.editing.edit import Edit, Everything, Scope
 from engine.editing.effects import NO_EFFECTS, EditStack
 from tests.app.playback.clip_models import CLIP, reference, source
 
-WAIT_S = 60.0
+WAIT_S = 300.0
 
 
 def test_paths_are_where_the_gaussians_were() -> None:

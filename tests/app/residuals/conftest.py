@@ -25,7 +25,7 @@ from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import train
 from tests.clip_headers import with_header
 
-DEADLINE_S = 120.0
+DEADLINE_S = 300.0
 TRAINED_ON = ("1", "2", "3")
 
 

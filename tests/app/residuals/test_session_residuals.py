@@ -106,7 +106,9 @@ def test_a_clip_has_heat_while_it_trains_and_what_is_gone_is_no_fault(make_sessi
     def is_another_shown() -> bool:
         session.shown_gaussians()  # the window reads it, so that the next one comes
         heat = session.residuals.heat(session.timeline, 1, "error")
-        session.residuals._heat.worker.wait_idle(1.0)  # the training runs on this thread, and would leave it no time
+        session.residuals._heat.worker.wait_idle(
+            DEADLINE_S
+        )  # the training runs on this thread, and would leave it no time
         if heat is not None and heat.values is not None and heat.key not in seen:
             seen.append(heat.key)
         return len(seen) >= 3

@@ -14,7 +14,7 @@ from app.calibration.job import CalibrationRequest
 from app.session.captures.capture_commands import CalibrateVideos, KeepCalibration, LookAtVideos, StopCalibration
 from app.session.commands import CloseQuestion
 from engine.errors import PreparationError
-from tests.app.conftest import poll_until
+from tests.app.conftest import DEADLINE_S, poll_until
 
 
 @pytest.fixture
@@ -131,7 +131,7 @@ def test_what_it_says_is_shown_and_stopping_leads_back_to_the_options(make_sessi
     session.dispatch(StopCalibration())
     assert session.calibrating.page.state == "asking"
     assert session.calibrating.progress is None
-    assert ended.wait(10)
+    assert ended.wait(DEADLINE_S)
     poll_until(session, lambda: True)
     assert session.calibrating.page.failure is None
 

@@ -31,13 +31,13 @@ from app.session.session import Session
 from engine.capture.capture import open_capture
 from engine.editing.edit import Sphere
 from engine.errors import ProjectError
+from tests.app.conftest import DEADLINE_S
 from tests.app.export.test_export_choices import CONTEXT
 from tests.app.export.test_export_queue import FakeExporter
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import train
 from tests.app.residuals.conftest import make_project
 
-DEADLINE_S = 60.0
 METRICS = ExportChoices(kind="metrics", out="")
 
 

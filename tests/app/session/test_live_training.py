@@ -16,10 +16,8 @@ from app.session.training.live_training import LiveTraining
 from app.training.worker import keeper
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError
-from tests.app.conftest import inline
+from tests.app.conftest import DEADLINE_S, inline
 from tests.app.fakes import N_STEPS, make_slow
-
-DEADLINE_S = 30.0
 
 
 class Desk:

@@ -8,7 +8,7 @@ from pathlib import Path
 from app.session.projects.project_commands import OpenCapture
 from app.session.projects.settings import Settings
 from app.session.session import Session
-from tests.app.conftest import poll_until
+from tests.app.conftest import DEADLINE_S, poll_until
 
 
 def test_pictures_that_are_gone_are_one_notice_and_the_session_goes_on(tmp_path: Path, capture_folder: Path) -> None:
@@ -22,8 +22,8 @@ def test_pictures_that_are_gone_are_one_notice_and_the_session_goes_on(tmp_path:
         for camera_index in range(len(session.rig)):
             for width in (160, 400):  # on one thread each
                 session.ground_truth(camera_index, frame_index, width)
-                session.playback.captured.viewing.wait_idle(10.0)
-                session.playback.captured.thumbnails.wait_idle(10.0)
+                session.playback.captured.viewing.wait_idle(DEADLINE_S)
+                session.playback.captured.thumbnails.wait_idle(DEADLINE_S)
                 session.poll()
     (notice,) = session.notices
     assert notice.kind == "error"

@@ -31,7 +31,7 @@ from engine.editing.edit import Picked, PickedRows
 from engine.editing.picks import pack_rows
 from engine.errors import ProjectError
 from engine.mending.figures import StretchFigures
-from tests.app.conftest import poll_until
+from tests.app.conftest import DEADLINE_S, poll_until
 
 Make = Callable[..., Session]
 BEFORE = StretchFigures(excess=0.4, worst=0.5, elsewhere=0.2, psnr={"0": 30.0, "1": 29.0})
@@ -194,7 +194,7 @@ def test_stopping_leaves_the_clips_as_they_were(session: Session, monkeypatch: p
     assert page_of(session).state == "running"
     session.dispatch(StopMend())
     assert page_of(session).state == "asking"
-    assert has_ended.wait(30.0)
+    assert has_ended.wait(DEADLINE_S)
     poll_until(session, lambda: session.mending.progress is None)
     assert fingerprint(session) == before
 
@@ -207,7 +207,7 @@ def test_stopping_too_late_shows_what_was_put_in_place(session: Session, monkeyp
 
         def work(context: JobContext) -> MendOutcome:
             outcome = mended(context)
-            may_go_on.wait(30.0)
+            may_go_on.wait(DEADLINE_S)
             return outcome
 
         return work
@@ -232,7 +232,7 @@ def test_clips_are_not_cut_or_copied_while_they_are_mended(
 
     def slow(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
         def work(context: JobContext) -> MendOutcome:
-            may_go_on.wait(30.0)
+            may_go_on.wait(DEADLINE_S)
             raise JobCancelled
 
         return work

@@ -18,6 +18,7 @@ from app.project.opening.opened_project import OpenedProject
 from app.project.project_picture import SIZE, fitted, picture_path, read_picture, write_picture
 from app.session.projects import project_pictures
 from app.session.projects.project_pictures import ProjectPictures
+from tests.app.conftest import DEADLINE_S
 
 
 @pytest.fixture(autouse=True)
@@ -26,7 +27,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def poll(pictures: ProjectPictures, is_done: Callable[[], bool]) -> None:
-    until_s = time.monotonic() + 30.0
+    until_s = time.monotonic() + DEADLINE_S
     while not is_done():
         assert time.monotonic() < until_s
         pictures.poll()
@@ -72,6 +73,7 @@ def test_a_project_gets_what_the_first_camera_took_and_later_what_was_looked_at(
     monkeypatch.setattr(project_pictures, "prepare_drawing", lambda: None)
     monkeypatch.setattr(project_pictures, "is_cache_warm", lambda: True)
     monkeypatch.setattr(project_pictures, "render", draw)
+    monkeypatch.setattr(project_pictures, "CLOSE_S", DEADLINE_S)
     opened = make_opened("a")
     folder = opened.project.folder.resolve()
     pictures = ProjectPictures()

@@ -10,6 +10,7 @@ from app.project.clips.clip_catalog import ClipCatalog
 from app.project.opening.opened_project import OpenedProject
 from app.session.projects.recent_projects import RecentProjects
 from app.session.projects.settings import Settings
+from tests.app.conftest import DEADLINE_S
 from tests.app.fakes import write_trained
 
 
@@ -36,7 +37,7 @@ def test_those_that_are_gone_are_known_a_moment_later(make_opened: Callable[...,
     (opened.project.folder / "project.json").unlink()
     recent.look()
     assert recent.missing == frozenset()
-    until_s = time.monotonic() + 20.0
+    until_s = time.monotonic() + DEADLINE_S
     while not recent.missing:
         assert time.monotonic() < until_s
         recent.poll()

@@ -171,6 +171,7 @@ def test_who_follows_the_training_sees_the_one_that_leads(session: Session) -> N
 def shared(make_session: Make, monkeypatch: pytest.MonkeyPatch) -> Session:
     """Six clips, the reference is trained. Nothing trains here, and clip 1 on another computer."""
     monkeypatch.setattr(claims, "LOOK_EVERY_S", 0.02)
+    monkeypatch.setattr(claims, "DEAD_AFTER_S", float("inf"))  # nobody speaks for that computer again
     made = make_session()
     made.dispatch(SetClipLength(1))
     made.dispatch(TrainNextClip())

@@ -19,7 +19,7 @@ from engine.capture.capture import open_capture
 from engine.errors import CaptureError
 from engine.progress import Progress
 from engine.synchronisation.synchronisation import CameraOffset
-from tests.app.conftest import poll_until
+from tests.app.conftest import DEADLINE_S, poll_until
 
 
 def found(offsets, sigma=0.1):
@@ -118,7 +118,7 @@ def test_closing_ends_the_measurement(session, monkeypatch):
     poll_until(session, lambda: session.synchronising.progress.message == "motion - camera 3")
     session.dispatch(CloseQuestion())
     assert session.synchronising.page is None
-    assert ended.wait(10)
+    assert ended.wait(DEADLINE_S)
     poll_until(session, lambda: True)
     assert session.synchronising.page is None
 

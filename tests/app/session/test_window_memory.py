@@ -20,6 +20,7 @@ from app.session.projects.window_memory import (
     show_again,
     view_of,
 )
+from tests.app.conftest import DEADLINE_S
 from tests.ui.fake_session import FakeSession
 
 
@@ -158,13 +159,13 @@ def test_saving_soon_waits_for_no_disk_and_loses_nothing(tmp_path: Path, monkeyp
 
     def slow(path: Path, document: dict[str, Any]) -> None:
         began.set()
-        assert go_on.wait(20.0)
+        assert go_on.wait(DEADLINE_S)
         write(path, document)
 
     monkeypatch.setattr(module, "write_checked_json", slow)
     memory = WindowMemory(tmp_path / "window.json", mark_size=1.0)
     memory.save_soon()
-    assert began.wait(20.0)
+    assert began.wait(DEADLINE_S)
     memory.mark_size = 2.0
     memory.save_soon()  # the first one is still being written
     assert not memory.path.exists()

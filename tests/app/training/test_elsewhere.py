@@ -111,13 +111,13 @@ def test_what_another_process_finishes_is_finished_here(pair) -> None:
 
 def ended_of(service: TrainingService) -> list[int]:
     """Clips that end before nothing trains any more, though others may wait."""
-    ended = list[int]()
-    for _ in range(1000):
+    ended, until_s = list[int](), time.monotonic() + DEADLINE_S
+    while True:
         ended += [index for index, event in service.poll() if isinstance(event, ClipTrained)]
         if not service.runs:
-            break
+            return ended
+        assert time.monotonic() < until_s
         time.sleep(0.002)  # clips arrive on a thread
-    return ended
 
 
 def test_others_can_pause_and_stop_it(pair) -> None:

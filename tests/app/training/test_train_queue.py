@@ -22,11 +22,10 @@ from app.training.worker import keeper
 from app.training.worker.folder_store import FolderStore
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import NonFiniteLoss, ProjectError
-from tests.app.conftest import inline
+from tests.app.conftest import DEADLINE_S, inline
 from tests.app.fakes import FakeTraining, make_fake, make_slow, write_trained
 from tests.app.made_projects import make_chain, make_project
 
-DEADLINE_S = 30.0
 Make = Callable[..., OpenedProject]
 
 

@@ -129,7 +129,7 @@ def test_a_process_of_this_computer_that_has_ended_is_dead_at_once(tmp_path: Pat
     context = multiprocessing.get_context("spawn")
     child = context.Process(target=_claim_and_die, args=(str(tmp_path),))
     child.start()
-    child.join(60)
+    child.join(300)
     assert child.exitcode == 9
     assert list(list_claims(tmp_path)) == [KEY]
     assert live_claims(tmp_path) == {}
