@@ -1,7 +1,8 @@
 """A program in place of the interpreter, which trains nothing: it keeps what `clipgstream train --clip` promises.
 
 A clip is finished by one process at a time and once, source clips after the reference clip 0. A file `fail-K` in the
-project holds exit codes that the next calls for clip K end with, one a line; `slow-K` makes it take that many seconds.
+project holds exit codes that the next calls for clip K end with, one a line; `slow-K` makes it take that many seconds,
+and as long as there is `hold-K`, it goes on.
 Each call is a line "K CODE" of the file `calls`.
 """
 
@@ -54,6 +55,8 @@ except FileNotFoundError:
 with open(path("begun-" + clip), "w") as begun:
     begun.write(str(os.getpid()))
 time.sleep(seconds)
+while os.path.exists(path("hold-" + clip)):
+    time.sleep(0.05)
 with open(path("done-" + clip), "a") as done:
     done.write("x")
 end(0)
@@ -87,7 +90,8 @@ def scheduled(scheduler: str, folder: Path, *, n_clips: int, reference: int = 0)
 
 def calls(project: Path, clip: int) -> list[int]:
     """Exit codes of all calls for a clip, in order."""
-    lines = (line.split() for line in (project / "calls").read_text().splitlines())
+    file = project / "calls"
+    lines = (line.split() for line in (file.read_text().splitlines() if file.exists() else ()))
     return [int(code) for index, code in lines if int(index) == clip]
 
 
