@@ -9,10 +9,11 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
 from engine.kernels.cache import current_key
 
@@ -53,6 +54,7 @@ class BuiltOnce:
         with FileLock(self._root / f"{name}.lock", timeout=BUILD_LIMIT_S):
             if not _is_whole(kept):
                 self._build(kept, build)
+                self._forget_oldest(name)
             kept.touch()
             shutil.copytree(kept, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(_MANIFEST))
         return folder
@@ -65,9 +67,25 @@ class BuiltOnce:
         build(partial)
         (partial / _MANIFEST).write_text(json.dumps(_hashes(partial)))
         partial.rename(kept)
-        folders = sorted((path for path in kept.parent.iterdir() if path.is_dir()), key=lambda p: -p.stat().st_mtime)
-        for path in folders[self._max_folders :]:
-            if path != kept and not path.name.startswith("partial-"):
+
+    def _forget_oldest(self, building: str) -> None:
+        """Other workers build and hand out folders meanwhile: theirs may be gone by now, and those in use stay.
+
+        Args:
+            building: The name that is locked here.
+        """
+        assert self._root is not None
+        ages: list[tuple[float, Path]] = []
+        for path in self._root.iterdir():
+            with suppress(FileNotFoundError):
+                if path.is_dir() and not path.name.startswith("partial-"):
+                    ages.append((path.stat().st_mtime, path))
+        for _, path in sorted(ages)[: -self._max_folders]:
+            name = path.name.rpartition("-")[0]
+            with (
+                suppress(Timeout),
+                FileLock(self._root / f"{name}.lock", timeout=0) if name != building else suppress(),
+            ):
                 shutil.rmtree(path, ignore_errors=True)
 
 

@@ -18,7 +18,7 @@ def undisturbed_project(tmp_path_factory: pytest.TempPathFactory, built_once: Bu
     def train(folder: Path) -> None:
         (work / "scratch").mkdir()
         command = Command(folder / "project", work / "scratch", FAST, "0:1", every_s=None)
-        assert command.wait(300), command.said()
+        assert command.wait(600), command.said()
         assert command.process.returncode == 0, command.said()
 
     return (

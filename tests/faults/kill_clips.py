@@ -44,7 +44,8 @@ from engine.errors import EngineError
 from engine.progress import Progress, StepStats
 from engine.storage import files as storage
 from tests.app.fakes import FakeTraining, make_fake, write_capture
-from tests.faults.trainings import ROOT, Kept, kept_clips, leftovers, problems_of
+from tests.faults.kill_training import ORPHANS_END_S
+from tests.faults.trainings import ROOT, Kept, kept_clips, leftovers, problems_of, processes_end
 
 COMPUTER = "CLIPGSTREAM_TEST_COMPUTER"
 N_COMPUTERS = 3
@@ -262,7 +263,8 @@ class ClipKills:
                     self.tally.faults.append(f"{name}: clip {index} differs from that without kills")
 
     def _check_last(self, project: Path, expected: dict[int, Kept], name: str) -> None:
-        time.sleep(1.5)  # orphans of what was killed last notice that
+        for alive in processes_end(self._scratch, ORPHANS_END_S):  # those of what was killed last, too
+            self.tally.faults.append(f"{name}: still running {ORPHANS_END_S:.0f} s after the end: {alive}")
         self.tally.faults += [f"{name}: {problem}" for problem in problems_of(project)]
         open_project(project).close()
         if kept_clips(project) != expected:

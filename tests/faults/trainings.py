@@ -149,12 +149,20 @@ class Command:
 
     def others_end(self, timeout_s: float) -> list[str]:
         """Processes that this run started and that still live after so many seconds."""
-        until_s = time.monotonic() + timeout_s
-        while True:
-            alive = [f"{pid} {name}" for pid, name in _processes_of(self._scratch) if pid != self.process.pid]
-            if not alive or time.monotonic() > until_s:
-                return alive
-            time.sleep(0.1)
+        return processes_end(self._scratch, timeout_s, but=self.process.pid)
+
+
+def processes_end(scratch: Path, timeout_s: float, *, but: int | None = None) -> list[str]:
+    """Processes with this temporary folder that still live after so many seconds; returns as soon as there is none.
+
+    but: One that does not count.
+    """
+    until_s = time.monotonic() + timeout_s
+    while True:
+        alive = [f"{pid} {name}" for pid, name in _processes_of(scratch) if pid != but]
+        if not alive or time.monotonic() > until_s:
+            return alive
+        time.sleep(0.1)
 
 
 def _processes_of(scratch: Path) -> Iterator[tuple[int, str]]:
