@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from hashlib import blake2b
 from pathlib import Path
 
@@ -54,7 +54,7 @@ class BuiltOnce:
         with FileLock(self._root / f"{name}.lock", timeout=BUILD_LIMIT_S):
             if not _is_whole(kept):
                 self._build(kept, build)
-                self._forget_oldest(name)
+                self._forget_oldest(kept)
             kept.touch()
             shutil.copytree(kept, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(_MANIFEST))
         return folder
@@ -68,11 +68,11 @@ class BuiltOnce:
         (partial / _MANIFEST).write_text(json.dumps(_hashes(partial)))
         partial.rename(kept)
 
-    def _forget_oldest(self, building: str) -> None:
+    def _forget_oldest(self, kept: Path) -> None:
         """Other workers build and hand out folders meanwhile: theirs may be gone by now, and those in use stay.
 
         Args:
-            building: The name that is locked here.
+            kept: What was built, under a name that is locked here.
         """
         assert self._root is not None
         ages: list[tuple[float, Path]] = []
@@ -82,10 +82,11 @@ class BuiltOnce:
                     ages.append((path.stat().st_mtime, path))
         for _, path in sorted(ages)[: -self._max_folders]:
             name = path.name.rpartition("-")[0]
-            with (
-                suppress(Timeout),
-                FileLock(self._root / f"{name}.lock", timeout=0) if name != building else suppress(),
-            ):
+            if path == kept:
+                continue
+            with suppress(Timeout), ExitStack() as held:
+                if name != kept.name.rpartition("-")[0]:
+                    held.enter_context(FileLock(self._root / f"{name}.lock", timeout=0))
                 shutil.rmtree(path, ignore_errors=True)
 
 
