@@ -367,7 +367,8 @@ class Session(SessionFace):
         self.playback.renderer.on_picture = self.playback.decoder.on_frame = self.selecting.on_found = wake
 
     def close(self) -> None:
-        """End workers and threads, keeping progress. Blocks for a few seconds at most. May be called twice."""
+        """End workers and threads, keeping progress. Blocks for a few seconds at most, longer only where the disk is at
+        fault. May be called twice."""
         if self._is_closed:
             return
         self._is_closed = True

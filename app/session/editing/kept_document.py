@@ -27,7 +27,9 @@ RETRY_S = 5.0
 KEPT_WITHIN_S = 0.08
 """So long the next step waits until the last one is on disk, which normally takes some milliseconds."""
 SETTLE_S = 2.0
-"""A disk that takes longer than this to write a few lines is not waited for."""
+"""A disk that takes longer than this to write a few lines is not waited for while somebody works."""
+CLOSING_S = 20.0
+"""Nor for longer than this at the end, where what is not written then is lost."""
 Guard = Callable[[ProjectDocument, ProjectDocument], None]
 """Sees whether one document may take the place of another; raises ProjectError where not."""
 
@@ -249,6 +251,7 @@ class KeptDocument(SessionPart):
 
     def close(self) -> None:
         """Keep all changes, end the thread."""
+        self._files.wait_idle(CLOSING_S)
         self._settle_for_good()
         self._files.close()
 

@@ -15,7 +15,7 @@ from app.project.opening.opened_project import OpenedProject, opened_project
 from app.training.messages import TrainingFailed, WarningRaised
 from engine.clip_files.clip_state import read_clip_header, read_clip_state
 from engine.errors import ProjectError
-from tests.app.cluster.clusters import BlindCluster, Driver, add_node, driving, ray_nodes
+from tests.app.cluster.clusters import HOLDS_AT, BlindCluster, Driver, add_node, driving, ray_nodes
 from tests.app.training.test_side_by_side import make_service
 from tests.app.training.test_train_queue import run_out
 
@@ -62,7 +62,7 @@ def warnings(driver: Driver) -> str:
 @pytest.mark.parametrize("kind", [cluster_module.Cluster, BlindCluster])
 def test_a_lost_node_costs_no_clip(ray_cluster, caches, make_opened, kind) -> None:
     opened, n_steps = clips_of_one(make_opened, n_steps=12), 12
-    doomed = add_node(ray_cluster, caches / "doomed")
+    doomed = add_node(ray_cluster, caches / "doomed", **{HOLDS_AT: "3"})
     with driving(opened, ray_cluster.address, kind=kind) as driver:
         assert driver.cluster.n_slots == 4
         driver.service.enqueue_all(range(6))
@@ -101,7 +101,7 @@ def test_a_copy_is_sent_once_and_gives_the_same_curves(ray_cluster, make_opened,
 
 def test_ctrl_c_keeps_progress_and_the_next_run_resumes(ray_cluster, make_opened) -> None:
     for kind, name in ((cluster_module.Cluster, "shared"), (BlindCluster, "copied")):
-        opened = clips_of_one(make_opened, name, n_steps=30)
+        opened = clips_of_one(make_opened, name, n_steps=10_000)  # more than anybody waits for
         with driving(opened, ray_cluster.address, kind=kind) as driver:
 
             def interrupt(seconds: float, driver: Driver = driver) -> None:
