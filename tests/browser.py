@@ -123,7 +123,7 @@ class Browser:
 
     # ---------------------------------------------------------------- the protocol
 
-    def call(self, method: str, *, timeout_s: float = 60.0, **params: Any) -> dict[str, Any]:
+    def call(self, method: str, *, timeout_s: float = 300.0, **params: Any) -> dict[str, Any]:
         """Carry out a method of the protocol."""
         self._number += 1
         message: dict[str, Any] = {"id": self._number, "method": method, "params": params}
@@ -185,7 +185,7 @@ class Browser:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def wait(self, expression: str, *, timeout_s: float = 30.0) -> None:
+    def wait(self, expression: str, *, timeout_s: float = 300.0) -> None:
         """Until an expression is true."""
         until_s = time.monotonic() + timeout_s
         while not self.value(expression):

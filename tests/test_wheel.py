@@ -87,7 +87,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (tree / "build" / "lib" / "clipgstream" / "app").mkdir(parents=True)
     (tree / "build" / "lib" / "clipgstream" / "app" / "left_by_an_earlier_build.py").touch()
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--no-build-isolation", "--no-deps"]
-    subprocess.run([*pip, "--no-index", "-q", "-w", folder, tree], check=True, timeout=300, capture_output=True)
+    subprocess.run([*pip, "--no-index", "-q", "-w", folder, tree], check=True, timeout=900, capture_output=True)
     return next(folder.glob("*.whl"))
 
 
@@ -99,7 +99,7 @@ def run_beside(
     folder = tmp_path_factory.mktemp("beside")
     site = folder / "site"
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", "--no-index", "--no-deps", "-q"]
-    subprocess.run([*pip, "--target", site, wheel], check=True, timeout=300, capture_output=True)
+    subprocess.run([*pip, "--target", site, wheel], check=True, timeout=900, capture_output=True)
     theirs = folder / "theirs"
     for name in ("app", "engine", "ui", "assets"):
         (theirs / name).mkdir(parents=True)

@@ -23,14 +23,22 @@ ROOT = Path(__file__).resolve().parents[2]
 def test_a_few_rounds_hold_no_more_handles_and_threads(tmp_path):
     """In a process of its own: what other tests hold does not count. Memory needs the long one: caches still fill."""
     program = (
+        "import time\n"
         "from pathlib import Path\n"
+        "from tests.soak.held import held_now\n"
         "from tests.soak.soak import Soak\n"
         "if __name__ == '__main__':\n"
         f"    folder = Path({str(tmp_path)!r})\n"
         "    soak = Soak(folder, has_window=False, rounds_of_a_session=2, n_seeks=6, is_preloading=False)\n"
         "    samples = [soak.round() for _ in range(5)]\n"
+        "    counts = [[held.handles, held.threads] for held in samples]\n"
+        "    until_s = time.monotonic() + 120.0\n"
+        "    while counts[-1] > counts[2] and time.monotonic() < until_s:  # threads that end have not ended yet\n"
+        "        soak._draw(1)\n"
+        "        time.sleep(0.1)\n"
+        "        counts[-1] = [(held := held_now()).handles, held.threads]\n"
         "    soak.close()\n"
-        "    print([[held.handles, held.threads] for held in samples])\n"
+        "    print(counts)\n"
     )
     script = tmp_path / "few_rounds.py"
     script.write_text(program)
@@ -41,7 +49,7 @@ def test_a_few_rounds_hold_no_more_handles_and_threads(tmp_path):
         capture_output=True,
         text=True,
         check=False,
-        timeout=600,
+        timeout=900,
     )
     assert done.returncode == 0, done.stderr[-3000:]
     held = [tuple(pair) for pair in json.loads(done.stdout.splitlines()[-1])]
