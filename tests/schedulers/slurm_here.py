@@ -8,8 +8,9 @@ import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from random import SystemRandom
 
 DEADLINE_S = 600.0
 
@@ -107,10 +108,7 @@ def slurm_here(folder: Path, *, n_cpus: int = 2) -> Iterator[SlurmHere]:
         folder: An empty one.
         n_cpus: How many jobs of one core run at once, whatever the machine has.
     """
-    with socket.socket() as first, socket.socket() as second:
-        for one in (first, second):
-            one.bind(("127.0.0.1", 0))
-        ports = [one.getsockname()[1] for one in (first, second)]
+    ports = _free_ports(2)
     host = socket.gethostname().partition(".")[0]
     (folder / "slurm.conf").write_text(CONFIGURATION.format(host=host, ports=ports, folder=folder, n_cpus=n_cpus))
     for name in ("state", "spool"):
@@ -135,6 +133,16 @@ def slurm_here(folder: Path, *, n_cpus: int = 2) -> Iterator[SlurmHere]:
             except subprocess.TimeoutExpired:
                 daemon.kill()
                 daemon.wait()
+
+
+def _free_ports(n: int) -> list[int]:
+    """Ports that nobody has, and that no system hands to whoever asks for any: they are still free a moment later."""
+    found: list[int] = []
+    for port in SystemRandom().sample(range(20_000, 30_000), 200):
+        with socket.socket() as one, suppress(OSError):
+            one.bind(("127.0.0.1", port))
+            found.append(port)
+    return found[:n]
 
 
 def _wait_for_node(cluster: SlurmHere, folder: Path) -> None:
