@@ -9,10 +9,11 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 
-from filelock import FileLock
+from filelock import FileLock, Timeout
 
 from engine.kernels.cache import current_key
 
@@ -65,10 +66,27 @@ class BuiltOnce:
         build(partial)
         (partial / _MANIFEST).write_text(json.dumps(_hashes(partial)))
         partial.rename(kept)
-        folders = sorted((path for path in kept.parent.iterdir() if path.is_dir()), key=lambda p: -p.stat().st_mtime)
-        for path in folders[self._max_folders :]:
-            if path != kept and not path.name.startswith("partial-"):
+        self._remove_old_ones(kept)
+
+    def _remove_old_ones(self, kept: Path) -> None:
+        """Other workers use the store meanwhile: what they hold the lock of stays, what they rename is passed over."""
+        times: dict[Path, float] = {}
+        for path in kept.parent.iterdir():
+            with suppress(FileNotFoundError):
+                if path.is_dir() and not path.name.startswith("partial-"):
+                    times[path] = path.stat().st_mtime
+        for path in sorted(times, key=lambda path: -times[path])[self._max_folders :]:
+            if _name_of(path) == _name_of(kept):  # whose lock is ours
+                if path != kept:
+                    shutil.rmtree(path, ignore_errors=True)
+                continue
+            with suppress(Timeout), FileLock(kept.parent / f"{_name_of(path)}.lock", timeout=0):
                 shutil.rmtree(path, ignore_errors=True)
+
+
+def _name_of(kept: Path) -> str:
+    """What was given as the name, of the folder that is kept."""
+    return kept.name.rpartition("-")[0]
 
 
 def _is_whole(kept: Path) -> bool:

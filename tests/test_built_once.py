@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from tests import built_once
 from tests.built_once import BuiltOnce
@@ -96,6 +97,17 @@ def test_the_oldest_go(tree, store_root, tmp_path):
         (tree / "recipe.py").write_text(str(i))
         copies(store, tmp_path, build, 1)
     assert len(list(store_root.glob("clip-*"))) == 2
+
+
+def test_what_another_worker_uses_stays(tree, store_root, tmp_path):
+    store, build = BuiltOnce(store_root, max_folders=1), Builder()
+    store.copy("other", tmp_path / "other", build)
+    with FileLock(store_root / "other.lock"):  # as it copies
+        copies(store, tmp_path, build, 1)
+        assert list(store_root.glob("other-*"))
+    (tree / "recipe.py").write_text("changed")
+    copies(store, tmp_path, build, 1)
+    assert len([path for path in store_root.iterdir() if path.is_dir()]) == 1
 
 
 def test_without_a_place_everything_is_built(tree, tmp_path):

@@ -189,7 +189,7 @@ def test_interrupting_stops_cleanly_and_keeps_what_was_learned(tmp_path, capture
         [sys.executable, str(script), str(capture_folder), str(tmp_path / "p"), name],
         capture_output=True,
         text=True,
-        timeout=90,
+        timeout=600,
         check=False,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         cwd=tmp_path,

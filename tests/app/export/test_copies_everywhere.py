@@ -43,7 +43,7 @@ from engine.editing.scene_object import ObjectInClip, SceneObject
 from tests.app.export.test_edits_everywhere import READER
 from tests.app.stored_project import copy_stored
 
-FRAMES, WAIT_S = range(6), 60.0
+FRAMES, WAIT_S = range(6), 300.0
 PUSH = Transform((0.4, 0.0, 0.2), scale=1.1)
 LATER = ObjectCopy(1, "later", 1, PUSH, shift_frames=2.0, first=1, stop=5)
 

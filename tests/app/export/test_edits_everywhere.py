@@ -47,7 +47,7 @@ from tests.app.stored_project import copy_stored
 FRAMES, SCOPE = range(6), Scope(2, 5)
 READER = runpy.run_path(str(Path(__file__).parents[3] / "docs" / "examples" / "read_player.py"))
 MIDDLE: Target = Sphere((0.0, 0.0, 0.5), 1.0)
-WAIT_S = 60.0
+WAIT_S = 300.0
 ACTIONS: dict[str, tuple[Target, Action]] = {
     "hide": (MIDDLE, Hide()),
     "delete": (MIDDLE, Delete()),
