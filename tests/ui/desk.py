@@ -17,7 +17,7 @@ PROGRAMS = ("Xvfb", "xdotool", "xwd")
 SCREEN = (1320, 840)
 WINDOW = (1280, 800)
 POLL_S = 0.02
-WAIT_S = 180.0
+WAIT_S = 300.0
 """Only a hang takes longer, even on a machine that is busy."""
 
 
