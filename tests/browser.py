@@ -54,6 +54,8 @@ AS_A_CARD_WITH_WEBGPU = (
 )
 """The same with `WEBGPU_FLAGS`."""
 _FIRST_FREE_FD = 10
+WAIT_S = 180.0
+"""For an answer, or for something to come true: only a hang takes so long, even on a machine that is busy."""
 
 
 def chromium() -> str | None:
@@ -101,8 +103,7 @@ class Browser:
         for end in (from_us, to_us, log):
             os.close(end)
         self._session: str | None = None
-        page = next(info for info in self.call("Target.getTargets")["targetInfos"] if info["type"] == "page")
-        self._session = self.call("Target.attachToTarget", targetId=page["targetId"], flatten=True)["sessionId"]
+        self._session = self.call("Target.attachToTarget", targetId=self._first_page(), flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
         self.resize(width, height)
@@ -121,9 +122,19 @@ class Browser:
             time.sleep(0.1)
         os.waitpid(self.pid, 0)
 
+    def _first_page(self) -> str:
+        """The page that the browser opens, which answers before it has done so."""
+        until_s = time.monotonic() + WAIT_S
+        while True:
+            for target in self.call("Target.getTargets")["targetInfos"]:
+                if target["type"] == "page":
+                    return target["targetId"]
+            assert time.monotonic() < until_s, "the browser opens no page"
+            time.sleep(0.03)
+
     # ---------------------------------------------------------------- the protocol
 
-    def call(self, method: str, *, timeout_s: float = 300.0, **params: Any) -> dict[str, Any]:
+    def call(self, method: str, *, timeout_s: float = WAIT_S, **params: Any) -> dict[str, Any]:
         """Carry out a method of the protocol."""
         self._number += 1
         message: dict[str, Any] = {"id": self._number, "method": method, "params": params}
@@ -169,9 +180,9 @@ class Browser:
         """Go to a page on the disk."""
         self.call("Page.navigate", url=page.resolve().as_uri())
 
-    def before_pages(self, script: str) -> None:
-        """Run a script in every page before its own."""
-        self.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+    def before_pages(self, script: str) -> str:
+        """Run a script in every page before its own. Returns its number."""
+        return self.call("Page.addScriptToEvaluateOnNewDocument", source=script)["identifier"]
 
     def resize(self, width: int, height: int, *, ratio: float = 1.0, is_phone: bool = False) -> None:
         """Size of the page in its own pixels, and how many of the screen's make one of them."""
@@ -185,7 +196,7 @@ class Browser:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def wait(self, expression: str, *, timeout_s: float = 300.0) -> None:
+    def wait(self, expression: str, *, timeout_s: float = WAIT_S) -> None:
         """Until an expression is true."""
         until_s = time.monotonic() + timeout_s
         while not self.value(expression):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterable
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 
@@ -54,7 +54,6 @@ class BuiltOnce:
         with FileLock(self._root / f"{name}.lock", timeout=BUILD_LIMIT_S):
             if not _is_whole(kept):
                 self._build(kept, build)
-                self._forget_oldest(kept)
             kept.touch()
             shutil.copytree(kept, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(_MANIFEST))
         return folder
@@ -67,27 +66,27 @@ class BuiltOnce:
         build(partial)
         (partial / _MANIFEST).write_text(json.dumps(_hashes(partial)))
         partial.rename(kept)
+        self._remove_old_ones(kept)
 
-    def _forget_oldest(self, kept: Path) -> None:
-        """Other workers build and hand out folders meanwhile: theirs may be gone by now, and those in use stay.
-
-        Args:
-            kept: What was built, under a name that is locked here.
-        """
-        assert self._root is not None
-        ages: list[tuple[float, Path]] = []
-        for path in self._root.iterdir():
+    def _remove_old_ones(self, kept: Path) -> None:
+        """Other workers use the store meanwhile: what they hold the lock of stays, what they rename is passed over."""
+        times: dict[Path, float] = {}
+        for path in kept.parent.iterdir():
             with suppress(FileNotFoundError):
                 if path.is_dir() and not path.name.startswith("partial-"):
-                    ages.append((path.stat().st_mtime, path))
-        for _, path in sorted(ages)[: -self._max_folders]:
-            name = path.name.rpartition("-")[0]
-            if path == kept:
+                    times[path] = path.stat().st_mtime
+        for path in sorted(times, key=lambda path: -times[path])[self._max_folders :]:
+            if _name_of(path) == _name_of(kept):  # whose lock is ours
+                if path != kept:
+                    shutil.rmtree(path, ignore_errors=True)
                 continue
-            with suppress(Timeout), ExitStack() as held:
-                if name != kept.name.rpartition("-")[0]:
-                    held.enter_context(FileLock(self._root / f"{name}.lock", timeout=0))
+            with suppress(Timeout), FileLock(kept.parent / f"{_name_of(path)}.lock", timeout=0):
                 shutil.rmtree(path, ignore_errors=True)
+
+
+def _name_of(kept: Path) -> str:
+    """What was given as the name, of the folder that is kept."""
+    return kept.name.rpartition("-")[0]
 
 
 def _is_whole(kept: Path) -> bool:

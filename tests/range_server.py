@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import threading
-import time
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -19,7 +18,7 @@ class RangeServer:
         has_ranges: Whether it knows ranges; otherwise it sends whole files.
         failing: How often each file of this name still ends in an error.
         failure: The status of these.
-        slow_s: Seconds before each answer, by file name.
+        held: By file name, what requests wait for before they are answered.
         asked: File name and Range of every request, in order.
         n_sent: Bytes of bodies.
     """
@@ -27,7 +26,7 @@ class RangeServer:
     def __init__(self, folder: Path) -> None:
         self.folder, self.has_ranges, self.failure = folder, True, 503
         self.failing: dict[str, int] = {}
-        self.slow_s: dict[str, float] = {}
+        self.held: dict[str, threading.Event] = {}
         self.asked: list[tuple[str, str]] = []
         self.n_sent = 0
         self._server = _Server(("127.0.0.1", 0), partial(_Handler, self))
@@ -38,6 +37,8 @@ class RangeServer:
         return self
 
     def __exit__(self, *_: object) -> None:
+        for event in self.held.values():
+            event.set()
         self._server.shutdown()
         self._server.server_close()
 
@@ -65,7 +66,8 @@ class _Handler(BaseHTTPRequestHandler):
         owner, path = self.owner, self.owner.folder / self.path.partition("?")[0].lstrip("/")
         wanted = self.headers.get("Range", "")
         owner.asked.append((path.name, wanted))
-        time.sleep(owner.slow_s.get(path.name, 0.0))
+        if path.name in owner.held:
+            owner.held[path.name].wait()
         if owner.failing.get(path.name, 0) > 0:
             owner.failing[path.name] -= 1
             self.send_error(owner.failure)

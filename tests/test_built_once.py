@@ -99,24 +99,15 @@ def test_the_oldest_go(tree, store_root, tmp_path):
     assert len(list(store_root.glob("clip-*"))) == 2
 
 
-def test_what_another_worker_hands_out_or_renames_just_now_is_left_alone(tree, store_root, tmp_path, monkeypatch):
+def test_what_another_worker_uses_stays(tree, store_root, tmp_path):
     store, build = BuiltOnce(store_root, max_folders=1), Builder()
-    for name in ("other", "third"):
-        store.copy(name, tmp_path / name, build, sources=["recipe.py"])
-    (store_root / "renamed").mkdir()
-    is_dir = Path.is_dir
-
-    def is_dir_then_gone(path: Path) -> bool:
-        found = is_dir(path)
-        if path.name == "renamed":
-            path.rmdir()
-        return found
-
-    with FileLock(store_root / "third.lock"):
-        monkeypatch.setattr(Path, "is_dir", is_dir_then_gone)
+    store.copy("other", tmp_path / "other", build)
+    with FileLock(store_root / "other.lock"):  # as it copies
         copies(store, tmp_path, build, 1)
-    monkeypatch.undo()
-    assert sorted(path.name.partition("-")[0] for path in store_root.iterdir() if path.is_dir()) == ["clip", "third"]
+        assert list(store_root.glob("other-*"))
+    (tree / "recipe.py").write_text("changed")
+    copies(store, tmp_path, build, 1)
+    assert len([path for path in store_root.iterdir() if path.is_dir()]) == 1
 
 
 def test_without_a_place_everything_is_built(tree, tmp_path):

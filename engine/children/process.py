@@ -34,8 +34,9 @@ POLL_S = 0.1
 MAX_TAIL_BYTES = 4000
 MAX_EVENTS_PER_POLL = 200
 """A window that slept must not spend a whole frame on old reports."""
-END_TIMEOUT_S = 2.0
-"""A killed process is gone in a few milliseconds."""
+END_TIMEOUT_S = 20.0
+"""A killed process is gone in a few milliseconds, on a machine that stalls in some seconds. Whoever goes on before may
+remove files that it still writes."""
 _CREATION_FLAGS = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 """On Windows, where Ctrl+C reaches a whole group and cannot be blocked."""
 

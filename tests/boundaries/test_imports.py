@@ -23,7 +23,7 @@ def lint_imports(root: Path) -> subprocess.CompletedProcess[str]:
     """Run the import contracts of `root` in a child, which sees the packages below `root` only."""
     code = "import sys; sys.path.insert(0, '.'); from importlinter.cli import lint_imports; sys.exit(lint_imports())"
     return subprocess.run(
-        [sys.executable, "-P", "-c", code], cwd=root, capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-P", "-c", code], cwd=root, capture_output=True, text=True, timeout=600, check=False
     )
 
 
@@ -31,7 +31,7 @@ def loaded_modules(statement: str) -> set[str]:
     """Top-level modules that a fresh interpreter holds after `statement`."""
     code = f"import json, sys\n{statement}\nprint(json.dumps(sorted({{name.split('.')[0] for name in sys.modules}})))"
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=600, check=False
     )
     assert done.returncode == 0, done.stderr
     return set(json.loads(done.stdout.splitlines()[-1]))

@@ -119,7 +119,7 @@ def test_an_example_edit_is_found_in_every_layer(tmp_path: Path) -> None:
     assert len(EXAMPLE) <= MAX_FILES
 
     command = [sys.executable, "-c", FIND, str(tmp_path / "project")]
-    done = subprocess.run(command, cwd=source, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, cwd=source, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout.splitlines()[-1]) == {
         "file": str(source / "clipgstream.py"),

@@ -14,7 +14,7 @@ def test_results_keep_the_order_of_the_items(monkeypatch):
 
     def function(item: int) -> int:
         if item == 0:
-            assert is_second_done.wait(10)  # the first one ends last
+            assert is_second_done.wait(300)  # the first one ends last
         else:
             is_second_done.set()
         return item * item

@@ -39,7 +39,7 @@ def on(monkeypatch: pytest.MonkeyPatch):
 def run(code: str, **environment: str) -> str:
     command = [sys.executable, "-c", code]
     done = subprocess.run(
-        command, env=os.environ | environment, capture_output=True, text=True, cwd=ROOT, check=False, timeout=300
+        command, env=os.environ | environment, capture_output=True, text=True, cwd=ROOT, check=False, timeout=900
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -16,7 +16,7 @@ from tests.engine.export.scenes import chance_splats, one_splat
 
 FOLDER = Path(__file__).parent
 MODULES = FOLDER / "node_modules"
-TIMEOUT_S = 120
+TIMEOUT_S = 600
 VALIDATE = """
 const fs = require("fs");
 const validator = require("gltf-validator");

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -73,6 +74,13 @@ def open_pilot(headless_gl: None) -> Iterator[Callable[..., Pilot]]:
     yield open_window
     for studio in opened:
         studio.close()
+
+
+@pytest.fixture
+def lasting_notices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is said for some seconds stays, however long the test takes."""
+    for name in ("INFO_LIFETIME_S", "WARNING_LIFETIME_S"):
+        monkeypatch.setattr(f"ui.panels.notices.{name}", math.inf)
 
 
 @pytest.fixture

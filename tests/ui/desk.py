@@ -17,6 +17,8 @@ PROGRAMS = ("Xvfb", "xdotool", "xwd")
 SCREEN = (1320, 840)
 WINDOW = (1280, 800)
 POLL_S = 0.02
+WAIT_S = 300.0
+"""Only a hang takes longer, even on a machine that is busy."""
 
 
 def missing_programs() -> list[str]:
@@ -75,7 +77,7 @@ class Desk:
         except FileNotFoundError:
             return {}
 
-    def wait_for(self, what: str, is_so: Callable[[dict[str, Any]], bool], timeout_s: float = 20.0) -> dict[str, Any]:
+    def wait_for(self, what: str, is_so: Callable[[dict[str, Any]], bool], timeout_s: float = WAIT_S) -> dict[str, Any]:
         """Poll the reports until one fits.
 
         Raises:
@@ -142,7 +144,7 @@ class Desk:
             capture_output=True,
             text=True,
             check=True,
-            timeout=30,
+            timeout=WAIT_S,
         )
         self.do(f"windowfocus {found.stdout.split()[0]}")
 
@@ -152,7 +154,7 @@ class Desk:
         from ui.shell.screenshot import write_png
 
         dump = subprocess.run(
-            ["xwd", "-root", "-silent"], env=self._environment, capture_output=True, check=True, timeout=20
+            ["xwd", "-root", "-silent"], env=self._environment, capture_output=True, check=True, timeout=WAIT_S
         )
         image = read_xwd(dump.stdout)
         return write_png(image[: self._size[1], : self._size[0]], path)
@@ -165,9 +167,9 @@ class Desk:
             if child.poll() is None:
                 child.terminate()
                 try:
-                    child.wait(15)
+                    child.wait(WAIT_S)
                 except subprocess.TimeoutExpired:
                     child.kill()
-                    child.wait(5)
+                    child.wait(WAIT_S)
         self._output.close()
         return self.program.returncode

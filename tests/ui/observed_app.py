@@ -31,6 +31,7 @@ def describe(studio: Any) -> dict[str, Any]:
     return {
         "rects": rects,
         "scale": scale,
+        "is_still": not studio.frame._redraw.is_due,
         "n_popups": len(studio.frame.backend.context.open_popup_stack),
         "capture": None if session.capture is None else str(session.capture.path),
         "frame_index": timeline.frame_index,

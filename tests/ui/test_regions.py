@@ -284,6 +284,7 @@ def test_choosing_ends_when_the_project_is_taken_away_or_another_capture_comes(p
     assert tool(pilot).radius == 0.0, "the next scene may be of another size"
 
 
+@pytest.mark.usefixtures("lasting_notices")
 def test_without_a_capture_the_panel_says_so(open_pilot: Callable[..., Pilot]) -> None:
     pilot = open_pilot(FakeSession(has_capture=False))
     pilot.key(key.M)

@@ -22,7 +22,7 @@ if __name__ == "__main__":  # run as a program: the repository root is not on th
     sys.path.insert(0, str(ROOT))
 
 from app.project.projects_folder import projects_dir  # noqa: E402
-from tests.ui.desk import Desk, missing_programs  # noqa: E402
+from tests.ui.desk import WAIT_S, Desk, missing_programs  # noqa: E402
 
 ORBIT_RADIANS_PER_PX = 0.006
 
@@ -35,9 +35,9 @@ def read_png(path: Path) -> np.ndarray:
 
 def journey(desk: Desk, pictures: Path) -> None:
     """Open, look through a camera, compare, scrub, orbit, dolly, play, mark; asserts what each must do."""
-    state = desk.wait_for("an open capture", lambda s: s["capture"] is not None and "timeline.track" in s["rects"], 60)
+    desk.wait_for("an open capture", lambda s: s["capture"] is not None and "timeline.track" in s["rects"])
     desk.focus()
-    desk.wait_for("something to look at", lambda s: s["shows"] != "Cameras only", 30)
+    state = desk.wait_for("something to look at", lambda s: s["shows"] != "Cameras only" and s["is_still"])
     n_frames = state["n_frames"]
     desk.screenshot(pictures / "1_open.png")
 
@@ -69,8 +69,8 @@ def journey(desk: Desk, pictures: Path) -> None:
     desk.key("f")
     desk.wait_for("the home view", lambda s: s["look_through"] is None)
 
-    label = desk.wait_for("the words over the picture", lambda s: s["hud"] is not None)["hud"]["label"]
-    assert label.startswith("clip 0   frame 0   0.00 s   free view   "), label
+    words = "clip 0   frame 0   0.00 s   free view   "
+    desk.wait_for("the words over the picture", lambda s: s["hud"] is not None and s["hud"]["label"].startswith(words))
 
     desk.click("timeline.play")
     desk.wait_for("playing", lambda s: s["is_playing"] and s["frame_index"] > 0)
@@ -102,7 +102,7 @@ def journey(desk: Desk, pictures: Path) -> None:
 def train(desk: Desk, pictures: Path, *, wait_s: float) -> None:
     """Press the button and watch until the first clip is trained, still scrubbing meanwhile."""
     desk.click("training.next")
-    desk.wait_for("training to begin", lambda s: s["training"]["state"] in ("starting", "preparing", "running"), 20)
+    desk.wait_for("training to begin", lambda s: s["training"]["state"] in ("starting", "preparing", "running"))
     desk.screenshot(pictures / "7_training_begins.png")
     desk.wait_for("steps", lambda s: s["training"]["step"] > 20, wait_s)
     desk.screenshot(pictures / "8_training_runs.png")
@@ -137,24 +137,23 @@ def test_the_window_obeys_a_real_pointer_and_keyboard(desk: Desk, tmp_path: Path
 def test_taps_open_menus_and_the_window_comes_back_as_it_was_left(
     desk: Desk, tiny_capture: Path, tmp_path: Path
 ) -> None:
-    desk.wait_for("an open capture", lambda s: s["capture"] is not None and "timeline.track" in s["rects"], 60)
+    desk.wait_for("an open capture", lambda s: s["capture"] is not None and "timeline.track" in s["rects"])
     desk.focus()
     desk.key("ctrl+plus")
     desk.wait_for("a larger interface", lambda s: s["scale"] == 1.25)
     desk.key("End")
     desk.wait_for("the last frame", lambda s: s["frame_index"] == s["n_frames"] - 1)
     for name, button in (("timeline.clip0", 3), ("menu.View", 1), ("viewport.overlays", 1)):
-        desk.wait_for("no popup", lambda s: s["n_popups"] == 0)
+        desk.wait_for("no popup", lambda s: s["n_popups"] == 0 and s["is_still"])
         picture = read_png(desk.screenshot(tmp_path / "before.png"))
         desk.move(*desk.center(name))
         desk.do(f"mousedown {button}", f"mouseup {button}")  # with no time between
         desk.wait_for(f"the popup of {name}", lambda s: s["n_popups"] == 1)
-        time.sleep(0.5)  # nothing else comes: what is not drawn by now never is
-        shown = read_png(desk.screenshot(tmp_path / f"{name}.png"))
-        assert (shown != picture).any(axis=2).sum() > 8_000, f"the popup of {name} was drawn"
+        until_s = time.monotonic() + WAIT_S
+        while (read_png(desk.screenshot(tmp_path / f"{name}.png")) != picture).any(axis=2).sum() <= 8_000:
+            assert time.monotonic() < until_s, f"the popup of {name} was not drawn, and nothing else comes"
         desk.key("Escape")
-    desk.wait_for("Escape to close it", lambda s: s["n_popups"] == 0)
-    left = desk.state
+    left = desk.wait_for("Escape to close it", lambda s: s["n_popups"] == 0 and s["is_still"])
     assert desk.close() == 0
     folder = tmp_path / "again"
     folder.mkdir()
@@ -162,7 +161,7 @@ def test_taps_open_menus_and_the_window_comes_back_as_it_was_left(
     again = Desk(folder, [str(project)])
     try:
         state = again.wait_for(
-            "the capture again", lambda s: "timeline.track" in s["rects"] and s["frame_index"] > 0, 60
+            "the capture again", lambda s: "timeline.track" in s["rects"] and s["frame_index"] > 0 and s["is_still"]
         )
         assert (state["frame_index"], state["scale"]) == (left["frame_index"], 1.25)
         assert state["rects"]["timeline.track"] == pytest.approx(left["rects"]["timeline.track"], abs=2)
@@ -182,7 +181,7 @@ def test_a_folder_that_is_no_capture_becomes_a_notice(tmp_path: Path, monkeypatc
     empty.mkdir()
     desk = Desk(tmp_path, [str(empty)])
     try:
-        state = desk.wait_for("an error notice", lambda s: bool(s["notices"]), 40)
+        state = desk.wait_for("an error notice", lambda s: bool(s["notices"]))
         kind, title, detail, hint = state["notices"][0]
         assert kind == "error"
         assert "holiday" in title

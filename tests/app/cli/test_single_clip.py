@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -165,15 +166,22 @@ def test_an_interruption_keeps_progress_and_frees_the_clip(train: Run, tmp_path:
 
 
 def test_one_that_others_stop_says_so_with_a_code_of_its_own(train: Run, tmp_path: Path, monkeypatch) -> None:
-    look = Claims.look_after_held
+    look, has_stepped = Claims.look_after_held, threading.Event()
 
     def look_when_asked(claims: Claims) -> None:
-        ask_holder(claims.folder, "0000", "stop")
+        if has_stepped.is_set():  # before, there is nothing to keep
+            ask_holder(claims.folder, "0000", "stop")
         look(claims)
+
+    def make_stepping(*arguments: Any) -> Any:
+        training: Any = make_slow(*arguments)
+        step = training.step
+        training.step = lambda n=1: (has_stepped.set(), step(n))[1]
+        return training
 
     monkeypatch.setattr(Claims, "look_after_held", look_when_asked)
     monkeypatch.setattr(claims_module, "BEAT_EVERY_S", 0.02)
-    code, _, err = train(0, make_training=make_slow)
+    code, _, err = train(0, make_training=make_stepping)
     assert code == 3
     assert "The training of clip 0 was stopped; progress is kept." in err
     assert (tmp_path / "p" / "checkpoints" / "0000.safetensors").is_file()

@@ -28,7 +28,7 @@ from engine.children.kind import Unwanted
 from engine.children.messages import decoded, encoded
 from engine.storage.files import PARTIAL_PREFIX
 
-DEADLINE_S = 300.0
+DEADLINE_S = 600.0
 Start = Callable[..., ExportProcess]
 
 

@@ -110,7 +110,7 @@ assert "`kite`: for windy days" in export_tables()
 
 @pytest.mark.slow
 def test_a_format_of_gaussians_is_in_every_layer():
-    subprocess.run([sys.executable, "-c", WITH_A_FORMAT], check=True, cwd=ROOT, timeout=300)
+    subprocess.run([sys.executable, "-c", WITH_A_FORMAT], check=True, cwd=ROOT, timeout=600)
 
 
 @pytest.mark.parametrize(

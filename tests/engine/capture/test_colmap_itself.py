@@ -25,7 +25,7 @@ AGREE_PX = 1e-6
 
 def run_child(what: str, folder: Path) -> None:
     subprocess.run(
-        [sys.executable, "-m", "tests.engine.capture.pycolmap_child", what, str(folder)], check=True, timeout=120
+        [sys.executable, "-m", "tests.engine.capture.pycolmap_child", what, str(folder)], check=True, timeout=600
     )
 
 

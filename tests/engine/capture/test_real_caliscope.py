@@ -61,7 +61,7 @@ def moving_features(
             moving[row, frame] = uniform_filter(np.abs(picture - still), 15) > MOVES
     np.savez(folder / "pictures.npz", **grays)
     child = [sys.executable, str(Path(__file__).parent / "sift_child.py"), "pictures.npz", "features.npz"]
-    subprocess.run(child, cwd=folder, check=True, timeout=300, capture_output=True)
+    subprocess.run(child, cwd=folder, check=True, timeout=600, capture_output=True)
     found = {}
     with np.load(folder / "features.npz") as features:
         for (row, frame), mask in moving.items():

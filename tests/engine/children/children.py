@@ -69,7 +69,7 @@ def _listen(job: Ask, parent: Parent[str]) -> str:
     while not job.path.exists():
         time.sleep(0.01)
     n_bytes = 0
-    while (said := parent.receive(60.0)) != "enough":
+    while (said := parent.receive(300.0)) != "enough":
         n_bytes += len(said)
     return str(n_bytes)
 

@@ -16,7 +16,7 @@ from engine.children.process import ChildProcess, run_child
 from engine.errors import CaptureError, EngineError, PreparationError
 from tests.engine.children.children import AT_ONCE, STUBBORN, TIDY, WIDE, Ask
 
-DEADLINE_S = 120.0
+DEADLINE_S = 300.0
 ROOT = Path(__file__).resolve().parents[3]
 
 
@@ -179,7 +179,7 @@ try:
     while True:
         child.wait(3600.0)
 except KeyboardInterrupt:
-    child.end(60.0)
+    child.end(300.0)
 """
 
 

@@ -91,6 +91,8 @@ def fit(browser: Browser, *, ratio: float = 1.0) -> None:
     bar = browser.value("document.querySelector('footer').offsetHeight")
     browser.resize(PICTURE[0], PICTURE[1] + bar, ratio=ratio)
     browser.wait(f"document.getElementById('picture').clientHeight === {PICTURE[1]}")
+    browser.value("void clipgstreamPlayer.changed()")  # another ratio alone is not always observed
+    browser.wait(f"clipgstreamPlayer.canvas.height === {ratio * PICTURE[1]}")
     browser.value("void (document.querySelector('header').hidden = true)")  # it lies over the picture
 
 

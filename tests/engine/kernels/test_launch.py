@@ -168,7 +168,7 @@ def test_the_workqueue_layer_runs_every_worker():
         "assert (job.visits == 1).all(), job.visits\n"
     )
     environment = {**os.environ, "NUMBA_THREADING_LAYER": "workqueue", "PYTHONPATH": str(ROOT)}
-    subprocess.run([sys.executable, "-c", probe], cwd=ROOT, env=environment, check=True, timeout=120)
+    subprocess.run([sys.executable, "-c", probe], cwd=ROOT, env=environment, check=True, timeout=600)
 
 
 class FillJob(NamedTuple):

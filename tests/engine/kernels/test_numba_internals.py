@@ -112,7 +112,7 @@ sys.exit(list(seen) != [3] * 5)
 """
     _check(
         "the symbol numba_parallel_for takes function, arrays, lengths, steps, data, inner dimensions, arrays, threads",
-        lambda: subprocess.run([sys.executable, "-c", probe], cwd=ROOT, timeout=120).returncode == 0,
+        lambda: subprocess.run([sys.executable, "-c", probe], cwd=ROOT, timeout=600).returncode == 0,
     )
 
 
@@ -185,7 +185,7 @@ def test_a_layer_is_chosen_before_the_start():
     )
     _check(
         "config.THREADING_LAYER chooses the layer of threads that were not started yet",
-        lambda: subprocess.run([sys.executable, "-c", probe], cwd=ROOT, timeout=120).returncode == 0,
+        lambda: subprocess.run([sys.executable, "-c", probe], cwd=ROOT, timeout=600).returncode == 0,
     )
 
 

@@ -86,7 +86,7 @@ def test_everything_draws_on_plain_3_3_without_heavy_imports(ctx: moderngl.Conte
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     if is_software(ctx):

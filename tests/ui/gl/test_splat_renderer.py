@@ -33,7 +33,7 @@ from ui.gl.targets import Precision, Target
 pytestmark = pytest.mark.gl
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-DEADLINE_S = 20.0
+DEADLINE_S = 180.0
 
 
 @dataclass(frozen=True)

@@ -113,6 +113,7 @@ def test_numbers_change_the_key_of_the_shown_frame(panel: Pilot) -> None:
     assert [one.frame for one in keyed(panel).keys] == [0.0, 10.0, 20.0]
 
 
+@pytest.mark.usefixtures("lasting_notices")
 def test_an_edit_without_a_volume_says_so(panel: Pilot) -> None:
     panel.session.dispatch(AddEdit(Expose(1.0)))
     panel.studio.frame.ui.editing.choose(2)

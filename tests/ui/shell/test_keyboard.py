@@ -163,6 +163,7 @@ def test_events_wait_for_the_frame_of_a_key_and_keep_their_order() -> None:
 
 @pytest.mark.gl
 @pytest.mark.slow
+@pytest.mark.usefixtures("lasting_notices")
 def test_a_key_that_cannot_act_says_why_once(pilot: Pilot) -> None:
     keys = ((key.X, key.LALT), (key.N, SHIFT), (key.UP, SHIFT), (key._3, CTRL), (key.V, SHIFT), (key.Z, CTRL))
     for n, (symbol, modifier) in enumerate(keys, 1):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from engine.clip_files.roles import ROLES
 from engine.gate.reasons import USER_DYNAMIC
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
+from tests.ui.real_session import draw_until
 from ui.gl import frusta_lines
 from ui.shell.screenshot import read_window, write_png
 from ui.viewport.layers.frusta import frustum_size
@@ -462,7 +462,7 @@ def test_dismissing_a_notice_takes_its_index(pilot: Pilot) -> None:
 
 
 def test_nothing_is_drawn_while_nothing_changes(pilot: Pilot) -> None:
-    pilot.studio.settle(4, until_idle_s=5.0)
+    pilot.rest()
     drawn = [pilot.studio.frame.update(1 / 60) for _ in range(5)]
     assert drawn == [False] * 5
     pilot.studio.window.dispatch_event("on_mouse_motion", 200, 200, 1, 1)
@@ -534,10 +534,7 @@ def test_why_a_capture_cannot_be_opened_is_said_and_the_window_goes_on(
     )
     pilot = open_pilot(session)  # closes the session with the window
     pilot.studio.window.dispatch_event("on_file_drop", 10, 10, [str(folder)])
-    until_s = time.monotonic() + 30.0
-    while session.opening.refused is None:
-        assert time.monotonic() < until_s, "nothing was said"
-        pilot.draw()
+    draw_until(pilot, lambda: session.opening.refused is not None, "why it does not open")
     pilot.draw(3)
     refused = session.opening.refused
     assert expected in refused.text
@@ -548,7 +545,5 @@ def test_why_a_capture_cannot_be_opened_is_said_and_the_window_goes_on(
     assert session.opening.refused is None
     assert len(session.notices) == 0
     session.dispatch(OpenCapture(tiny_capture))
-    while session.capture is None:
-        assert time.monotonic() < until_s, f"a good capture did not open: {list(session.notices)}"
-        pilot.draw()
+    draw_until(pilot, lambda: session.capture is not None, "a good capture")
     assert len(session.clips) == 1

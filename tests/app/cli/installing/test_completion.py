@@ -48,7 +48,7 @@ def run(shell: str, text: str) -> str:
     program = shutil.which(shell)
     if program is None:
         pytest.skip(f"{shell} is not installed")
-    done = subprocess.run([program], input=text, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([program], input=text, capture_output=True, text=True, timeout=600, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
 

@@ -18,7 +18,7 @@ def test_every_item_comes_once_and_in_the_order_of_its_iterator(n_threads):
 
 
 def test_as_many_at_a_time_as_wanted_each_thread_prepared_once():
-    both_run = threading.Barrier(2, timeout=30)  # passes only when two wait at it at once
+    both_run = threading.Barrier(2, timeout=300)  # passes only when two wait at it at once
     prepared: list[int] = []
 
     def waits() -> Iterator[int]:
