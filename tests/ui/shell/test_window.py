@@ -537,6 +537,7 @@ def test_why_a_capture_cannot_be_opened_is_said_and_the_window_goes_on(
     draw_until(pilot, lambda: session.opening.refused is not None, "why it does not open")
     pilot.draw(3)
     refused = session.opening.refused
+    assert refused is not None
     assert expected in refused.text
     assert str(folder) in refused.text
     assert sorted(folder.iterdir()) == before
