@@ -202,4 +202,4 @@ def described_cameras(
     said = [note] if note else []
     if left_out:
         said.append(f"Cameras of the calibration that have no video are left out: {shortened(left_out)}.")
-    return found, said
+    return found, [*said, *search.left_over()]
