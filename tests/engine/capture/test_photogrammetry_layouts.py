@@ -73,6 +73,16 @@ def test_other_xml_and_the_metadata_of_photographs_are_no_calibrations(tmp_path:
         open_capture(tmp_path)
 
 
+def test_what_is_cut_off_or_has_no_camera_in_place_is_said(tmp_path: Path) -> None:
+    path = metashape(tmp_path / "m")
+    path.write_text(path.read_text()[:900])
+    with pytest.raises(CaptureError, match=r"cameras.xml, of which the file is not XML .* that cannot be read"):
+        open_capture(path.parent)
+    path.write_text(re.sub(r"<transform>[-+.e\d ]+</transform>", "", metashape(tmp_path / "m").read_text()))
+    with pytest.raises(CaptureError, match=r"No calibrated camera is in it.*placed and switched on"):
+        open_capture(path.parent)
+
+
 def test_a_camera_without_frames_is_left_out_and_named(tmp_path: Path) -> None:
     realitycapture(tmp_path)
     (tmp_path / "cam10.mp4").unlink()
