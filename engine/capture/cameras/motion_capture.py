@@ -111,7 +111,7 @@ def probe_calibration(folder: Path, suffix: str, is_it: Callable[[Path], bool] |
 
 
 def _damaged(folder: Path, suffix: str) -> Probe | None:
-    """What is said of a file that may be the calibration but cannot be read; None where there is none."""
+    """Names the first file of this suffix that cannot be read; None where all can."""
     for path in calibrations(folder, suffix)[:MAX_TRIED]:
         try:
             read_calibration(path)
