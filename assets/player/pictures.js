@@ -44,7 +44,9 @@ class Pictures {
    * atMost: so many levels are enough; view: to have it painted, as of Painter.paint. */
   want(frame, row, atMost = Infinity, view = null) {
     const { quality } = this, few = { auto: atMost, low: Math.min(COARSE, atMost), full: Infinity }[quality];
-    this.wish = { frame, row, view, clipIndex: this.clipOf(frame), nLevels: Math.min(few, this.nLevels) };
+    const clipIndex = this.clipOf(frame);
+    if (this.wish && this.wish.clipIndex !== clipIndex) this.loader.hurry(clipIndex);
+    this.wish = { frame, row, view, clipIndex, nLevels: Math.min(few, this.nLevels) };
     this.go();
   }
 

@@ -195,6 +195,30 @@ def test_a_leap_outranks_what_was_needed_before(browser: Browser, server: RangeS
     assert not state(browser, "pictures.loaded.has(1)")
 
 
+def test_clips_that_fail_are_in_nobodys_way(browser: Browser, server: RangeServer):
+    server.failing.update({"clip1.bin": 99, "clip2.bin": 99})
+    go_to(browser, server.url("scene.html"), until=SETTLED)
+    browser.wait("clipgstreamPlayer.pictures.loaded.has(3)", timeout_s=5.0)  # while both are tried again
+    assert not state(browser, "pictures.loader.failure(1).isFinal")
+    assert not state(browser, "pictures.loader.failure(2).isFinal")
+
+
+@pytest.mark.parametrize("is_final", ["true", "false"])
+def test_a_clip_that_failed_is_asked_for_as_soon_as_it_is_wanted(browser: Browser, server: RangeServer, is_final: str):
+    server.failing["clip3.bin"] = 99
+    go_to(browser, server.url("scene.html"), until=SETTLED)
+    browser.wait("clipgstreamPlayer.pictures.loader.failure(3)")
+    browser.value(
+        "void Object.assign(clipgstreamPlayer.pictures.loader.failure(3),"
+        f" {{isFinal: {is_final}, againMs: performance.now() + 60000}})"
+    )
+    del server.failing["clip3.bin"]
+    browser.value(f"void clipgstreamPlayer.go({N_FRAMES - 1})")
+    browser.wait(SETTLED, timeout_s=5.0)
+    assert label(browser).startswith(f"Frame {N_FRAMES - 1} of")
+    assert browser.value("document.getElementById('notice').hidden")
+
+
 def test_memory_is_bounded_while_one_scrubs(browser: Browser, server: RangeServer):
     page = server.folder / "scene.html"
     page.write_text(
