@@ -141,7 +141,7 @@ class Pictures {
       if (answer.of === "levels" && key !== "shared") {
         this.loader.forget(key); // so that trying again asks for it again
         this.loader.fail(key, `A clip is damaged: ${answer.message}`, true);
-      } else this.stop(answer.message);
+      } else this.stop(`The scene cannot be shown: ${answer.message} Load the page again.`);
     }
     if (answer.kind === "picture") {
       this.isBusy = false;

@@ -268,7 +268,9 @@ class Player {
   }
 
   help() {
-    document.getElementById("keys").showModal();
+    const sheet = document.getElementById("keys");
+    sheet.showModal();
+    sheet.scrollTop = 0; // on a low screen the button at its end, which has the focus, was scrolled to
   }
 
   fillControls() {

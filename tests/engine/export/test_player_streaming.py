@@ -111,8 +111,9 @@ def test_the_quality_says_how_much_is_drawn(browser: Browser, server: RangeServe
     assert browser.console == []
 
 
-def test_a_server_without_ranges_sends_whole_files(browser: Browser, server: RangeServer):
-    server.has_ranges = False
+@pytest.mark.parametrize("piece_bytes", [None, 500])
+def test_a_server_without_ranges_sends_whole_files(browser: Browser, server: RangeServer, piece_bytes: int | None):
+    server.has_ranges, server.piece_bytes = False, piece_bytes
     go_to(browser, server.url("scene.html"))
     fit(browser)
     browser.value("void clipgstreamPlayer.go(4); void clipgstreamPlayer.look(1)")
