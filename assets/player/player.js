@@ -45,7 +45,7 @@ class Player {
     }
     this.pictures.wish = null; // until the next tick says how it is drawn
     this.headset = new Headset(this, document.getElementById("headset"));
-    this.fillControls();
+    fillControls(this);
     const table = keyTable(this);
     fillKeySheet(table);
     followKeys(table);
@@ -273,38 +273,6 @@ class Player {
     sheet.scrollTop = 0; // on a low screen the button at its end, which has the focus, was scrolled to
   }
 
-  fillControls() {
-    const title = document.getElementById("title"), by = (id) => document.getElementById(id);
-    title.textContent = this.header.title;
-    document.title = this.header.title;
-    const option = (value, text) => {
-      const made = document.createElement("option");
-      made.value = value;
-      made.textContent = text;
-      return made;
-    };
-    by("speed").append(...SPEEDS.map((speed) => option(speed, `${speed}\u00d7`)));
-    by("camera").append(option("", "Free"), ...this.header.cameras.map((camera, i) => option(i, camera.name)));
-    by("play").onclick = () => this.play(!this.clock.isPlaying);
-    by("loop").onclick = () => this.loop(!this.clock.isLooping);
-    by("home").onclick = () => this.look(null, true);
-    by("full").onclick = () => this.fillScreen();
-    by("help").onclick = () => this.help();
-    by("speed").onchange = (event) => {
-      this.clock.speed = Number(event.target.value);
-      this.changed();
-    };
-    by("quality").append(...["auto", "low", "full"].map((name) => option(name, name[0].toUpperCase() + name.slice(1))));
-    by("quality").onchange = ({ target }) => {
-      this.pictures.quality = target.value;
-      this.changed();
-    };
-    by("again").onclick = () => this.pictures.loader.again();
-    addEventListener("online", () => this.pictures.loader.again());
-    for (const id of ["speed", "camera", "quality"]) leaveWhenChosen(by(id), () => this.canvas.focus());
-    by("camera").onchange = ({ target }) => this.look(target.value === "" ? null : Number(target.value));
-  }
-
   /** A driver may take the context away, as when a laptop wakes up; everything is sent again then. */
   followContext(canvas) {
     canvas.addEventListener("webglcontextlost", (event) => {
@@ -322,14 +290,6 @@ class Player {
       this.changed();
     });
   }
-}
-
-/** A list that was used with the pointer gives the keys back; one that was reached by keys keeps them. */
-function leaveWhenChosen(list, leave) {
-  let isPointed = false;
-  list.addEventListener("pointerdown", () => (isPointed = true));
-  list.addEventListener("keydown", () => (isPointed = false));
-  list.addEventListener("change", () => isPointed && leave());
 }
 
 /** Words over the picture, which screen readers are told too; canRetry: with a button to try again. */

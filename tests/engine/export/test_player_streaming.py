@@ -354,3 +354,20 @@ def test_the_poster_is_seen_before_anything_runs(browser: Browser, server: Range
         assert grey.min() > 60
     finally:
         browser.call("Emulation.setScriptExecutionDisabled", value=False)
+
+
+@pytest.mark.parametrize("size", [(960, 600), (780, 360)])
+def test_the_buttons_take_one_row_and_their_sheet_begins_at_its_top(
+    browser: Browser, server: RangeServer, size: tuple[int, int]
+):
+    browser.resize(*size)
+    go_to(browser, server.url("scene.html"))
+    browser.value("void (document.getElementById('headset').hidden = innerHeight < 480)")  # phones have none
+    tops = browser.value(
+        "[...document.querySelectorAll('#buttons > :not([hidden])')].map(b => b.getBoundingClientRect().bottom)"
+    )
+    assert np.ptp(tops) < 12
+    assert browser.value("[...document.querySelectorAll('select')].every(one => one.getAttribute('aria-label'))")
+    browser.key("?", modifiers=8)
+    assert browser.value("document.getElementById('keys').scrollTop") == 0
+    browser.value("void document.getElementById('keys').close()")
