@@ -20,7 +20,7 @@ class Headset {
     this.session = null;
     this.isPlaced = false; // in the scene
     const { is_measured } = player.header.stage;
-    this.advice = `${is_measured ? "The scene has its true size." : "How large the scene is, is a guess."} ${WAY_TO_RESIZE}`;
+    this.advice = `${is_measured ? "The scene has its true size at first." : "The size of the scene is a guess."} ${WAY_TO_RESIZE}`;
     button.title = `Stand in the scene. ${this.advice}`;
     button.onclick = () => this.begin();
     if (!navigator.xr) return;

@@ -13,7 +13,7 @@ PERSON_M = 1.7
 CAMERAS_M = 2.5
 """Where that says nothing, cameras are taken to be so far from what they look at."""
 FARTHEST_CAMERAS_M = 10.0
-"""If a person's height puts them farther away, what moves is flat or small, and no person."""
+"""If a person's height puts them farther away, what moves is too flat or too small for a person."""
 FEWEST_MOVING = 50
 """Gaussians; fewer are chance."""
 ENDS_PERCENT = 2.0
@@ -27,7 +27,7 @@ class Stage(TypedDict):
         floor: How far up the ground is: a coordinate along the scene's up direction, scene units.
         meters_per_unit: Length of a scene unit, m.
         is_measured: Whether that was set by the user; otherwise it is a guess from the height of what moves, or from
-            the cameras where it is no person's.
+            the cameras where that is not a person's.
     """
 
     floor: float

@@ -225,7 +225,7 @@ def test_two_squeezed_hands_pull_the_scene_larger_around_where_one_stands(browse
     for hand in ("left", "right"):
         browser.value(f"void device.controllers.{hand}.updateButtonValue('squeeze', 0)")
         frames(browser, 3)
-    assert not state(browser, "clock.isPlaying"), "that was no wish to play"
+    assert not state(browser, "clock.isPlaying"), "pulling does not play"
     place[1] = -(FLOOR + HEAD[1] / (2.0 * METERS_PER_UNIT))
     assert state(browser, "headset.stage.metersPerUnit") == pytest.approx(2.0 * METERS_PER_UNIT)
     for eye, found in zip(eyes(place, facing, scale=2.0), seen(browser), strict=True):
@@ -236,7 +236,7 @@ def test_two_squeezed_hands_pull_the_scene_larger_around_where_one_stands(browse
 
 def test_how_large_the_scene_is_said_to_be_a_guess_where_it_is_one(browser: Browser):
     words = browser.value("document.getElementById('notice').innerText")
-    assert words.startswith("How large the scene is, is a guess. Squeeze both controllers")
+    assert words.startswith("The size of the scene is a guess. Squeeze both controllers")
     assert words in browser.value("document.getElementById('headset').title")
 
 

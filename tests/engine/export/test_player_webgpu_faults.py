@@ -1,4 +1,4 @@
-"""What the player does where WebGPU fails, by faults that are put into a real browser's: the page goes on without it."""
+"""The player where WebGPU fails, by faults that are put into a real browser: the page goes on without it."""
 
 from __future__ import annotations
 
