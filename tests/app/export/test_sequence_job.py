@@ -24,11 +24,13 @@ from app.export.take import TakeFrame, take_frames
 from app.project.opening.project_access import open_project
 from engine.children.kind import Unwanted
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.export.sequences.sequence import SequenceTiming
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
 from engine.timing.timing import SourceMoment
 from tests.app.stored_project import copy_stored
+from tests.engine.export.made_sequence import FPS, N_FRAMES, MadeSequence
 from tests.engine.synchronisation.made_recordings import write_sound_video
 from tests.faults.full_disk import can_mount, full_disk
 
@@ -174,6 +176,16 @@ def test_a_full_disk_is_said(opened: TrainedProject, tmp_path: Path, name: str):
         assert [path.name for path in disk.iterdir()] == ["other"]
 
 
+@pytest.mark.skipif(not can_mount(), reason="needs to mount a file system")
+def test_a_file_needs_no_more_room_while_it_is_written(tmp_path: Path):
+    write, timing, path = SEQUENCES["4dgs"].write, SequenceTiming(N_FRAMES, FPS), tmp_path / "made.4dgs"
+    write(MadeSequence().stretches(), timing, path)
+    (tmp_path / "disk").mkdir()
+    with full_disk(tmp_path / "disk", path.stat().st_size * 5 // 4000) as disk:
+        write(MadeSequence().stretches(), timing, disk / path.name)
+        assert (disk / path.name).read_bytes() == path.read_bytes()
+
+
 def test_sound_is_that_of_the_frames(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     rate, fps = take_sound.RATE, opened.capture.fps
     sound = np.zeros(rate)
@@ -187,9 +199,11 @@ def test_sound_is_that_of_the_frames(opened: TrainedProject, tmp_path: Path, mon
     run(opened, job, quiet)
     with closing(SEQUENCES["4dgs"].open(job.out)) as reader:
         assert reader.timing.sound is not None
-        with wave.open(io.BytesIO(reader.timing.sound)) as file:
+        with wave.open(io.BytesIO(b"".join(reader.timing.sound.pieces()))) as file:
             assert file.getnframes() == round(4 / fps * rate)
             samples = np.frombuffer(file.readframes(file.getnframes()), "<i2")[::2]
     assert abs(int(np.abs(samples).argmax()) - rate / fps) < 0.002 * rate
+    with pytest.raises(ProjectError, match=r"lasts 7.0 hours; a WAV file holds 6.2"):
+        take_sound.take_sound(opened.capture, camera, 0, None, 7 * 3600.0)
     gaps = SequenceJob(tmp_path / "g.4dgs", frames=PickedFrames((range(0, 2), range(4, 6)), 1), sound=camera)
     assert any("sound is left out" in line for line in estimate(opened, gaps).lines)
