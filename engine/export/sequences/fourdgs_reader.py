@@ -34,8 +34,8 @@ MAX_ROWS = 1 << 22
 """Gaussians of a moment: more are not read, since each takes about 300 bytes meanwhile."""
 MAX_READ_BYTES = 1 << 30
 CACHE_BYTES = 192 << 20
-MAX_VALIDATED_BYTES = 512 << 20
-"""The library's validator holds the whole file in memory; a longer file is not given to it."""
+MAX_VALIDATED_BYTES = 128 << 20
+"""The library's validator holds the whole file in memory, and its sound twice; a longer file is not given to it."""
 _PIECE_BYTES = 1 << 20
 _STREAM_HEADER = struct.Struct("<BBBBBIQ")
 

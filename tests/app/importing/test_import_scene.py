@@ -141,6 +141,20 @@ def test_clips_are_cut_where_memory_ends(scene: Path, tmp_path: Path, monkeypatc
     assert len(shown(done.folder, 5)) == 60
 
 
+def test_all_clips_have_the_near_plane_that_fits_the_views(
+    scene: Path, frames: list[Splats], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    for number in range(3):  # at first the scene is large and stands still
+        with (scene / f"{number}.ply").open("wb") as file:
+            FORMATS["ply"].write(replace(frames[0], means=5 * frames[0].means), file)
+    monkeypatch.setattr(importing, "CLIP_BYTES", 3 * 60 * importing.GAUSSIAN_BYTES)
+    opened = open_trained(open_project(import_scene(scene, tmp_path / "p").folder, is_writable=False))
+    assert opened.trained == [0, 1]
+    distance = np.linalg.norm(opened.rig.centers - opened.rig.focus_point(), axis=1).mean()
+    for clip_index in opened.trained:
+        assert opened.header(clip_index).near_plane == pytest.approx(importing.NEAR_SHARE * distance, rel=1e-4)
+
+
 def test_what_needs_pictures_says_that_there_are_none(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     folder = import_scene(scene, tmp_path / "p").folder
     capture, sentence = folder / "scene" / "dance", "This scene was imported and has no pictures."
