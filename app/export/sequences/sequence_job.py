@@ -44,12 +44,12 @@ def estimate(opened: TrainedProject, job: SequenceJob) -> ExportEstimate:
     frames = take_frames(scene, job.frames, has_timing=job.has_timing)
     fps = _fps(opened, job)
     n_bytes = RATE * SAMPLE_BYTES * len(frames) / fps if _has_sound(job, frames) else 0.0
-    most_still = 0
-    for clip_index, n_frames in Counter(scene.clip_at(one.frame).clip_index for one in frames).items():
+    most_still, n_each = 0, Counter(scene.clip_at(one.frame).clip_index for one in frames)
+    for clip_index, n_frames in n_each.items():
         n_still, n_moving = expected_rows(opened.header(clip_index))
         most_still = max(most_still, n_still)
         n_bytes += kind.moving_bytes * n_moving * n_frames
-    n_bytes += kind.still_bytes * most_still
+    n_bytes += kind.still_bytes * most_still * (1.0 + kind.still_again * (len(n_each) - 1))
     check_target(job.out, n_bytes=round(n_bytes))
     lines = (
         f"About {n_bytes / 1e6:.1f} MB for {len(frames)} frames at {fps:g} frames per second.",
@@ -121,7 +121,7 @@ def _measured(figures: dict[int, float], kind: SequenceFormat) -> str:
             f"Warning: of {len(figures)} frames that were read back, {said}. At least {kind.min_psnr_db:.0f} dB were "
             f"expected of {kind.suffix}; check the file before use."
         )
-    return f"{len(figures)} frames were read back and compared; {said}."
+    return f"{len(figures)} frame{'s were' if len(figures) > 1 else ' was'} read back and compared; {said}."
 
 
 def _scene(opened: TrainedProject, job: SequenceJob) -> SceneFrames:
