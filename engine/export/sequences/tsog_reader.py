@@ -58,7 +58,7 @@ def open_tsog(path: Path) -> TsogReader:
     except ProjectError as error:
         raise ProjectError(error.message, hint=error.hint, path=path) from error
     except (zipfile.BadZipFile, EOFError, zlib.error, ValueError, KeyError, NotImplementedError, struct.error) as error:
-        reason = str(error).strip("'\"") if str(error) else type(error).__name__
+        reason = str(error.args[0] if isinstance(error, KeyError) else error) or type(error).__name__
         raise ProjectError(damaged(f"it is not a .tsog file, or is damaged ({reason})").message, path=path) from error
     except OSError as error:
         raise ProjectError(f"The file of Gaussians cannot be read: {error.strerror or error}.", path=path) from error
