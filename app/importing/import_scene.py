@@ -13,6 +13,7 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.storing.document_store import DocumentStore
 from app.project.clips.clip_names import clip_name
+from app.project.opening.project_access import is_project
 from engine.capture.capture import open_capture
 from engine.capture.clip import cut_clips
 from engine.capture.formats.imported import write_imported
@@ -81,6 +82,8 @@ def import_scene(
     """
     if folder.is_symlink() or folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise ProjectError("This name is already taken.", hint="Give a new or empty folder.", path=folder)
+    if any(is_project(parent) for parent in folder.absolute().parents):
+        raise ProjectError("This place is inside a project.", hint="Choose another place.", path=folder)
     source = open_scene(path)
     try:
         rate = fps if fps is not None else source.fps or DEFAULT_FPS
