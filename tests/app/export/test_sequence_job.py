@@ -228,7 +228,9 @@ def test_help_and_window_say_which_way_is_up_in_each_format():
 def test_refined_cameras_are_corrected_once(opened: TrainedProject, monkeypatch: pytest.MonkeyPatch):
     state = opened.reference
     assert state is not None
-    values = np.tile(np.float32([0.01, -0.02, 0.03, 0.1, 0.2, -0.1, 0.05]), (len(state.header.camera_names), 1))
+    values = np.tile(
+        np.array([0.01, -0.02, 0.03, 0.1, 0.2, -0.1, 0.05], np.float32), (len(state.header.camera_names), 1)
+    )
     write_clip_state(opened.project.clip_path(0), replace(state, arrays={**state.arrays, CORRECTIONS: values}))
     refined = open_trained(opened.project)
     seen: list[View] = []

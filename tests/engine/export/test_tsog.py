@@ -194,6 +194,7 @@ def test_a_single_frame_is_static(path: Path, n: int):
     assert "timeline" not in taken_apart(path)[0]
     reader = FORMAT.open(path)
     assert reader.timing == SequenceTiming(1, 30.0, sound)
+    assert reader.timing.sound is not None
     assert b"".join(reader.timing.sound.pieces()) == data
     assert len(reader.splats(0)) == n
 
