@@ -20,7 +20,7 @@ def _vector_text(vector: Vector) -> str:
 
 
 def _usual_up() -> str:
-    """Which axis is up in each format where nobody says."""
+    """Which axis points up in each format where the user chooses none."""
     turned: dict[str, list[str]] = {}
     for name, row in SEQUENCES.items():
         if row.up is not None:
