@@ -15,6 +15,7 @@ import pytest
 
 from app.document.changes.world_changes import set_scale
 from app.evaluation.headless import TrainedProject, open_trained
+from app.export.expected_rows import expected_rows
 from app.export.export_choices import ExportChoices
 from app.export.export_progress import ExportProgress
 from app.export.gaussians import read_back
@@ -270,3 +271,16 @@ def test_sound_is_that_of_the_frames(opened: TrainedProject, tmp_path: Path, mon
         take_sound.take_sound(opened.capture, camera, 0, None, 7 * 3600.0)
     gaps = SequenceJob(tmp_path / "g.4dgs", frames=PickedFrames((range(0, 2), range(4, 6)), 1), sound=camera)
     assert any("sound is left out" in line for line in estimate(opened, gaps).lines)
+
+
+def test_still_parts_that_change_their_light_from_clip_to_clip_are_expected(stored: TrainedProject, tmp_path: Path):
+    def expected(name: str, n_frames: int) -> int:
+        job = SequenceJob(tmp_path / f"a{SEQUENCES[name].suffix}", name, PickedFrames.of(range(n_frames)))
+        return estimate(stored, job).n_bytes
+
+    n_still, n_moving = expected_rows(stored.header(0))  # of three frames; the other clip has as many
+    for name, kind in SEQUENCES.items():
+        more = expected(name, 6) - expected(name, 3)
+        assert more == pytest.approx(
+            kind.moving_bytes * n_moving * 3 + kind.still_again * kind.still_bytes * n_still, rel=0.2
+        )
