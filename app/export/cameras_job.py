@@ -19,7 +19,10 @@ from engine.capture.writers.conversion import convert
 ROW_BYTES = {"colmap": 240, "transforms": 720, "usd": 900}
 SAMPLE_BYTES = 400
 """Of a camera path, at a frame, as USD."""
-WORLD = "Cameras are in the coordinates and units of the Gaussians; frames are not copied."
+WORLD = (
+    "Cameras are in the coordinates and units of the capture, as are Gaussians that were neither turned nor scaled; "
+    "frames are not copied."
+)
 
 
 def estimate(opened: TrainedProject, job: CamerasJob) -> ExportEstimate:

@@ -48,7 +48,7 @@ _WHICH: tuple[tuple[Choice, Precision], ...] = (
 
 
 def estimate(opened: TrainedProject, job: MetricsJob) -> ExportEstimate:
-    """See `JobModule`. Raises ProjectError where nothing is trained among the frames."""
+    """See `JobModule`. Raises ProjectError where nothing is trained among the frames, CaptureError without pictures."""
     chosen = _Chosen(opened, job)
     n_rows = sum(len(frames) for frames in chosen.frames.values()) * len(opened.capture.rig)
     return ExportEstimate(1, n_rows * ROW_BYTES[job.format], chosen.lines())
@@ -76,6 +76,7 @@ class _Chosen:
     """The clips of a job and the figures kept of them, one clip at a time."""
 
     def __init__(self, opened: TrainedProject, job: MetricsJob) -> None:
+        opened.capture.check_pictures()
         self.opened, trained = opened, opened.trained
         wanted = range(opened.capture.n_frames) if job.frames is None else job.frames
         touched = {

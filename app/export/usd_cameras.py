@@ -14,7 +14,7 @@ import numpy as np
 
 from engine.camera.camera_path import CameraPath
 from engine.capture.layout.format_result import CameraEntry
-from engine.export.usd_library import usd_module, writing_usd
+from engine.export.usd_library import state_unit, usd_module, writing_usd
 
 FILE = "cameras.usda"
 FILM = 36.0
@@ -55,8 +55,7 @@ def write_usd_cameras(
         stage = Usd.Stage.CreateNew(str(folder / FILE))
     axis, lines = _up_axis(up)
     UsdGeom.SetStageUpAxis(stage, axis)
-    if meters_per_unit is not None:
-        UsdGeom.SetStageMetersPerUnit(stage, meters_per_unit)
+    state_unit(stage, meters_per_unit)
     stage.SetFramesPerSecond(fps)
     stage.SetTimeCodesPerSecond(fps)
     stage.SetStartTimeCode(0)

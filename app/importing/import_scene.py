@@ -13,15 +13,16 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.storing.document_store import DocumentStore
 from app.project.clips.clip_names import clip_name
+from app.project.opening.project_access import is_project
 from engine.capture.capture import open_capture
 from engine.capture.clip import cut_clips
 from engine.capture.formats.imported import write_imported
-from engine.clip_files.clip_state import write_clip_state
+from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from engine.errors import ProjectError
 from engine.export.splats import PLY_UP, Splats
 from engine.export.world import AXES
 from engine.importing.scene_source import SceneSource, open_scene
-from engine.importing.stored_clip import stored_clip
+from engine.importing.stored_clip import stored_clip, with_near_plane
 from engine.importing.stored_rows import stored_gaussians
 from engine.importing.views import VIEW_NAMES, Contents
 from engine.storage.files import atomic_folder, disk_error
@@ -33,7 +34,7 @@ CLIP_BYTES = 192 << 20
 """Of the frames of a clip: as many are in memory while it is made."""
 GAUSSIAN_BYTES = 56
 NEAR_SHARE = 0.05
-"""Near plane as a share of the distance from which the whole scene is seen."""
+"""Near plane of all clips, as a share of the distance from which the views see the scene."""
 DEFAULT_FPS = 30.0
 FPS_LIMITS = 0.01, 1000.0
 
@@ -81,6 +82,8 @@ def import_scene(
     """
     if folder.is_symlink() or folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise ProjectError("This name is already taken.", hint="Give a new or empty folder.", path=folder)
+    if any(is_project(parent) for parent in folder.absolute().parents):
+        raise ProjectError("This place is inside a project.", hint="Choose another place.", path=folder)
     source = open_scene(path)
     try:
         rate = fps if fps is not None else source.fps or DEFAULT_FPS
@@ -118,8 +121,7 @@ def _fill(
         clip = cut_clips(bounds, clip_length)[-1]
         found = stored_gaussians(waiting)
         contents.add(found)
-        state = stored_clip(clip, found, near_plane=NEAR_SHARE * contents.distance, views=VIEW_NAMES)
-        write_clip_state(clips / f"{clip.clip_index}", state)
+        write_clip_state(clips / f"{clip.clip_index}", stored_clip(clip, found, views=VIEW_NAMES))
         waiting.clear()
 
     for frame in range(source.n_frames):
@@ -130,8 +132,11 @@ def _fill(
             end_clip()
         waiting.append(splats)
     end_clip()
-    for index in range(len(bounds) - 1):  # names depend on all bounds
-        (clips / f"{index}").rename(clips / f"{clip_name(index, tuple(bounds), clip_length)}.safetensors")
+    for index in range(len(bounds) - 1):  # names depend on all bounds, and the near plane on all contents
+        draft = clips / f"{index}"
+        state = with_near_plane(read_clip_state(draft), NEAR_SHARE * contents.distance)
+        write_clip_state(clips / f"{clip_name(index, tuple(bounds), clip_length)}.safetensors", state)
+        draft.unlink()
     report(source.n_frames, source.n_frames)
     rig = contents.views(np.array(AXES[up] if up is not None else source.up or PLY_UP))
     write_imported(scene, rig, n_frames=source.n_frames, fps=fps, source=name, notes=source.notes, place=source.place)

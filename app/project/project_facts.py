@@ -36,6 +36,7 @@ class ClipFacts:
         coverage: Of a clip that inherits: moving things and how much of them has an anchor near it, see
             engine.clip_files.clip_header.Coverage; None when not recorded.
         memory_mb: Most that the process held which prepared and trained it, 10^6 bytes; None when not recorded.
+        is_imported: Whether another program made it.
     """
 
     clip_index: int
@@ -50,6 +51,7 @@ class ClipFacts:
     training_s: float | None
     coverage: Coverage | None = None
     memory_mb: float | None = None
+    is_imported: bool = False
 
     @property
     def wall_s(self) -> float | None:
@@ -132,6 +134,7 @@ def _read_clip(path: Path, clip_index: int) -> ClipFacts | DamagedClip | None:
             training_s=header.figures.training_s,
             coverage=header.coverage,
             memory_mb=header.figures.memory_mb,
+            is_imported=header.holds == "gaussians",
         )
     except ProjectError as error:  # removed or replaced since
         return DamagedClip(path, error.message)

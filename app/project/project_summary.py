@@ -11,6 +11,7 @@ from msgspec.structs import asdict
 from app.project.clips.clip_bytes import COMPONENT_NAMES
 from app.project.opening.opening import open_capture_of
 from app.project.project_facts import ClipFacts, read_facts
+from engine.capture.formats.imported import finished_word
 from engine.errors import CaptureError, ProjectError
 from engine.text import rate_text
 
@@ -22,7 +23,8 @@ def describe_project(folder: Path) -> dict[str, Any]:
     """Bytes of a project's trained clips as plain data.
 
     Returns:
-        schema; kind "project"; path; capture; fps (None when the capture is not there); clips, each with clip_index,
+        schema; kind "project"; path; capture; is_imported, whether another program made its clips; fps (None when the
+        capture is not there); clips, each with clip_index,
         role, start, n_frames, components (name to bytes), n_bytes and coverage (moving things and the share with an
         anchor near, see engine.clip_files.clip_header.Coverage; None where not known); damaged, files of
         clips that cannot be read, each with path and reason; components and n_bytes of all clips;
@@ -46,6 +48,7 @@ def describe_project(folder: Path) -> dict[str, Any]:
         "kind": "project",
         "path": str(folder),
         "capture": facts.settings.capture,
+        "is_imported": facts.clips[0].is_imported,
         "fps": fps,
         "clips": [
             {
@@ -73,10 +76,11 @@ def project_lines(found: dict[str, Any]) -> list[str]:
     """The same as text: a line of sums, then one column per clip and one row per component, in kilobytes."""
     clips = found["clips"]
     n_frames = sum(clip["n_frames"] for clip in clips)
-    lines = [
-        f"{found['path']}: {len(clips)} trained clips, {n_frames} frames, {found['n_bytes'] / _MB:.2f} MB, of which "
-        f"{100 * found['reference_share']:.0f} % are the reference clip"
-    ]
+    word = finished_word(has_pictures=not found["is_imported"])
+    line = f"{found['path']}: {len(clips)} {word} clips, {n_frames} frames, {found['n_bytes'] / _MB:.2f} MB"
+    if found["reference_bytes"]:
+        line += f", of which {100 * found['reference_share']:.0f} % are the reference clip"
+    lines = [line]
     heads = ["kB", *(f"{clip['role']} {clip['clip_index']}" for clip in clips), "all"]
     columns = [*(clip["components"] for clip in clips), found["components"]]
     rows = [
@@ -94,7 +98,8 @@ def project_lines(found: dict[str, Any]) -> list[str]:
     if covered:
         lines.append(f"Moving points within reach of an anchor: {'; '.join(covered)}.")
     if found["bytes_per_frame"] is not None:
-        line = f"Clips after the reference take {found['bytes_per_frame'] / 1e3:.1f} kB per frame"
+        which = "Clips after the reference" if found["reference_bytes"] else "Clips"
+        line = f"{which} take {found['bytes_per_frame'] / 1e3:.1f} kB per frame"
         if found["mb_per_minute"] is None:
             lines.append(f"{line}; the capture is missing, so its frame rate is unknown.")
         else:

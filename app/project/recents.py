@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from app.document.storing.document_file import PROJECT_FILE
+from engine.capture.formats.imported import finished_word
 
 MAX_RECENT = 12
 
@@ -23,6 +24,7 @@ class RecentProject:
         n_trained, n_clips: Clips that are finished, and all of them; both 0 where unknown.
         opened: When it was last open, as ISO 8601 in UTC; empty where unknown.
         preset: The one that its settings begin with; empty where unknown.
+        word: For clips that are finished.
     """
 
     project: str
@@ -32,6 +34,7 @@ class RecentProject:
     n_clips: int = 0
     opened: str = ""
     preset: str = ""
+    word: str = "trained"
 
     @property
     def folder(self) -> Path:
@@ -43,7 +46,7 @@ class RecentProject:
         """Progress of its training, in words."""
         if not self.project:
             return "capture"
-        return f"{self.n_trained} of {self.n_clips} clips trained" if self.n_clips else "project"
+        return f"{self.n_trained} of {self.n_clips} clips {self.word}" if self.n_clips else "project"
 
 
 def read_recents(document: dict[str, Any]) -> list[RecentProject]:
@@ -105,4 +108,5 @@ def _entry(values: Any) -> RecentProject | None:
         n_clips if isinstance(n_clips, int) else 0,
         opened if isinstance(opened, str) else "",
         preset if isinstance(preset, str) else "",
+        finished_word(has_pictures=values.get("word") != finished_word(has_pictures=False)),
     )

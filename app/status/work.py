@@ -17,6 +17,7 @@ class ProjectStatus:
         folder: Where it lies.
         n_trained, n_clips: Clips that are finished and up to date, and all of them.
         is_writable: Whether it can be trained into.
+        word: For clips that are finished.
     """
 
     name: str
@@ -24,11 +25,12 @@ class ProjectStatus:
     n_trained: int = 0
     n_clips: int = 0
     is_writable: bool = True
+    word: str = "trained"
 
     @property
     def trained_text(self) -> str:
         """How far it is trained, in words."""
-        return f"{self.n_trained} of {self.n_clips} clips trained"
+        return f"{self.n_trained} of {self.n_clips} clips {self.word}"
 
 
 @dataclass(frozen=True, slots=True)

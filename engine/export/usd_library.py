@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from types import ModuleType
+from typing import Any
 
 from engine.errors import ProjectError
 
@@ -23,6 +24,12 @@ def usd_module(name: str) -> ModuleType:
             f"USD needs the library usd-core, which is not installed ({error}).",
             hint="Install it with: pip install 'clipgstream[usd]'",
         ) from error
+
+
+def state_unit(stage: Any, meters_per_unit: float | None) -> None:
+    """Write into a stage how long its unit is, m. Where that is not known, a unit counts as a metre, as in our add-on
+    for Blender: without a statement USD takes it for a centimetre. Raises ProjectError: The library is missing."""
+    usd_module("UsdGeom").SetStageMetersPerUnit(stage, meters_per_unit or 1.0)
 
 
 @contextmanager

@@ -110,7 +110,7 @@ def open_scene(path: Path) -> SceneSource:
         if not path.exists():
             raise ProjectError("There is no such file or folder.", hint="Check the path.", path=path)
         for row in SEQUENCES.values():
-            if path.suffix.lower() == row.suffix:
+            if path.suffix.lower() == row.suffix and row.suffix in SEQUENCE_SUFFIXES:
                 return SequenceScene(row.open(path))
         if path.suffix.lower() in FRAME_SUFFIXES:
             return FrameFiles([path])
@@ -265,7 +265,9 @@ def _open_folder(folder: Path) -> FrameFiles:
             hint="Export the whole scene to import it.",
             path=folder,
         )
-    return FrameFiles(files, fps=sidecar.fps, up=sidecar.up, place=sidecar.place, notes=_gaps(names))
+    step = _step(names)  # every so many frames were exported
+    notes = [] if step > 1 else _gaps(names)
+    return FrameFiles(files, fps=sidecar.fps / step, up=sidecar.up, place=sidecar.place, notes=notes)
 
 
 def _sidecar(folder: Path) -> _Sidecar | None:
@@ -284,10 +286,22 @@ def _sidecar(folder: Path) -> _Sidecar | None:
         ) from error
 
 
+def _numbers(names: Sequence[str]) -> list[int]:
+    """The numbers among the names of files, in order."""
+    found = [_LAST_NUMBER.search(Path(name).stem) for name in names]
+    return sorted({int(match[1][:18]) for match in found if match})
+
+
+def _step(names: Sequence[str]) -> int:
+    """From each number among the files to the next one; 1 where that differs."""
+    numbers = _numbers(names)
+    steps = {b - a for a, b in itertools.pairwise(numbers)}
+    return steps.pop() if len(steps) == 1 and len(numbers) == len(names) else 1
+
+
 def _gaps(names: Sequence[str]) -> list[str]:
     """A sentence about numbers that are missing among the files."""
-    found = [_LAST_NUMBER.search(Path(name).stem) for name in names]
-    numbers = sorted({int(match[1][:18]) for match in found if match})
+    numbers = _numbers(names)
     if len(numbers) < len(names) or numbers[-1] - numbers[0] == len(numbers) - 1:
         return []
     runs = runs_of(numbers)

@@ -16,6 +16,7 @@ from app.psnr_words import psnr_words
 from app.residuals.kept_reading import note_kept
 from app.training.service import Launch
 from engine.capture.capture import Capture
+from engine.capture.formats.imported import finished_word
 from engine.storage.json_files import json_text
 
 SCHEMA = 1
@@ -48,7 +49,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             capture.close()
     finally:
         project.close()
-    print(json_text(found, indent=2) if options.json else "\n".join(clip_lines(found)))
+    word = finished_word(has_pictures=capture.has_pictures)
+    print(json_text(found, indent=2) if options.json else "\n".join(clip_lines(found, word)))
     return EXIT_OK
 
 
@@ -101,14 +103,15 @@ def describe_clips(project: Project, capture: Capture) -> dict[str, Any]:
     }
 
 
-def clip_lines(found: dict[str, Any]) -> list[str]:
-    """The same as text."""
+def clip_lines(found: dict[str, Any], word: str) -> list[str]:
+    """The same as text. word: For clips that are finished."""
     lines = [f"{found['path']}: {len(found['clips'])} clips, usually {found['clip_length']} frames each"]
     for clip in found["clips"]:
         reference = ", reference" if clip["clip_index"] == found["reference_clip"] else ""
         psnr = clip["held_out_psnr"]
         psnr = "" if psnr is None else f", {psnr_words(psnr, is_whole=clip['held_out_whole'])}"
+        state = word if clip["state"] == "trained" else clip["state"]
         reason = f". {clip['reason']}" if clip["reason"] else ""
         frames = f"frames {clip['start']} to {clip['stop'] - 1}"
-        lines.append(f"clip {clip['clip_index']}{reference}: {frames}, {clip['state']}{psnr}{reason}")
+        lines.append(f"clip {clip['clip_index']}{reference}: {frames}, {state}{psnr}{reason}")
     return lines

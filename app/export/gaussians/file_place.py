@@ -35,3 +35,9 @@ def file_world(
     scale = job.scale if job.scale is not None else 1.0 if said is None else said
     scene_up = opened.up if job.scene_up is None else np.array(job.scene_up)
     return world(scene_up, up=job.up or usual_up, scale=scale, is_rub=is_rub)
+
+
+def file_meters_per_unit(opened: TrainedProject, placement: FileWorld) -> float | None:
+    """Length of a unit of files with this placement, m; None where the project does not say how long its unit is."""
+    said = opened.project.document.world.meters_per_unit
+    return None if said is None else said / placement.scale

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.export.export_progress import ExportProgress, Report
+from app.export.gaussians.file_place import file_meters_per_unit
 from app.export.gaussians.gaussian_files import GaussianFile, WrittenPart, base_name, moment_files, static_file
 from app.export.gaussians.read_back import ReadBack
 from app.export.scene_frames import SceneFrames
@@ -150,7 +151,6 @@ class GaussianSequence:
         stand in the files. In units of the files are meters_per_unit, null where the project does not say, and
         near_plane, the nearest depth that is drawn."""
         opened = self._scene.opened
-        meters_per_unit = opened.project.document.world.meters_per_unit
         return {
             "schema": SCHEMA,
             "program": "ClipGStream Studio",
@@ -163,7 +163,7 @@ class GaussianSequence:
             "up": [round(value, 6) for value in self._placement.up],
             "scale": self._placement.scale,
             "quat": quats_of(self._placement.rotation).tolist(),
-            "meters_per_unit": None if meters_per_unit is None else meters_per_unit / self._placement.scale,
+            "meters_per_unit": file_meters_per_unit(opened, self._placement),
             "psnr_db": self.psnr_db,
             "min_psnr_db": self._kind.min_psnr_db,
             "lines": list(self.lines()),

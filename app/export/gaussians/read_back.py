@@ -28,7 +28,7 @@ class ReadBack:
 
     def __init__(self, scene: SceneFrames, world: FileWorld) -> None:
         self._scene, self._world = scene, world
-        rig = scene.opened.rig
+        rig = scene.opened.capture.rig  # each clip corrects it as it was trained
         self._rig = _reduced(rig.subset(np.unique(np.linspace(0, len(rig) - 1, N_CAMERAS).round().astype(int))))
 
     def psnr_db(self, splats: Splats, frame: float, live: Gaussians) -> dict[str, float]:

@@ -47,7 +47,7 @@ EDITS = option(
     "Whether the edits of the project are applied",
     "Edits",
     titles={"true": "Applied", "false": "Left out"},
-    flags=(Flag("--without-edits", "Left out: the scene as it was trained", constant=False),),
+    flags=(Flag("--without-edits", "Left out: the scene without them", constant=False),),
 )
 
 OBJECT = option(

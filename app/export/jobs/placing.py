@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.export.jobs.job import option
+from engine.export.sequences.table import SEQUENCES
 from engine.export.world import AXES
 from engine.setting import Flag, Writing, value_text
 
@@ -18,10 +19,19 @@ def _vector_text(vector: Vector) -> str:
     return " ".join(map(value_text, vector))
 
 
+def _usual_up() -> str:
+    """Which axis points up in each format where the user chooses none."""
+    turned: dict[str, list[str]] = {}
+    for name, row in SEQUENCES.items():
+        if row.up is not None:
+            turned.setdefault(row.up, []).append(name)
+    return "; ".join(["as in the capture", *(f"{up} in {', '.join(names)}" for up, names in turned.items())])
+
+
 UP = option(
     "Turns the scene so that up points along this axis of the files",
     "Up axis",
-    none="as in the capture",
+    none=_usual_up(),
     choices=dict.fromkeys(AXES, ""),
     titles={"": "As in the capture", "+y": "+y", "-y": "-y", "+z": "+z", "-z": "-z"},
     flags=(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from app.export.jobs.job import EDITS, FRAMES, OBJECT, SOUND, TIMING, ExportJob, option
@@ -44,9 +45,12 @@ class SequenceJob(ExportJob, frozen=True):
 
     @classmethod
     def asked(cls, questions: dict[str, Question], answers: Answers) -> dict[str, Question]:
-        """Sound is asked for where the format holds some and there is some."""
-        if not (answers.context.has_videos and SEQUENCES[questions["format"].chosen(answers.choices)].has_sound):
+        """Sound is asked for where the format holds some and there is some; the usual axis is that of the format."""
+        kind, up = SEQUENCES[questions["format"].chosen(answers.choices)], questions["up"]
+        if not (answers.context.has_videos and kind.has_sound):
             del questions["sound"]
+        if kind.up is not None:
+            questions["up"] = replace(up, values=(("", f"As {kind.title} has it: {kind.up}"), *up.values[1:]))
         return questions
 
     def check(self) -> None:

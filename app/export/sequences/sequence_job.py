@@ -12,12 +12,12 @@ from app.evaluation.headless import TrainedProject
 from app.export.edits.written_edits import written_edits
 from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
-from app.export.gaussians.file_place import file_world
+from app.export.gaussians.file_place import file_meters_per_unit, file_world
 from app.export.gaussians.read_back import ReadBack
 from app.export.jobs.sequence import SequenceJob
 from app.export.scene_frames import SceneFrames
 from app.export.sequences.scene_stretches import SceneStretches
-from app.export.sequences.take_sound import take_sound
+from app.export.sequences.take_sound import RATE, SAMPLE_BYTES, take_sound
 from app.export.staging import check_target, staged_file
 from app.export.take import TakeFrame, take_frames, timing_of
 from engine.errors import ProjectError
@@ -26,8 +26,6 @@ from engine.export.sequences.table import SEQUENCES, SequenceFormat
 
 N_CHECKED = 5
 """Frames that are read back, spread over the file, from several cameras each."""
-SOUND_BYTES_EACH = 192_000
-"""Of a second of sound."""
 
 
 def estimate(opened: TrainedProject, job: SequenceJob) -> ExportEstimate:
@@ -45,13 +43,13 @@ def estimate(opened: TrainedProject, job: SequenceJob) -> ExportEstimate:
     scene = _scene(opened, job)
     frames = take_frames(scene, job.frames, has_timing=job.has_timing)
     fps = _fps(opened, job)
-    n_bytes = float(SOUND_BYTES_EACH * len(frames) / fps if _has_sound(job, frames) else 0)
-    most_still = 0
-    for clip_index, n_frames in Counter(scene.clip_at(one.frame).clip_index for one in frames).items():
+    n_bytes = RATE * SAMPLE_BYTES * len(frames) / fps if _has_sound(job, frames) else 0.0
+    most_still, n_each = 0, Counter(scene.clip_at(one.frame).clip_index for one in frames)
+    for clip_index, n_frames in n_each.items():
         n_still, n_moving = expected_rows(opened.header(clip_index))
         most_still = max(most_still, n_still)
         n_bytes += kind.moving_bytes * n_moving * n_frames
-    n_bytes += kind.still_bytes * most_still
+    n_bytes += kind.still_bytes * most_still * (1.0 + kind.still_again * (len(n_each) - 1))
     check_target(job.out, n_bytes=round(n_bytes))
     lines = (
         f"About {n_bytes / 1e6:.1f} MB for {len(frames)} frames at {fps:g} frames per second.",
@@ -63,7 +61,7 @@ def estimate(opened: TrainedProject, job: SequenceJob) -> ExportEstimate:
 
 
 def run(opened: TrainedProject, job: SequenceJob, report: Report) -> ExportResult:
-    """Write the file; memory does not grow with the number of frames, but for sound.
+    """Write the file; memory does not grow with the number of frames, but of .tsog.
 
     Args:
         report: Receives the progress; an exception from it ends the work, and then nothing is left.
@@ -80,11 +78,12 @@ def run(opened: TrainedProject, job: SequenceJob, report: Report) -> ExportResul
     scene.check(moment.frame for one in frames for moment in one.moments)
     fps, sound = _fps(opened, job), None
     if job.sound is not None and _has_sound(job, frames):
-        timing = timing_of(scene, has_timing=job.has_timing)
-        sound = take_sound(opened.capture, job.sound, frames[0].number, timing, len(frames) / fps)
+        taken = timing_of(scene, has_timing=job.has_timing)
+        sound = take_sound(opened.capture, job.sound, frames[0].number, taken, len(frames) / fps)
     stretches = SceneStretches(scene, frames, world, lambda n_done: report(ExportProgress(n_done, len(frames))))
+    timing = SequenceTiming(len(frames), fps, sound, file_meters_per_unit(opened, world))
     with staged_file(job.out) as path:
-        notes = kind.write(stretches, SequenceTiming(len(frames), fps, sound), path)
+        notes = kind.write(stretches, timing, path)
         report(ExportProgress(len(frames), len(frames), message="Reading the file back"))
         check = ReadBack(scene, world)
         figures = _checked(kind, path, scene, frames, check)
@@ -122,7 +121,7 @@ def _measured(figures: dict[int, float], kind: SequenceFormat) -> str:
             f"Warning: of {len(figures)} frames that were read back, {said}. At least {kind.min_psnr_db:.0f} dB were "
             f"expected of {kind.suffix}; check the file before use."
         )
-    return f"{len(figures)} frames were read back and compared; {said}."
+    return f"{len(figures)} frame{'s were' if len(figures) > 1 else ' was'} read back and compared; {said}."
 
 
 def _scene(opened: TrainedProject, job: SequenceJob) -> SceneFrames:

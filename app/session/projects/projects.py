@@ -47,6 +47,7 @@ from app.session.showing.showing import Showing
 from app.session.training.live_training import LiveTraining
 from app.status import ProjectStatus
 from engine.capture.capture import Capture
+from engine.capture.formats.imported import finished_word
 from engine.errors import EngineError
 
 
@@ -291,7 +292,8 @@ class Projects(SessionPart):
         project, service = self.opened.project, self._live.service
         n_trained = 0 if service is None else service.catalog.n_trained
         name = project_name(project.folder.absolute(), project.settings.capture)
-        return ProjectStatus(name, project.folder, n_trained, len(self.opened.clips), project.is_writable)
+        word = finished_word(has_pictures=self.opened.capture.has_pictures)
+        return ProjectStatus(name, project.folder, n_trained, len(self.opened.clips), project.is_writable, word)
 
     def poll(self) -> bool:
         """Take in the state of recent projects, and keep how far the open one is trained."""

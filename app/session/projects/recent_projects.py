@@ -13,6 +13,7 @@ from app.project.projects_folder import project_name
 from app.project.recents import RecentProject, missing_folders
 from app.session.projects.project_pictures import ProjectPictures
 from app.session.projects.settings import Settings
+from engine.capture.formats.imported import finished_word
 from engine.training.presets import closest_preset
 
 logger = logging.getLogger(__name__)
@@ -42,8 +43,10 @@ class RecentProjects:
         folder = opened.project.folder.resolve()
         now = datetime.now(UTC).isoformat(timespec="seconds")
         name = project_name(folder, place)
-        preset = closest_preset(opened.project.settings.overrides)
-        self._settings.add_recent(RecentProject(str(folder), place, name, catalog.n_trained, len(catalog), now, preset))
+        has_pictures, n_trained = opened.capture.has_pictures, catalog.n_trained
+        preset = closest_preset(opened.project.settings.overrides) if has_pictures else ""
+        word = finished_word(has_pictures=has_pictures)
+        self._settings.add_recent(RecentProject(str(folder), place, name, n_trained, len(catalog), now, preset, word))
 
     def forget(self, folder: Path) -> None:
         """Take one out of the list; its files stay."""

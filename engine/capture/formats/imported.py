@@ -109,6 +109,11 @@ class NoFrames:
         """Nothing is open."""
 
 
+def finished_word(*, has_pictures: bool) -> str:
+    """What users call a finished clip of a capture with or without pictures."""
+    return "trained" if has_pictures else "imported"
+
+
 def raise_no_pictures(path: Path) -> NoReturn:
     """Refuse what needs pictures. Raises CaptureError."""
     raise CaptureError(NO_PICTURES, hint="It can be viewed, edited and exported, not trained or measured.", path=path)

@@ -93,7 +93,7 @@ def write_pictures(
     n: int,
     *,
     effort: int = 0,
-    others: Mapping[str, bytes] | None = None,
+    others: Mapping[str, Iterable[bytes]] | None = None,
 ) -> None:
     """A zip file with the document and its pictures, which are packed already and stored as they are; without dates, so
     that equal scenes are equal files.
@@ -101,7 +101,7 @@ def write_pictures(
     Args:
         pixels: By the name of the picture. [n, 1 to 4] each
         effort: 0 to 100: 50 makes pictures a fifth smaller and takes four times as long.
-        others: Further files by their names.
+        others: Further files by their names, in pieces.
     """
     width = max(4, int(np.ceil(np.sqrt(n) / 4)) * 4)
     height = max(4, int(np.ceil(n / width / 4)) * 4)
@@ -109,8 +109,10 @@ def write_pictures(
         archive.writestr(zipfile.ZipInfo("meta.json", _LONG_AGO), json.dumps(meta, separators=(",", ":")))
         for name, values in pixels.items():
             archive.writestr(zipfile.ZipInfo(name, _LONG_AGO), _webp(values, width, height, effort))
-        for name, data in (others or {}).items():
-            archive.writestr(zipfile.ZipInfo(name, _LONG_AGO), data)
+        for name, pieces in (others or {}).items():
+            with archive.open(zipfile.ZipInfo(name, _LONG_AGO), "w") as other:
+                for piece in pieces:
+                    other.write(piece)
 
 
 def _webp(values: np.ndarray, width: int, height: int, effort: int) -> bytes:

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from fourdgs.validate import validate
 from engine.byte_cache import ByteCache
 from engine.errors import ProjectError
 from engine.export.sequences.fourdgs_writer import FPS_KEY
-from engine.export.sequences.sequence import SequenceTiming
+from engine.export.sequences.sequence import SequenceSound, SequenceTiming
 from engine.export.splats import PLY_UP, Splats
 from engine.export.world import AXES
 from engine.images.srgb import encoded_of
@@ -32,10 +33,10 @@ MAX_FRAMES = 10_000_000
 MAX_ROWS = 1 << 22
 """Gaussians of a moment: more are not read, since each takes about 300 bytes meanwhile."""
 MAX_READ_BYTES = 1 << 30
-MAX_SOUND_BYTES = 1 << 29
 CACHE_BYTES = 192 << 20
-MAX_VALIDATED_BYTES = 512 << 20
-"""The library's validator holds the whole file in memory; a longer file is not given to it."""
+MAX_VALIDATED_BYTES = 128 << 20
+"""The library's validator holds the whole file in memory, and its sound twice; a longer file is not given to it."""
+_PIECE_BYTES = 1 << 20
 _STREAM_HEADER = struct.Struct("<BBBBBIQ")
 
 
@@ -176,9 +177,17 @@ class FourdgsReader:
         for one in self._scene.audio_sources[:1]:
             assert self._file is not None
             about = indexed_reader.read_audio_source_descriptors(self._file, self._scene)[0]
-            if about.codec == "wav" and about.start_sec == 0.0 and one.data_length <= MAX_SOUND_BYTES:
-                sound = self._file.read(one.data_offset, one.data_length)
+            if about.codec == "wav" and about.start_sec == 0.0:
+                sound = SequenceSound(one.data_length, partial(self._pieces, one.data_offset, one.data_length))
         return fps, SequenceTiming(max(1, round(header.duration_sec * fps)), fps, sound)
+
+    def _pieces(self, start: int, n_bytes: int) -> Iterator[bytes]:
+        """A part of the file, piece by piece. Raises ProjectError where it cannot be read."""
+        end = start + n_bytes
+        with _typed_errors(self._path):
+            for at in range(start, end, _PIECE_BYTES):
+                assert self._file is not None
+                yield self._file.read(at, min(_PIECE_BYTES, end - at))
 
 
 def problems(path: Path) -> tuple[str, ...]:

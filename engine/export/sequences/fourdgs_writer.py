@@ -8,16 +8,14 @@ format, took 41 to 56 % more bytes on a real capture.
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from fourdgs import records
-from fourdgs.serialization import MAGIC, crc32
+from fourdgs import opcode, records
+from fourdgs.serialization import MAGIC, crc32, put_u8, put_u32, put_u64
 
 from engine.export.sequences.fourdgs_grid import ChunkRows, FourdgsGrid
 from engine.export.sequences.segments import segments
@@ -36,6 +34,7 @@ NEAREST_AXIS = 0.999
 PRODUCER = "ClipGStream Studio"
 FPS_KEY = "clipgstream_fps"
 """Attribute with the frames per second of the take that was written; the format itself knows seconds only."""
+_BLOCK_BYTES = 1 << 20
 
 
 def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Path) -> tuple[str, ...]:
@@ -43,19 +42,18 @@ def write(stretches: Iterable[SequenceStretch], timing: SequenceTiming, path: Pa
 
     Args:
         stretches: They follow one another without a gap.
-        timing: When frames are shown; sound is a WAV file.
-        path: Replaced where it is there. A file of the same size lies next to it for the time being.
+        timing: When frames are shown.
+        path: Replaced where it is there.
     Returns:
         Sentences about what could not be stored as it is.
     Raises:
         OSError: The disk refused.
     """
-    with tempfile.TemporaryFile(dir=path.parent) as body:
-        chunks = _Chunks(body, timing)
+    with path.open("w+b") as file:
+        chunks = _Chunks(file, timing)
         for rows in _rows(stretches, timing, chunks.look):
             chunks.add(rows)
-        with path.open("wb") as file:
-            chunks.write(file)
+        chunks.finish()
     return chunks.notes()
 
 
@@ -108,10 +106,11 @@ def _drawn(splats: Splats) -> np.ndarray:
 
 
 class _Chunks:
-    """The chunks of a file, put down one after another until what comes before them is known."""
+    """Sound and chunks of a file, put down one after another; what comes before them is known at the end only, and
+    then they move on to make room for it."""
 
-    def __init__(self, body: BinaryIO, timing: SequenceTiming) -> None:
-        self._body, self._timing = body, timing
+    def __init__(self, file: BinaryIO, timing: SequenceTiming) -> None:
+        self._file, self._timing = file, timing
         self._grid: FourdgsGrid | None = None
         self._first_still: list[Splats] = []
         self._windows: dict[tuple[int, int], int] = {}
@@ -119,6 +118,11 @@ class _Chunks:
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
         self._up = (0.0, -1.0, 0.0)
         self._n_far = self._n_bright = 0
+        if timing.sound is not None:
+            n = timing.sound.n_bytes
+            file.write(put_u8(opcode.AUDIO_DATA) + put_u64(12 + n) + put_u32(0) + put_u64(n))  # as records.AudioData
+            for piece in timing.sound.pieces():
+                file.write(piece)
 
     def look(self, still: Splats) -> None:
         """See a still part before it is added: grids have to fit it too."""
@@ -142,26 +146,24 @@ class _Chunks:
         record, means = self._grid.chunk(rows, np.array(numbers, np.int64)[which.reshape(-1)])
         self._low, self._high = np.minimum(self._low, means.min(0)), np.maximum(self._high, means.max(0))
         begin, end = self._grid.seconds(int(rows.first.min())), self._grid.seconds(int(rows.end.max()))
-        entry = records.ChunkIndexEntry(begin, end, self._body.tell(), len(record), len(rows.first))
+        entry = records.ChunkIndexEntry(begin, end, self._file.tell(), len(record), len(rows.first))
         self._entries.append(entry)
-        self._body.write(record)
+        self._file.write(record)
 
-    def write(self, file: BinaryIO) -> None:
-        """Write the whole file."""
-        file.write(MAGIC)
-        for record in self._front():
-            file.write(record)
-        begin = file.tell()
-        self._body.seek(0)
-        shutil.copyfileobj(self._body, file, 1 << 20)
-        start = file.tell()
+    def finish(self) -> None:
+        """Write the rest of the file."""
+        file, front = self._file, MAGIC + b"".join(self._front())
+        _move_on(file, len(front))
+        file.seek(0)
+        file.write(front)
+        start, begin = file.seek(0, 2), len(front)
         summary = b"".join(replace(one, chunk_offset=one.chunk_offset + begin).encode() for one in self._entries)
         file.write(summary)
         file.write(records.Footer(start if summary else 0, 0, crc32(summary) if summary else 0).encode())
         file.write(MAGIC)
 
     def _front(self) -> Iterator[bytes]:
-        """Everything before the chunks."""
+        """Everything before sound and chunks."""
         timing, grid = self._timing, self._grid or FourdgsGrid([_NOTHING], self._timing.fps)
         duration_s = grid.seconds(timing.n_frames)
         box = [*self._low.tolist(), *self._high.tolist()] if self._entries else [0.0] * 6
@@ -181,7 +183,7 @@ class _Chunks:
                 name="sound",
                 codec="wav",
                 channel_layout="unspecified",
-                data_length=len(timing.sound),
+                data_length=timing.sound.n_bytes,
                 start_sec=0.0,
                 duration_sec=duration_s,
                 gain=1.0,
@@ -189,7 +191,6 @@ class _Chunks:
                 position=[0.0, 0.0, 0.0],
                 rotation=[0.0, 0.0, 0.0, 1.0],
             ).encode()
-            yield records.AudioData(0, timing.sound).encode()
 
     def _attributes(self) -> dict[str, str]:
         found = {
@@ -213,6 +214,16 @@ class _Chunks:
         if self._n_bright:
             found.append(f"{self._n_bright:,} rows were brighter than white and are white in the file.")
         return tuple(found)
+
+
+def _move_on(file: BinaryIO, n_bytes: int) -> None:
+    """Move the contents of a file towards its end, the last block first, so that no second file is needed."""
+    for end in range(file.seek(0, 2), 0, -_BLOCK_BYTES):
+        begin = max(end - _BLOCK_BYTES, 0)
+        file.seek(begin)
+        block = file.read(end - begin)
+        file.seek(begin + n_bytes)
+        file.write(block)
 
 
 _NOTHING = Splats.from_arrays(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -42,18 +42,33 @@ class SequenceStretch:
 
 
 @dataclass(frozen=True, slots=True)
+class SequenceSound:
+    """The sound of a file over time: a WAV file that starts with the first frame.
+
+    Attributes:
+        n_bytes: Of all of it.
+        pieces: Makes it anew, piece by piece, so that memory never holds more than one.
+    """
+
+    n_bytes: int
+    pieces: Callable[[], Iterable[bytes]] = field(compare=False)
+
+
+@dataclass(frozen=True, slots=True)
 class SequenceTiming:
-    """When the frames of a file are shown.
+    """When the frames of a file are shown, and how large its scene is.
 
     Attributes:
         n_frames: Of the file, at least one.
         fps: Frames per second.
-        sound: An audio file that starts with the first frame, as WAV; None without sound.
+        sound: None without sound.
+        meters_per_unit: Length of a unit of the file, m; None where that is not known, or not read.
     """
 
     n_frames: int
     fps: float
-    sound: bytes | None = None
+    sound: SequenceSound | None = None
+    meters_per_unit: float | None = None
 
 
 class SequenceReader(Protocol):

@@ -46,6 +46,8 @@ class SequenceFormat(NamedTuple):
         open: Opens a file to read frames from it. Raises ProjectError where it is damaged, of an unknown version, or
             asks for more memory than a limit.
         has_sound: Whether it can hold sound.
+        still_again: Of the Gaussians that stand still, the share that each further clip states anew, since their light
+            has changed; for a forecast.
         up: One of engine.export.world.AXES: up in the file where the user does not say; None as in the capture.
         check: Raises ProjectError where something is missing that it is written and read with.
         problems: What the format's own validator says is wrong with a file.
@@ -61,6 +63,7 @@ class SequenceFormat(NamedTuple):
     write: Callable[[Iterable[SequenceStretch], SequenceTiming, Path], tuple[str, ...]]
     open: Callable[[Path], SequenceReader]
     has_sound: bool = False
+    still_again: float = 0.2
     up: str | None = None
     check: Callable[[], None] = _can_always
     problems: Callable[[Path], tuple[str, ...]] = _is_valid
@@ -116,6 +119,7 @@ SEQUENCES: dict[str, SequenceFormat] = {
         _later("tsog:write"),
         _later("tsog_reader:open_tsog"),
         has_sound=True,
+        still_again=0.0,
         up="+y",
     ),
     "usd": _USD,
@@ -123,8 +127,8 @@ SEQUENCES: dict[str, SequenceFormat] = {
         title="USD as text",
         use="the same to look into, several times as large",
         suffix=".usda",
-        still_bytes=160.0,
-        moving_bytes=100.0,
+        still_bytes=175.0,
+        moving_bytes=110.0,
     ),
 }
 """By the name that the command line has for it, in the order in which they are offered."""

@@ -134,9 +134,9 @@ def _write(parts: list[TimedRows], timing: SequenceTiming, is_continuous: bool, 
     else:
         _add_frames(meta, pixels, frames, timing.n_frames)
     others = {}
-    if timing.sound is not None and len(timing.sound) <= MOST_SOUND_BYTES:
+    if timing.sound is not None and timing.sound.n_bytes <= MOST_SOUND_BYTES:
         meta["audio"] = {"file": _SOUND, "mimeType": "audio/wav"}
-        others[_SOUND] = timing.sound
+        others[_SOUND] = timing.sound.pieces()
     write_pictures(file, meta, pixels, len(splats), effort=_EFFORT, others=others)
     return len(splats)
 
@@ -208,5 +208,5 @@ def _notes(timing: SequenceTiming, is_continuous: bool, n_written: int, n_repeat
             f"The file has {n_written:,} Gaussians. OpsiClear's player shows {_PLAYER_ROWS:,} of a file unless its "
             "limit is raised (maxPoints)."
         )
-    if timing.sound is not None and len(timing.sound) > MOST_SOUND_BYTES:
-        yield f"The sound of {len(timing.sound) >> 20} MB is left out: a .tsog holds {MOST_SOUND_BYTES >> 20} MB."
+    if timing.sound is not None and timing.sound.n_bytes > MOST_SOUND_BYTES:
+        yield f"The sound of {timing.sound.n_bytes >> 20} MB is left out: a .tsog holds {MOST_SOUND_BYTES >> 20} MB."

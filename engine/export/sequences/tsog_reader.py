@@ -17,7 +17,7 @@ from msgspec import UNSET
 from engine.errors import ProjectError
 from engine.export.formats.damaged import damaged
 from engine.export.formats.sog_pictures import between, member, pixels_of, shares, splats_of, webp_size
-from engine.export.sequences.sequence import SequenceTiming
+from engine.export.sequences.sequence import SequenceSound, SequenceTiming
 from engine.export.sequences.tsog_meta import (
     MAX_ROWS,
     MOST_DIRECTORY_BYTES,
@@ -58,7 +58,7 @@ def open_tsog(path: Path) -> TsogReader:
     except ProjectError as error:
         raise ProjectError(error.message, hint=error.hint, path=path) from error
     except (zipfile.BadZipFile, EOFError, zlib.error, ValueError, KeyError, NotImplementedError, struct.error) as error:
-        reason = str(error).strip("'\"") if str(error) else type(error).__name__
+        reason = str(error.args[0] if isinstance(error, KeyError) else error) or type(error).__name__
         raise ProjectError(damaged(f"it is not a .tsog file, or is damaged ({reason})").message, path=path) from error
     except OSError as error:
         raise ProjectError(f"The file of Gaussians cannot be read: {error.strerror or error}.", path=path) from error
@@ -153,7 +153,7 @@ class TsogReader:
         share = shares(lower, upper[0]) if upper else lower / 255.0
         return between(motion.mins[0], motion.maxs[0], share)
 
-    def _sound(self, archive: zipfile.ZipFile) -> bytes | None:
+    def _sound(self, archive: zipfile.ZipFile) -> SequenceSound | None:
         audio = self._meta.audio
         if not isinstance(audio, TsogAudio):
             return None
@@ -161,7 +161,8 @@ class TsogReader:
         if kind not in ("audio/wav", "audio/x-wav", "audio/wave"):
             self._notes.append(f"Its sound is {kind}, which is not read; only WAV is.")
             return None
-        return member(archive, audio.file, MOST_SOUND_BYTES)
+        data = member(archive, audio.file, MOST_SOUND_BYTES)
+        return SequenceSound(len(data), lambda: (data,))
 
 
 def _pictures(meta: TsogMeta) -> list[str]:

@@ -21,7 +21,7 @@ from engine.export.player.blocks import joined
 from engine.export.sequences.sequence import SequenceStretch, SequenceTiming
 from engine.export.sequences.still_rows import LastingRows, StillRows
 from engine.export.splats import Splats, colors_of
-from engine.export.usd_library import usd_module, writing_usd
+from engine.export.usd_library import state_unit, usd_module, writing_usd
 from engine.export.world import AXES, FileWorld
 
 ROOT = "/Scene"
@@ -81,7 +81,7 @@ class _UsdFile:
         self._n_frames, self._n_still = timing.n_frames, 0
         self._up: tuple[float, float, float] | None = None
         self._stage.SetDefaultPrim(geom.Xform.Define(self._stage, ROOT).GetPrim())
-        geom.SetStageMetersPerUnit(self._stage, 1.0)
+        state_unit(self._stage, timing.meters_per_unit)
         self._stage.SetTimeCodesPerSecond(timing.fps)
         self._stage.SetFramesPerSecond(timing.fps)
         self._stage.SetStartTimeCode(0.0)

@@ -390,3 +390,5 @@ def test_up_and_scale_are_those_of_the_project_unless_others_are_asked_for(proje
     assert sidecar(tmp_path / "out")["meters_per_unit"] == 1.0
     other = structs.replace(job, out=tmp_path / "other", scale=2.0, scene_up=(0.0, 1.0, 0.0))
     assert "2 units per unit" in estimate(opened, other).lines[0]
+    run(opened, other, quiet)
+    assert sidecar(tmp_path / "other")["meters_per_unit"] == 0.125

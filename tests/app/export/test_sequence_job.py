@@ -6,14 +6,20 @@ import io
 import sys
 import wave
 from contextlib import closing, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from app.document.changes.world_changes import set_scale
 from app.evaluation.headless import TrainedProject, open_trained
+from app.export.expected_rows import expected_rows
+from app.export.export_choices import ExportChoices
 from app.export.export_progress import ExportProgress
+from app.export.gaussians import read_back
+from app.export.jobs.answers import Answers
 from app.export.jobs.sequence import SequenceJob
 from app.export.picked_frames import PickedFrames
 from app.export.scene_frames import SceneFrames
@@ -23,12 +29,20 @@ from app.export.sequences.sequence_job import estimate, run
 from app.export.take import TakeFrame, take_frames
 from app.project.opening.project_access import open_project
 from engine.children.kind import Unwanted
+from engine.clip_files.array_names import CORRECTIONS
+from engine.clip_files.clip_state import write_clip_state
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.export.sequences.sequence import SequenceTiming
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
 from engine.export.world import FileWorld
+from engine.model.clip_view import View, render_gaussians
+from engine.raster.gaussians import Gaussians
+from engine.setting import settings_of
 from engine.timing.timing import SourceMoment
+from tests.app.export.test_export_choices import CONTEXT
 from tests.app.stored_project import copy_stored
+from tests.engine.export.made_sequence import FPS, N_FRAMES, MadeSequence
 from tests.engine.synchronisation.made_recordings import write_sound_video
 from tests.faults.full_disk import can_mount, full_disk
 
@@ -174,6 +188,68 @@ def test_a_full_disk_is_said(opened: TrainedProject, tmp_path: Path, name: str):
         assert [path.name for path in disk.iterdir()] == ["other"]
 
 
+@pytest.mark.skipif(not can_mount(), reason="needs to mount a file system")
+def test_a_file_needs_no_more_room_while_it_is_written(tmp_path: Path):
+    write, timing, path = SEQUENCES["4dgs"].write, SequenceTiming(N_FRAMES, FPS), tmp_path / "made.4dgs"
+    write(MadeSequence().stretches(), timing, path)
+    (tmp_path / "disk").mkdir()
+    with full_disk(tmp_path / "disk", path.stat().st_size * 5 // 4000) as disk:
+        write(MadeSequence().stretches(), timing, disk / path.name)
+        assert (disk / path.name).read_bytes() == path.read_bytes()
+
+
+def test_files_say_how_long_their_unit_is(project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    writable = open_project(project)
+    writable.change(set_scale(writable.document, 0.25), "set the scale")
+    writable.close()
+    opened = open_trained(open_project(project, is_writable=False))
+    told: list[float | None] = []
+
+    def write(stretches: Any, timing: SequenceTiming, path: Path) -> tuple[str, ...]:
+        told.append(timing.meters_per_unit)
+        raise Unwanted
+
+    monkeypatch.setitem(sequence_job.SEQUENCES, "4dgs", SEQUENCES["4dgs"]._replace(write=write))
+    for scale in (None, 100.0):
+        with pytest.raises(Unwanted):
+            run(opened, SequenceJob(tmp_path / "a.4dgs", scale=scale), quiet)
+    assert told == [1.0, 0.0025]
+
+
+def test_help_and_window_say_which_way_is_up_in_each_format():
+    said = settings_of(SequenceJob)["up"].usual
+    for name, kind in SEQUENCES.items():
+        assert (kind.up is not None) == (name in said.split(" in ")[-1].split(", "))
+        choices = ExportChoices(kind="sequence").with_answer("format", name)
+        (up,) = [one for one in Answers(CONTEXT, choices).questions if one.name == "up"]
+        assert up.values[0][0] == up.chosen(choices) == ""
+        assert ("+y" in up.values[0][1]) == (kind.up == "+y")
+
+
+def test_refined_cameras_are_corrected_once(opened: TrainedProject, monkeypatch: pytest.MonkeyPatch):
+    state = opened.reference
+    assert state is not None
+    values = np.tile(
+        np.array([0.01, -0.02, 0.03, 0.1, 0.2, -0.1, 0.05], np.float32), (len(state.header.camera_names), 1)
+    )
+    write_clip_state(opened.project.clip_path(0), replace(state, arrays={**state.arrays, CORRECTIONS: values}))
+    refined = open_trained(opened.project)
+    seen: list[View] = []
+
+    def looked_at(gaussians: Gaussians, view: View, *, backend: Any) -> Any:
+        seen.append(view)
+        return render_gaussians(gaussians, view, backend=backend)
+
+    monkeypatch.setattr(read_back, "render_gaussians", looked_at)
+    scene = SceneFrames(refined)
+    live = scene.gaussians(1)
+    figures = read_back.ReadBack(scene, FileWorld()).psnr_db(Splats.of(live), 1, live)
+    expected = [refined.rig.world_to_camera[refined.rig.names.index(name)] for name in figures for _ in range(2)]
+    assert len(seen) == len(expected) == 6
+    for view, pose in zip(seen, expected, strict=True):
+        np.testing.assert_allclose(view.world_to_camera.numpy(), pose, atol=1e-5)
+
+
 def test_sound_is_that_of_the_frames(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     rate, fps = take_sound.RATE, opened.capture.fps
     sound = np.zeros(rate)
@@ -187,9 +263,24 @@ def test_sound_is_that_of_the_frames(opened: TrainedProject, tmp_path: Path, mon
     run(opened, job, quiet)
     with closing(SEQUENCES["4dgs"].open(job.out)) as reader:
         assert reader.timing.sound is not None
-        with wave.open(io.BytesIO(reader.timing.sound)) as file:
+        with wave.open(io.BytesIO(b"".join(reader.timing.sound.pieces()))) as file:
             assert file.getnframes() == round(4 / fps * rate)
             samples = np.frombuffer(file.readframes(file.getnframes()), "<i2")[::2]
     assert abs(int(np.abs(samples).argmax()) - rate / fps) < 0.002 * rate
+    with pytest.raises(ProjectError, match=r"lasts 7.0 hours; a WAV file holds 6.2"):
+        take_sound.take_sound(opened.capture, camera, 0, None, 7 * 3600.0)
     gaps = SequenceJob(tmp_path / "g.4dgs", frames=PickedFrames((range(0, 2), range(4, 6)), 1), sound=camera)
     assert any("sound is left out" in line for line in estimate(opened, gaps).lines)
+
+
+def test_still_parts_that_change_their_light_from_clip_to_clip_are_expected(stored: TrainedProject, tmp_path: Path):
+    def expected(name: str, n_frames: int) -> int:
+        job = SequenceJob(tmp_path / f"a{SEQUENCES[name].suffix}", name, PickedFrames.of(range(n_frames)))
+        return estimate(stored, job).n_bytes
+
+    n_still, n_moving = expected_rows(stored.header(0))  # of three frames; the other clip has as many
+    for name, kind in SEQUENCES.items():
+        more = expected(name, 6) - expected(name, 3)
+        assert more == pytest.approx(
+            kind.moving_bytes * n_moving * 3 + kind.still_again * kind.still_bytes * n_still, rel=0.2
+        )

@@ -141,6 +141,20 @@ def test_clips_are_cut_where_memory_ends(scene: Path, tmp_path: Path, monkeypatc
     assert len(shown(done.folder, 5)) == 60
 
 
+def test_all_clips_have_the_near_plane_that_fits_the_views(
+    scene: Path, frames: list[Splats], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    for number in range(3):  # at first the scene is large and stands still
+        with (scene / f"{number}.ply").open("wb") as file:
+            FORMATS["ply"].write(replace(frames[0], means=5 * frames[0].means), file)
+    monkeypatch.setattr(importing, "CLIP_BYTES", 3 * 60 * importing.GAUSSIAN_BYTES)
+    opened = open_trained(open_project(import_scene(scene, tmp_path / "p").folder, is_writable=False))
+    assert opened.trained == [0, 1]
+    distance = np.linalg.norm(opened.rig.centers - opened.rig.focus_point(), axis=1).mean()
+    for clip_index in opened.trained:
+        assert opened.header(clip_index).near_plane == pytest.approx(importing.NEAR_SHARE * distance, rel=1e-4)
+
+
 def test_what_needs_pictures_says_that_there_are_none(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     folder = import_scene(scene, tmp_path / "p").folder
     capture, sentence = folder / "scene" / "dance", "This scene was imported and has no pictures."
@@ -149,6 +163,7 @@ def test_what_needs_pictures_says_that_there_are_none(scene: Path, tmp_path: Pat
         ["mend", str(folder), "--frames", "0:2"],
         ["clips", str(folder), "--split", "2"],
         ["synchronise", str(capture)],
+        ["export", str(folder), "--format", "metrics-csv", "--out", str(tmp_path / "a.csv")],
         ["render", str(folder), "--camera", "view0", "--show", "compare", "--out", str(tmp_path / "a.mp4")],
     ):
         assert main(command) == 2, command
@@ -180,6 +195,22 @@ def test_a_name_that_is_taken_is_refused(scene: Path, tmp_path: Path):
         import_scene(scene, tmp_path / "p", fps=float("nan"))
 
 
+def test_no_project_is_made_inside_another(scene: Path, tmp_path: Path):
+    folder = import_scene(scene, tmp_path / "p").folder
+    with pytest.raises(ProjectError, match="inside a project"):
+        import_scene(scene, folder / "clips" / "new")
+
+
+def test_its_clips_are_called_imported(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    folder = import_scene(scene, tmp_path / "p").folder
+    for command in (["clips", str(folder)], ["inspect", str(folder)]):
+        assert main(command) == 0
+        said = capsys.readouterr().out
+        assert "imported" in said
+        assert "trained" not in said
+        assert "reference clip" not in said
+
+
 @pytest.mark.parametrize("wrong", ["presence", "rows", "missing", "infinite"])
 def test_a_damaged_clip_is_one(scene: Path, tmp_path: Path, wrong: str):
     folder = import_scene(scene, tmp_path / "p").folder
@@ -204,6 +235,8 @@ def test_the_window_imports_a_scene_and_opens_it_the_next_time(scene: Path, tmp_
         assert session.capture is not None
         assert not session.capture.has_pictures
         assert [state.state for state in session.clip_states] == ["trained"]
+        assert session.project_status is not None
+        assert session.project_status.trained_text == "1 of 1 clips imported"
         (folder,) = projects_dir().iterdir()
         session.dispatch(TrainClip(0, is_confirmed=True))
         session.dispatch(SplitClip(3, is_confirmed=True))

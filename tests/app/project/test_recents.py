@@ -21,6 +21,9 @@ def test_projects_are_kept_newest_first_and_once(tmp_path: Path) -> None:
     again = Settings(tmp_path / "settings.json")
     assert [(known.name, known.n_trained) for known in again.recent] == [("a", 2), ("b", 0)]
     assert again.recent[0].trained_text == "2 of 3 clips trained"
+    again.add_recent(entry("c", n_trained=4, n_clips=4, word="imported"))
+    assert Settings(tmp_path / "settings.json").recent[0].trained_text == "4 of 4 clips imported"
+    again.forget_recent(Path("/projects/c"))
     again.forget_recent(Path("/projects/a"))
     assert [known.name for known in Settings(tmp_path / "settings.json").recent] == ["b"]
 

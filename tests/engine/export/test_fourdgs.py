@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import struct
 import tracemalloc
 from collections.abc import Callable
@@ -20,25 +21,28 @@ from engine.errors import ProjectError
 from engine.export.sequences.fourdgs_reader import MAX_ROWS, FourdgsReader, problems
 from engine.export.sequences.fourdgs_writer import FAINTEST, write
 from engine.export.sequences.segments import PATH_SHARE, segments
-from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
+from engine.export.sequences.sequence import MovingSplats, SequenceSound, SequenceStretch, SequenceTiming
 from engine.export.splats import Splats
 from tests.engine.export.made_sequence import FPS, N_FRAMES, N_MOVING, N_OTHER, N_STILL, N_STRETCHES, MadeSequence
 from tests.engine.export.scenes import angles_deg, chance_splats, one_splat, order_of
 
 SOUND = b"RIFF....WAVE, or so"
+TIMING = SequenceTiming(N_FRAMES, FPS, SequenceSound(len(SOUND), lambda: (SOUND[:7], SOUND[7:])))
 
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file of the made sequence."""
     path = tmp_path_factory.mktemp("sequence") / "made.4dgs"
-    assert write(MadeSequence().stretches(), SequenceTiming(N_FRAMES, FPS, SOUND), path) == ()
+    assert write(MadeSequence().stretches(), TIMING, path) == ()
     return path
 
 
 def test_every_frame_comes_back_nearly_as_it_was(path: Path):
     made, reader = MadeSequence(), FourdgsReader(path)
-    assert reader.timing == SequenceTiming(N_FRAMES, FPS, SOUND)
+    assert reader.timing == TIMING
+    assert reader.timing.sound is not None
+    assert b"".join(reader.timing.sound.pieces()) == SOUND
     assert reader.notes == ()
     for frame in (35, 0, 11, 12, 5, 23):
         found, live = reader.splats(frame), made.frame(frame)
@@ -68,6 +72,22 @@ def test_the_librarys_reader_and_validator_agree(path: Path):
         np.testing.assert_allclose(np.sort(state["centers"], axis=0), np.sort(found.means, axis=0), atol=1e-4)
     assert len(scene.state_at((N_FRAMES - 1 + 0.999) / FPS)["indices"]) > 0
     assert len(scene.state_at(N_FRAMES / FPS)["indices"]) == 0
+
+
+def test_sound_of_any_length_takes_little_memory(tmp_path: Path):
+    piece, still = bytes(1 << 20), chance_splats(5)
+    timing = SequenceTiming(2, 30.0, SequenceSound(64 << 20, lambda: itertools.repeat(piece, 64)))
+    nothing = MovingSplats(still[:0], np.zeros(0, np.int64))
+    tracemalloc.start()
+    write([SequenceStretch(0, 2, still, lambda frame: nothing)], timing, tmp_path / "long.4dgs")
+    with closing(FourdgsReader(tmp_path / "long.4dgs")) as reader:
+        assert reader.timing == timing
+        assert len(reader.splats(1)) == int((still.opacities >= FAINTEST).sum())
+        assert reader.timing.sound is not None
+        assert all(not any(part) for part in reader.timing.sound.pieces())
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8e6
 
 
 def test_what_stands_still_or_goes_straight_is_stored_once(path: Path):

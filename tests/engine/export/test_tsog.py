@@ -17,7 +17,7 @@ from PIL import Image
 
 from engine.errors import ProjectError
 from engine.export.sequences import tsog
-from engine.export.sequences.sequence import MovingSplats, SequenceStretch, SequenceTiming
+from engine.export.sequences.sequence import MovingSplats, SequenceSound, SequenceStretch, SequenceTiming
 from engine.export.sequences.table import SEQUENCES
 from engine.export.splats import Splats
 from tests.engine.export.scenes import angles_deg, chance_splats, one_splat, order_of
@@ -187,12 +187,15 @@ def test_light_that_moves_a_little_within_a_stretch_stands_still(path: Path):
 
 @pytest.mark.parametrize("n", [0, 1, 300])
 def test_a_single_frame_is_static(path: Path, n: int):
-    splats, sound = chance_splats(n), b"RIFF" + bytes(500)
+    splats, data = chance_splats(n), b"RIFF" + bytes(500)
+    sound = SequenceSound(len(data), lambda: (data[:100], data[100:]))
     stretch = SequenceStretch(0, 1, splats, lambda _: MovingSplats(splats[:0], np.zeros(0, np.int64)))
     assert FORMAT.write([stretch], SequenceTiming(1, 30.0, sound), path) == ()
     assert "timeline" not in taken_apart(path)[0]
     reader = FORMAT.open(path)
     assert reader.timing == SequenceTiming(1, 30.0, sound)
+    assert reader.timing.sound is not None
+    assert b"".join(reader.timing.sound.pieces()) == data
     assert len(reader.splats(0)) == n
 
 

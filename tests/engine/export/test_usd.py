@@ -65,6 +65,17 @@ def test_the_stage_is_one_that_programs_understand(path: Path):
     assert set(n_shown) == {3}
 
 
+@pytest.mark.parametrize(("said", "written"), [(None, 1.0), (0.01, 0.01)])
+def test_a_stage_says_how_long_its_unit_is(tmp_path: Path, said: float | None, written: float):
+    pytest.importorskip("pxr")
+    Usd, UsdGeom = modules("Usd", "UsdGeom")
+    timing = SequenceTiming(N_FRAMES, FPS, meters_per_unit=said)
+    usd.write(MadeSequence().stretches(), timing, tmp_path / "unit.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "unit.usda"))
+    assert UsdGeom.StageHasAuthoredMetersPerUnit(stage)
+    assert UsdGeom.GetStageMetersPerUnit(stage) == written
+
+
 def test_a_turned_and_scaled_prim_lies_where_the_stage_has_it(path: Path):
     Gf, Usd, UsdGeom = modules("Gf", "Usd", "UsdGeom")
     live = usd.UsdReader(path).splats(3)

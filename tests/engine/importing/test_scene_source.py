@@ -122,6 +122,15 @@ def test_missing_numbers_are_said(tmp_path: Path):
     assert "(1, 3, 5)" in open_scene(folder).notes[0]
 
 
+def test_an_export_of_every_so_many_frames_plays_as_fast_as_it_was(tmp_path: Path):
+    folder = write_frames(tmp_path / "s", "ply", moving_frames(3), numbers=range(3, 9, 2))
+    (folder / "p_export.json").write_text('{"fps": 24, "up": [0, 0, 1], "files": [{"part": "all"}]}')
+    assert (open_scene(folder).fps, open_scene(folder).notes) == (12.0, ())
+    write_frames(folder, "ply", moving_frames(1), numbers=range(8, 9))
+    assert open_scene(folder).fps == 24.0
+    assert "(4, 6)" in open_scene(folder).notes[0]
+
+
 def test_what_is_no_scene_is_refused_in_words(tmp_path: Path):
     empty = tmp_path / "empty"
     empty.mkdir()
@@ -131,6 +140,10 @@ def test_what_is_no_scene_is_refused_in_words(tmp_path: Path):
     other = tmp_path / "a.txt"
     other.write_text("")
     assert "not a scene" in refused(other)
+    for suffix in (".usda", ".usdc"):  # it may name any other file
+        other = other.with_suffix(suffix)
+        other.write_text("#usda 1.0")
+        assert "not a scene" in refused(other)
     mixed = write_frames(write_frames(tmp_path / "mixed", "ply", moving_frames(2)), "spz", moving_frames(1))
     assert "2 .ply and 1 .spz" in refused(mixed)
 

@@ -21,7 +21,7 @@ from tests.engine.importing.frames import moving_frames, values
 
 def loaded(frames: list[Splats]) -> tuple[ClipState, ClipModel]:
     n = len(frames)
-    state = stored_clip(Clip(0, 0, n, n), stored_gaussians(frames), near_plane=0.1, views=["a"])
+    state = stored_clip(Clip(0, 0, n, n), stored_gaussians(frames), views=["a"])
     return state, load_clip_model(state, None, backend=backend_called("reference"))
 
 

@@ -36,7 +36,9 @@ from app.status import (
 )
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
+from ui.panels.actions.clips.training import ACTIONS
 from ui.panels.state import LOG
+from ui.panels.timeline.clip_words import state_words
 from ui.panels.training import training
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -324,3 +326,8 @@ def test_an_imported_scene_says_that_nothing_was_trained(open_pilot: Open, monke
     pilot.draw(3)
     assert "This scene was imported; it has no training curves." in said
     assert training.next_label(session).endswith("Imported from another program")  # type: ignore[arg-type]
+    assert [state_words(state, session) for state in ("trained", "damaged")] == ["imported", "damaged"]  # type: ignore[arg-type]
+    (action,) = [action for action in ACTIONS if action.id == "train.next"]
+    assert action.lacks is not None
+    session.training = replace(session.training, can_train_next=False, state="idle")
+    assert "no pictures" in action.lacks(session)  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from ui.panels.picture.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.picture.comparison import shown_compare
 from ui.panels.pieces.widgets import elided
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline.clip_words import STATE_WORDS
+from ui.panels.timeline.clip_words import state_words
 from ui.style import theme
 from ui.style.colors import Color
 from ui.style.numbers import format_count
@@ -118,7 +118,7 @@ class Hud:
             wanted,
             fps=timeline.fps,
             state=state,
-            state_words=str(STATE_WORDS.get(state, state)),
+            state_words=state_words(state, session),
             camera_name=camera_name,
             rate=rate,
             loading=session.loading,

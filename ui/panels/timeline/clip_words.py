@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from app.session.session_view import SessionView
 from app.status import ClipStatus
+from engine.capture.formats.imported import finished_word
 from ui.style.numbers import format_count
 
 STATE_WORDS: dict[str, str] = {
@@ -19,8 +21,15 @@ STATE_WORDS: dict[str, str] = {
 }
 
 
-def state_words(state: str) -> str:
+def is_imported(session: SessionView) -> bool:
+    """Is the open scene one of another program, which nothing was trained for?"""
+    return session.capture is not None and not session.capture.has_pictures
+
+
+def state_words(state: str, session: SessionView) -> str:
     """A state as the user reads it."""
+    if state == "trained":
+        return finished_word(has_pictures=not is_imported(session))
     return STATE_WORDS.get(state, state)
 
 

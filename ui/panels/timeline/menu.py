@@ -39,7 +39,7 @@ def draw_clip_menu(stage: TimelineStage, session: SessionView, dispatch: Dispatc
     clip = session.timeline.clip_of(ui.timeline.menu_frame)
     if clip is not None:
         state = session.clip_states[clip.clip_index].state
-        imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
+        imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state, session)}")
         draw_clip_training(session, dispatch, ui, clip.clip_index, is_by_key=is_by_key)
         imgui.separator()
         frame, n_clips = ui.timeline.menu_frame, len(session.clips)

@@ -14,7 +14,7 @@ from engine.text import duration_text
 from ui.panels.clips.section import draw_clip_section, draw_stale
 from ui.panels.pieces.widgets import primary_button, text_right, text_wrapped, text_wrapped_dim
 from ui.panels.state import Dispatch, UiState
-from ui.panels.timeline.clip_words import STATE_WORDS, state_note
+from ui.panels.timeline.clip_words import is_imported, state_note, state_words
 from ui.panels.training.clip_quality import draw_clip_quality
 from ui.panels.training.clip_training_menu import draw_clip_training
 from ui.panels.training.curves import draw_curves
@@ -63,11 +63,6 @@ def draw_training(session: SessionView, dispatch: Dispatch, ui: UiState) -> None
     draw_clip_section(session, dispatch, ui)
     imgui.spacing()
     _draw_clips(session, dispatch, ui)
-
-
-def is_imported(session: SessionView) -> bool:
-    """Is the open scene one of another program, which nothing was trained for?"""
-    return session.capture is not None and not session.capture.has_pictures
 
 
 def next_label(session: SessionView) -> str:
@@ -216,7 +211,7 @@ def _draw_clip_row(session: SessionView, clip: Clip, status: ClipStatus, dispatc
     imgui.pop_id()
     imgui.same_line(0, 0)
     icon = theme.CLIP_ICONS.get(status.state, "")
-    words: str = STATE_WORDS.get(status.state, str(status.state))
+    words = state_words(status.state, session)
     imgui.text(f"{clip.clip_index}")
     ui.mark(f"training.clip{clip.clip_index}")
     imgui.same_line(26 + 8 * (clip.clip_index > 99))

@@ -152,7 +152,7 @@ class ExportDialog:
 
     def _draw_frames(self, context: ExportContext, ui: UiState) -> None:
         words: dict[FramesChoice, str] = {
-            "all": "All trained",
+            "all": "All finished",
             "range": "From in to out",
             "clip": "This clip",
             "frame": "This frame",

@@ -22,8 +22,10 @@ from app.session.training.train_commands import (
     TrainNextClip,
 )
 from app.status import RunningClip
+from engine.capture.formats.imported import NO_PICTURES
 from ui.panels.actions.action import TRAIN, WINDOW, Action, Run
 from ui.panels.state import LOG, TRAINING, Dispatch, UiState
+from ui.panels.timeline.clip_words import is_imported
 
 
 def train_or_pause(session: SessionView, dispatch: Dispatch) -> None:
@@ -111,6 +113,8 @@ def _cannot_train(session: SessionView) -> str:
     status = session.training
     if (status.is_going and not status.is_stopping) or status.can_train_next:
         return ""
+    if is_imported(session):
+        return NO_PICTURES
     is_all = all(clip.state == "trained" for clip in session.clip_states)
     return "Every clip is trained." if is_all else "No clip can be trained next."
 

@@ -30,7 +30,7 @@ def draw_stack(session: SessionView, dispatch: Dispatch, ui: UiState) -> None:
     reach_section(ui, "edits")
     edits = session.edits.edits
     if not edits:
-        text_wrapped_dim("No edits: everything is shown as it was trained.")
+        text_wrapped_dim("No edits: everything is shown as the clips have it.")
         return
     n_on = sum(edit.is_on for edit in edits)
     imgui.text(f"{len(edits)} edit{'' if len(edits) == 1 else 's'}")

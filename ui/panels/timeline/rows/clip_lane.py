@@ -68,7 +68,7 @@ def _draw_runs(stage: TimelineStage, session: SessionView, in_sight: tuple[int, 
         else:
             band = _band(stage, session, begin, last)
             rects[f"timeline.clip{begin}"] = band
-            _draw_run(draw, band, begin, last, state)
+            _draw_run(draw, band, begin, last, state, state_words(state, session))
 
 
 def state_runs(
@@ -94,8 +94,8 @@ def _band(stage: TimelineStage, session: SessionView, first: int, last: int) -> 
     return Rect(x0, row.y0, max(x1, x0 + 1), row.y1)
 
 
-def _draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: str) -> None:
-    """Many clips in one state as one band."""
+def _draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: str, words: str) -> None:
+    """Many clips in one state as one band. words: Of the state."""
     color = theme.status_color(state)
     draw.add_rect_filled(band.low, band.high, theme.u32(theme.RAISED), 3)
     draw.add_rect_filled(band.low, band.high, theme.u32(theme.faded(color, 0.38 if state == "trained" else 0.22)), 3)
@@ -106,7 +106,7 @@ def _draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: 
         return
     icon = theme.CLIP_ICONS.get(state, "")
     title = f"Clips {first} to {last}" if last > first else f"Clip {first}"
-    words = f"{icon}  {state_words(state)}".strip()
+    words = f"{icon}  {words}".strip()
     title = next((text for text in (title, f"{first}-{last}") if _fits(text, band)), "")  # a part would mislead
     _draw_lines(draw, band, title, words if _fits(words, band) else icon, theme.TEXT)
 
@@ -140,7 +140,7 @@ def _draw_words(draw: imgui.ImDrawList, band: Rect, session: SessionView, clip: 
         return
     plain = clip_title(clip.clip_index, session.reference_index)
     titles = (with_label(session, "clip", str(clip.start), plain), plain, str(clip.clip_index))
-    words = band_words(status, session.training, clip.clip_index, state_words(state))
+    words = band_words(status, session.training, clip.clip_index, state_words(state, session))
     if status.held_out_psnr is not None:
         words = f"{words}, {psnr_label(status.held_out_psnr, is_whole=status.held_out_whole)} dB"
     title = next((title for title in titles if _fits(title, band)), titles[-1])
@@ -180,6 +180,6 @@ def _draw_note(session: SessionView, frame_index: int) -> None:
     imgui.begin_tooltip()
     imgui.push_text_wrap_pos(NOTE_WIDTH)
     title = with_label(session, "clip", str(clip.start), clip_title(clip.clip_index, session.reference_index))
-    imgui.text_unformatted(f"{title}: {state_words(status.state)}. {note}")
+    imgui.text_unformatted(f"{title}: {state_words(status.state, session)}. {note}")
     imgui.pop_text_wrap_pos()
     imgui.end_tooltip()
