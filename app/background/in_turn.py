@@ -12,8 +12,7 @@ T = TypeVar("T")
 
 
 class InTurn:
-    """Methods are for one thread. The thread starts with the first piece of work and ends with the program at the latest: one that
-    hangs holds nobody up.
+    """Methods are for one thread. The thread that works starts with the first piece and holds up no end of the program.
 
     Args:
         name: Of the thread.

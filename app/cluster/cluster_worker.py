@@ -12,11 +12,13 @@ from app.cluster.cluster import Cluster
 from app.cluster.errands import CopiedProject, SharedProject
 from app.cluster.far_child import Errand, FarChild
 from app.cluster.nodes import Node, Seat
+from app.project.claims.holder_record import MachineLoad
 from app.project.project import Project
 from app.training.messages import (
     ENDINGS,
     Command,
     Event,
+    LoadReported,
     StageReported,
     Stop,
     TrainingFailed,
@@ -65,6 +67,7 @@ class ClusterWorker:
         self._said: list[Event] = []
         self._is_whole = self._is_waiting = False
         self._n_retries, self._reached = 0, -1
+        self._load: MachineLoad | None = None
         self._has_ended = False
 
     def send(self, command: Command) -> None:
@@ -132,7 +135,7 @@ class ClusterWorker:
         if self._stop is not None and attempt.child.pid is None:
             attempt.worker.close(timeout_s=0.0)
             return [self._stopped(self._stop)]
-        events = attempt.worker.poll()
+        events = self._load_of(attempt) + attempt.worker.poll()
         if not events or not isinstance(ending := events[-1], TrainingFailed | WorkerDied):
             return events
         why = self._why_again(ending, attempt)
@@ -141,6 +144,12 @@ class ClusterWorker:
         self._leave()
         title = f"Clip {self.job.clip_index} resumes, on another computer if there is one"
         return [*events[:-1], WarningRaised(title, f"{why.rstrip('.')}.")]
+
+    def _load_of(self, attempt: NodeAttempt) -> list[Event]:
+        if attempt.child.load is self._load or attempt.child.load is None:
+            return []
+        self._load = attempt.child.load
+        return [LoadReported(self._load)]
 
     def _may_retry(self) -> bool:
         """Whether another attempt is due: the last ones have got further, or there were few."""

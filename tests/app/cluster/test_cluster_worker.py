@@ -24,7 +24,7 @@ class FullCluster:
         """Nothing happened."""
         return []
 
-    def seat_for(self, **_: Any) -> None:
+    def seat_for(self, **_: Any) -> Seat | None:
         """There is none."""
 
 
@@ -42,7 +42,7 @@ class LossyCluster(FullCluster):
 class LostChild:
     """Its computer was lost."""
 
-    fault, pid, is_over = "lost", 1, True
+    fault, pid, is_over, load = "lost", 1, True, None
 
     def __init__(self, *_: Any, **__: Any) -> None:
         """At once."""

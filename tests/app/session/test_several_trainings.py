@@ -14,7 +14,7 @@ import pytest
 from app.project.claims import claims
 from app.project.claims.asks import take_ask
 from app.project.claims.claim_files import CLAIMS, ClaimFile, holder_path, make_claim
-from app.project.claims.holder_record import ClipProgress, HolderRecord, MachineLoad, write_holder
+from app.project.claims.holder_record import ClipProgress, HolderRecord, MachineLoad, machine_name, write_holder
 from app.project.lock import this_process
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
@@ -36,8 +36,9 @@ from app.session.training.train_commands import (
     TrainNextClip,
 )
 from app.training import service as training_service
-from app.training.messages import SetSnapshots, SnapshotNow, TrainJob
+from app.training.messages import LoadReported, SetSnapshots, SnapshotNow, TrainJob
 from app.training.process import Worker
+from app.training.training_status import machines, running_clips
 from app.training.worker import keeper
 from engine.errors import ProjectError
 from tests.app.conftest import DEADLINE_S, inline, poll_until
@@ -194,6 +195,21 @@ def tell_of(session: Session, *clips: ClipProgress, beat: int = 1) -> None:
     write_holder(holder_path(folder, record.token), record)
     for key in keys:
         make_claim(ClaimFile(folder, key, 1), record.token)
+
+
+def test_computers_of_a_cluster_are_shown_with_their_own_load(session: Session) -> None:
+    service = session.live_training.service
+    assert service is not None
+    service.runs[1].machine, service.runs[2].machine = "node-1", "node-2"
+    service.runs[1]._take(LoadReported(MachineLoad(8, 3.0, 1e4)))
+    tell_of(session, ClipProgress(4, "running", "node-3", load=MachineLoad(4, 0.5, 2e4)))
+    service.claims.look()
+    found = {
+        one.name: (one.n_clips, one.n_cores, one.load, one.free_mb) for one in machines(service, running_clips(service))
+    }
+    del found[machine_name()]
+    assert found == {"node-1": (1, 8, 3.0, 1e4), "node-2": (1, 0, None, None), "node-3": (1, 4, 0.5, 2e4)}
+    assert service._described()[service.project.clip_name(1)].load == MachineLoad(8, 3.0, 1e4), "for other windows"
 
 
 def test_a_clip_that_trains_elsewhere_is_shown_like_an_own_one(shared: Session) -> None:
