@@ -228,6 +228,8 @@ TABLES: dict[str, Clips | Printed] = {
         ("python -m tests.benchmarks.bench_workers OUT BASKETBALL --scale 0.5 --frames 0:36 --clip-length 4",),
         which=-1,
     ),
+    "plan": Printed("the forecast of several workers", ("python -m tests.benchmarks.bench_plan BASKETBALL OUT",)),
+    "node-loss": Printed("a lost node", ("python -m tests.benchmarks.bench_node_loss",)),
     "large": Printed("a project of 1,000 clips", ("python -m tests.benchmarks.bench_project",), which=None),
     "faults": Printed("faults", ("make faults",), which=None),
 }
