@@ -16,21 +16,25 @@ class InTurn:
 
     Args:
         name: Of the thread.
+        is_apart: Whether there is one; else work is done where it is given.
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, *, is_apart: bool = True) -> None:
+        self._name, self._is_apart = name, is_apart
         self._waiting: SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] | None = None
 
-    def do(self, work: Callable[[], T], *, wait_s: float | None) -> Future[T]:
+    def do(self, work: Callable[[], T], *, wait_s: float) -> Future[T]:
         """Have something done after all that went before.
 
         Args:
-            wait_s: Wait so long for it; until it is done when None.
+            wait_s: Wait so long for it.
         Returns:
             Its result, or its error, once it is done.
         """
         future: Future[T] = Future()
+        if not self._is_apart:
+            _work(future, work)
+            return future
         if self._waiting is None:
             self._waiting = SimpleQueue()
             threading.Thread(target=_run, args=(self._waiting,), name=self._name, daemon=True).start()
@@ -47,8 +51,11 @@ class InTurn:
 
 def _run(waiting: SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]) -> None:
     while (given := waiting.get()) is not None:
-        future, work = given
-        try:
-            future.set_result(work())
-        except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
-            future.set_exception(error)
+        _work(*given)
+
+
+def _work(future: Future[T], work: Callable[[], T]) -> None:
+    try:
+        future.set_result(work())
+    except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
+        future.set_exception(error)

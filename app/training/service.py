@@ -118,8 +118,7 @@ class TrainingService:
         self._next: int | None = None
         self._next_of: tuple[tuple[int, ...], object] = ((), None)
         self.claims = Claims(project.folder, describe=self._described) if claims is None else claims
-        self._disk = InTurn("claims of clips")
-        self._wait_s = PATIENCE_S if is_window_open else None
+        self._disk = InTurn("claims of clips", is_apart=is_window_open)
         self._claiming: tuple[int, int, Future[Claimed]] | None = None  # a clip, how many share the cores, its claim
         self._ended_elsewhere: list[ClipEvent] = []
         self._known_elsewhere: Mapping[str, Elsewhere] = self.claims.elsewhere
@@ -342,7 +341,7 @@ class TrainingService:
             self.catalog.update(clip_index)
         self.runs = {}
         self._claiming = None
-        self._disk.do(self.claims.close, wait_s=timeout_s if is_busy else self._wait_s)
+        self._disk.do(self.claims.close, wait_s=timeout_s if is_busy else PATIENCE_S)
         self._disk.close()
         if self._owns_curves:
             self.curves.close()
@@ -361,7 +360,7 @@ class TrainingService:
             if not ready:
                 return
             n_beside = min(len(self.runs) + len(ready), self.n_workers)
-            claim = self._disk.do(partial(self._claim, ready[0]), wait_s=self._wait_s)
+            claim = self._disk.do(partial(self._claim, ready[0]), wait_s=PATIENCE_S)
             if claim.done():
                 self._start(ready[0], claim, n_beside=n_beside)
             else:
@@ -380,7 +379,7 @@ class TrainingService:
         return Claimed(read_clip_header(files.handed_over), self.claims.n_holders)
 
     def _release(self, key: str) -> None:
-        self._disk.do(partial(self.claims.release, key), wait_s=self._wait_s if self._wait_s is None else 0.0)
+        self._disk.do(partial(self.claims.release, key), wait_s=0.0)
 
     def _ready(self) -> list[int]:
         """Waiting clips that need none that trains or waits before them, as many as there is room for; but for those
