@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.project.lock import is_process_alive
-from engine.errors import ProjectError
+from engine.errors import DiskError, ProjectError
 from engine.storage.files import atomic_folder, atomic_path, discard, disk_error, is_left_over
 
 if TYPE_CHECKING:
@@ -33,7 +33,8 @@ def check_target(
         n_bytes: Its expected size, as far as known.
         is_folder: Which of the two it is.
     Raises:
-        ProjectError: Something else has this name, the place may not be written to, or the disk has too little room.
+        ProjectError: Something else has this name, or the place may not be written to.
+        DiskError: The disk has too little room.
     """
     if opened is not None:
         _check_apart(path, opened)
@@ -51,7 +52,7 @@ def check_target(
     spare_bytes = min(SPARE_BYTES, LEAST_SPARE_BYTES + n_bytes)
     if n_bytes + spare_bytes > disk.free:
         needed = f"About {_room(n_bytes)} will be written" if n_bytes else f"{_room(spare_bytes)} must be free"
-        raise ProjectError(
+        raise DiskError(
             f"{needed}, but only {_room(disk.free)} are free.",
             hint="Free some space, choose another place, or export fewer frames.",
             path=path,

@@ -84,16 +84,19 @@ def geometry() -> bpy.types.NodeTree:
     return tree
 
 
-def set_pixel(modifier: bpy.types.NodesModifier, width: float) -> None:
-    """Tell the modifier how wide a pixel of the render is at the distance 1."""
-    name = _pixel_identifier(modifier.node_group)
-    if modifier.get(name) != width:
+def set_pixel(mesh_object: bpy.types.Object, width: float) -> None:
+    """Tell our modifier of a mesh how wide a pixel of the render is at the distance 1. Users may have taken it away, or
+    given it nodes of their own."""
+    modifier = mesh_object.modifiers.get(NAME)
+    tree = None if modifier is None else getattr(modifier, "node_group", None)
+    name = None if tree is None else _pixel_identifier(tree)
+    if name is not None and modifier.get(name) != width:
         modifier[name] = width
         modifier.id_data.update_tag()
 
 
-def _pixel_identifier(tree: bpy.types.NodeTree) -> str:
-    return next(item.identifier for item in tree.interface.items_tree if item.name == _PIXEL)
+def _pixel_identifier(tree: bpy.types.NodeTree) -> str | None:
+    return next((item.identifier for item in tree.interface.items_tree if item.name == _PIXEL), None)
 
 
 def _to_camera(nodes: NodeBuilder) -> bpy.types.NodeSocket:

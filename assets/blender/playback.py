@@ -78,7 +78,7 @@ def show(root: bpy.types.Object, scene: bpy.types.Scene) -> None:
             mesh_object.hide_render = mesh_object.hide_viewport = is_hidden
         if is_hidden or part not in sequence.files:
             continue
-        look.set_pixel(mesh_object.modifiers[look.NAME], pixel)
+        look.set_pixel(mesh_object, pixel)
         path = sequence.file_at(part, min(max(frame, sequence.first_frame), sequence.last_frame + _EPSILON))
         stamp = stamp_of(path)
         wanted = (path, stamp, settings.size, settings.limit, settings.colors)

@@ -6,6 +6,7 @@ from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from engine.assets import asset_path
+from engine.errors import ProjectError
 from engine.storage.files import atomic_path, disk_error
 
 FILE = "clipgstream_blender.zip"
@@ -15,12 +16,15 @@ def write_addon(folder: Path) -> Path:
     """Write the add-on into a folder, which is made; an earlier one is replaced. The same files make the same zip.
 
     Raises:
-        DiskError: It could not be written.
+        ProjectError: This installation lacks its files. DiskError: It could not be written.
     """
-    path = folder / FILE
+    path, sources = folder / FILE, sorted(asset_path("blender").glob("*"))
+    if not sources:
+        where = asset_path("blender")
+        raise ProjectError("The add-on is not in this installation.", hint="Install the program again.", path=where)
     try:
         with atomic_path(path) as partial, ZipFile(partial, "w") as target:
-            for source in sorted(asset_path("blender").iterdir()):
+            for source in sources:
                 if source.suffix in (".py", ".toml"):
                     target.writestr(ZipInfo(source.name), source.read_bytes(), ZIP_DEFLATED)
     except OSError as error:

@@ -131,6 +131,12 @@ def check(folder: Path) -> dict[str, Any]:
     path = root.clipgstream.path
     said["not relinked"] = refused(bpy.ops.clipgstream.relink, filepath=str(bad[0] / "p_export.json"))
     said["stays"] = root.clipgstream.path == path
+    shown = meshes(root)["all"]
+    shown.modifiers[0].node_group = bpy.data.node_groups.new("of the user", "GeometryNodeTree")
+    scene.frame_set(3)
+    shown.modifiers.clear()
+    scene.frame_set(2)
+    said["without our nodes"] = root.clipgstream.problem, len(shown.data.vertices)
     bpy.ops.preferences.addon_disable(module="bl_ext.user_default.clipgstream")
     scene.frame_set(2)
     return said

@@ -175,6 +175,10 @@ def test_what_moved_and_what_was_exported_again_is_linked_again(said: dict, open
     assert said["camera again"] == opened.rig.names[-1], "the one that was looked through last"
 
 
+def test_nodes_of_the_user_in_place_of_ours_are_left_alone(said: dict, folder: Path):
+    assert said["without our nodes"] == ["", len(written(folder / "elsewhere" / "p_0003.ply"))]
+
+
 def test_bad_input_is_an_error_in_words_and_leaves_nothing(said: dict):
     assert "ends too early" in said["refused"]["truncated"]
     assert "schema 7" in said["refused"]["newer"]

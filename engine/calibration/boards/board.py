@@ -101,7 +101,8 @@ def read_board(text: str) -> Board:
         raise CaptureError(f"The board is {columns} x {rows}; each must be 3 to {MAX_SQUARES}.", hint=HOW)
     if not all(0 < length <= MAX_METRES for length in lengths):
         what = "Squares and markers" if kind == "charuco" else "Squares"
-        raise CaptureError(f"{what} must be larger than 0 and at most {MAX_METRES:g} m.", hint=HOW)
+        said = " and ".join(f"{length:g}" for length in lengths)
+        raise CaptureError(f"{what} of {said} m: they must be larger than 0 and at most {MAX_METRES:g} m.", hint=HOW)
     if kind == "chessboard":
         if (columns + rows) % 2 == 0:
             what = f"A chessboard of {columns} x {rows} inner corners looks the same turned by half a turn"
@@ -122,11 +123,15 @@ def _with_markers(board: Board) -> Board:
     dictionary, known = board.dictionary.upper().removeprefix("DICT_"), dictionaries()
     if dictionary not in known:
         raise CaptureError(f"{shown(dictionary)} is not a dictionary of markers.", hint=f"Known: {', '.join(known)}.")
-    n_there = len(cv2.aruco.getPredefinedDictionary(known[dictionary]).bytesList)
+    sizes = {name: len(cv2.aruco.getPredefinedDictionary(number).bytesList) for name, number in known.items()}
+    n_there = sizes[dictionary]
     n_needed = board.columns * board.rows // 2
     if n_needed > n_there:
+        large = [name for name, n_markers in sizes.items() if n_markers >= n_needed]
         raise CaptureError(
             f"A board of {board.columns} x {board.rows} squares needs {n_needed} markers; {dictionary} has {n_there}.",
-            hint="Take a larger dictionary, such as 4X4_1000 or 5X5_1000.",
+            hint=f"Take a larger dictionary: {', '.join(large)}."
+            if large
+            else f"At most {max(sizes.values())} are known.",
         )
     return Board(board.columns, board.rows, board.square_m, board.marker_m, dictionary)

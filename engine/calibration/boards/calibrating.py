@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -54,12 +55,8 @@ def calibrate_by_board(
     sizes = np.array([video.size for video in videos], dtype=np.int64)
     solution = solve_boards(views, board.corners, sizes, options.lens, progress.solved)
     if isinstance(solution, str):
-        names = {f"{{{row}}}": video.name for row, video in enumerate(videos)}
-        for key, name in names.items():
-            solution = solution.replace(key, name)
-        raise PreparationError(
-            f"No two cameras could be placed. {solution[:1].upper()}{solution[1:]}.", hint=WHAT_TO_FILM
-        )
+        said = re.sub(r"\{(\d+)\}", lambda found: videos[int(found[1])].name, solution)
+        raise PreparationError(f"No two cameras could be placed: {said}.", hint=WHAT_TO_FILM)
     return _finished(solution, videos, np.array(frames), sizes, options)
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from engine.calibration.boards.detection import BoardView
-from engine.calibration.boards.joining import Pose, joined
+from engine.calibration.boards.joining import MIN_COMMON, Pose, joined
 from engine.calibration.boards.single import EXPECTED, SingleCamera, lens_of, pose_of, refined, sightings
 from engine.calibration.solving.bundle import Observations, RigidPlaces, adjust, errors_px
 from engine.calibration.solving.cameras import N_LENS, Cameras, with_lens
+from engine.capture.layout.format_checks import shortened
 
 MIN_VIEWS = 6
 """Of one camera; fewer do not give its lens."""
@@ -95,11 +98,11 @@ def solve_boards(
         singles = _best_lenses(singles, own, corners, sizes)
     progress(0.7)
     if len(singles) < 2:
-        return "; ".join(f"{{{row}}}: {why}" for row, why in unusable.items())
+        return shortened([f"{{{row}}}: {why}" for row, why in unusable.items()])
     held = [_held(moment, singles, corners) for moment in views]
     group = joined(n_cameras, held)
     if group is None:
-        return "no two cameras saw the board at the same moment in enough places"
+        return _said_apart(held)
     rows = group.rows
     cameras = _together([singles[int(row)].camera for row in rows], group.poses)
     moments = [i for i, moment in enumerate(held) if sum(int(row) in moment for row in rows) >= 2]
@@ -123,6 +126,15 @@ def _held(moment: Mapping[int, BoardView], singles: Mapping[int, SingleCamera], 
     """From the board to each camera that sees it."""
     poses = {row: pose_of(view, corners, singles[row].camera) for row, view in moment.items() if row in singles}
     return {row: pose for row, pose in poses.items() if pose is not None}
+
+
+def _said_apart(held: Sequence[Mapping[int, Pose]]) -> str:
+    """Why no two cameras are joined."""
+    pairs = Counter(pair for moment in held for pair in combinations(sorted(moment), 2))
+    if not pairs:
+        return "no two of them saw the board at the same moment"
+    (a, b), n = pairs.most_common(1)[0]
+    return f"{{{a}}} and {{{b}}} saw the board together most often, {n} times, and {MIN_COMMON} have to agree"
 
 
 def _first_lens(lens: str) -> str:

@@ -64,7 +64,7 @@ def read_motion_capture(
     findings = Findings()
     cameras = cameras_in(root)
     if not cameras:
-        hint = "Export the calibration again, with its cameras."
+        hint = "Export the calibration again, with its cameras placed and switched on."
         findings.add(CaptureError("No calibrated camera is in it.", hint=hint, path=path))
     search = FrameSearch(folder, FRAME_FOLDERS, follow_links=follow_links, named_in=path)
 
@@ -103,11 +103,22 @@ def probe_calibration(folder: Path, suffix: str, is_it: Callable[[Path], bool] |
     """Whether a folder has such a calibration, and a video or a folder of images where they are looked for."""
     found = calibrations(folder, suffix, is_it)
     if not found:
-        return Probe(False, lacks=f"no {suffix}")
+        return _damaged(folder, suffix) or Probe(False, lacks=f"no {suffix}")
     if (folder / "images").is_dir() or any(_has_video(folder / place) for place in FRAME_FOLDERS):
         return MATCH
     hint = "Put the videos next to it or into videos/, and open the folder above."
     return Probe(False, seen=found[0].relative_to(folder).as_posix(), lacks="no matching video", hint=hint)
+
+
+def _damaged(folder: Path, suffix: str) -> Probe | None:
+    """Names the first file of this suffix that cannot be read; None where all can."""
+    for path in calibrations(folder, suffix)[:MAX_TRIED]:
+        try:
+            read_calibration(path)
+        except CaptureError as error:
+            seen = f"{path.name}, of which {error.message[0].lower()}{error.message[1:].rstrip('.')}"
+            return Probe(False, seen=seen, lacks="that cannot be read", hint=_AGAIN)
+    return None
 
 
 def _has_video(folder: Path) -> bool:
@@ -202,4 +213,4 @@ def described_cameras(
     said = [note] if note else []
     if left_out:
         said.append(f"Cameras of the calibration that have no video are left out: {shortened(left_out)}.")
-    return found, said
+    return found, [*said, *search.left_over()]

@@ -28,6 +28,7 @@ class FrameSearch:
         self._folder, self._follow_links, self._named_in = folder, follow_links, named_in
         self._directories = tuple(directories)
         self._places: list[tuple[str, str, bool]] = []  # name without suffix, place below the folder, is a video
+        self._taken: set[str] = set()  # plain names of places that belong to a camera
         for directory in directories:
             inside = folder / directory if directory else folder
             try:
@@ -53,6 +54,7 @@ class FrameSearch:
         for name in names:
             for known, place, is_video in self._places:
                 if known == name:
+                    self._taken.add(plain_name(known))
                     return self._at(place, is_video=is_video)
         for name in names:
             alike = [found for found in self._places if plain_name(found[0]) == plain_name(name)]
@@ -61,6 +63,7 @@ class FrameSearch:
                 hint = f"Name one of them {shown(name)}."
                 raise CaptureError(f"Its frames may be {several}.", hint=hint, path=self._named_in)
             if alike:
+                self._taken.add(plain_name(name))
                 return self._at(alike[0][1], is_video=alike[0][2])
         return None
 
@@ -105,9 +108,15 @@ class FrameSearch:
             found = dict(by_order(list(cameras), videos))
             note = "No video is named after its camera; they are taken in name order, as Pose2Sim does"
         pairs = shortened([f"{name} is {video}" for name, video in found.items()])
+        self._taken.update(plain_name(os.path.splitext(os.path.basename(video))[0]) for video in found.values())
         options = {"follow_links": self._follow_links, "named_in": self._named_in}
         paths = {name: place_in(self._folder, video, **options) for name, video in found.items()}
         return paths, f"{note}: {pairs}." if found and note else ""
+
+    def left_over(self) -> list[str]:
+        """A sentence about videos that belong to none of the cameras asked for so far; none where all do."""
+        videos = [place for known, place, is_video in self._places if is_video and plain_name(known) not in self._taken]
+        return [f"Videos of which the calibration has no camera are left out: {shortened(videos)}."] if videos else []
 
     def masks(self, names: Sequence[str], frames: Files) -> tuple[Files | None, str]:
         """Masks that fit the frames of a camera: a video, or for each image one of the same name.

@@ -37,6 +37,8 @@ SUFFIX = ".xml"
 LENS_KEYS = ("k1", "k2", "p2", "p1", "k3")
 """As the file spells them, in OpenCV's order."""
 _CAMERAS = ("chunk", "cameras")
+_OFF = ("false", "0")
+"""Of a camera that is switched off, as new and old versions write it."""
 
 
 def probe(folder: Path) -> Probe:
@@ -80,7 +82,7 @@ def _cameras_in(root: XmlElement) -> list[NamedCamera]:
         components = {one.attributes.get("id", ""): one for one in chunk.inside("components", "component")}
         cameras = [*chunk.inside("cameras", "camera"), *chunk.inside("cameras", "group", "camera")]
         for camera in cameras:
-            if not any(True for _ in camera.inside("transform")) or camera.attributes.get("enabled") == "false":
+            if not any(True for _ in camera.inside("transform")) or camera.attributes.get("enabled") in _OFF:
                 continue
             places = [
                 chunk,

@@ -106,6 +106,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
             cameras.append(camera)
     if left_out:
         warnings.append(f"Cameras that the calibration ignores are left out: {shortened(left_out)}.")
+    warnings += search.left_over()
     return assemble(folder, FORMAT, cameras, problems=findings.problems, warnings=warnings, said_in=path)
 
 

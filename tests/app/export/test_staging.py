@@ -99,7 +99,7 @@ def test_too_little_room_is_said_before_work_starts(tmp_path: Path, monkeypatch:
 
     monkeypatch.setattr(staging.shutil, "disk_usage", lambda _: Usage)
     check_target(tmp_path / "a.ply", n_bytes=30_000_000)
-    with pytest.raises(ProjectError, match="About 40 MB will be written, but only 52 MB are free"):
+    with pytest.raises(DiskError, match="About 40 MB will be written, but only 52 MB are free"):
         check_target(tmp_path / "a.ply", n_bytes=40_000_000)
 
 

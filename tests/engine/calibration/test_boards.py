@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -12,14 +13,14 @@ from PIL import Image
 
 from engine.calibration.boards import detection
 from engine.calibration.boards.board import Board, dictionaries, read_board
-from engine.calibration.boards.calibrating import _finished
+from engine.calibration.boards.calibrating import BoardProgress, _finished, calibrate_by_board
 from engine.calibration.boards.detection import BoardStyle, BoardView, find_style, finder, other_markers
 from engine.calibration.boards.printing import draw_board, write_board
-from engine.calibration.boards.solution import BoardSolution, solve_boards
+from engine.calibration.boards.solution import BoardSolution, _said_apart, solve_boards
 from engine.calibration.calibrated import Calibration
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.videos import PlainVideo
-from engine.errors import CaptureError
+from engine.errors import CaptureError, PreparationError
 from tests.engine.calibration.made_boards import BOARD, SIZE, BoardPictures, held_boards, ring, views_of
 from tests.engine.calibration.made_rigs import off_truth
 
@@ -65,9 +66,15 @@ def test_a_board_is_read_and_written_as_text(text: str, board: Board) -> None:
         ("charuco:7x5", "does not describe"),
         ("charuco:7:0.04:0.03", "cannot be read"),
         ("charuco:7x5:nan:0.03", "larger than 0"),
+        ("charuco:7x5:40:30", "Squares and markers of 40 and 30 m"),
         ("charuco:7x5:0.03:0.04", "do not fit"),
         ("charuco:7x5:0.04:0.03:9X9_50", "not a dictionary"),
         ("charuco:20x20:0.04:0.03:4X4_50", "needs 200 markers; 4X4_50 has 50"),
+        (
+            "charuco:45x45:0.04:0.03:4X4_50",
+            "needs 1012 markers; 4X4_50 has 50. Take a larger dictionary: [A-Z0-9_, ]*AR",
+        ),
+        ("charuco:90x90:0.04:0.03:4X4_50", "needs 4050 markers; 4X4_50 has 50. At most 2320 are known"),
         ("chessboard:999999999x6:0.03", "must be 3 to 100"),
         ("chessboard:8x6:0.03", "looks the same"),
     ],
@@ -123,7 +130,25 @@ def test_up_is_away_from_a_board_that_lies_on_the_floor() -> None:
 def test_nothing_in_common_is_no_calibration() -> None:
     alone = [{row: view} for moment in views() for row, view in moment.items()]
     said = solve_boards(alone[:40], BOARD.corners, np.tile(SIZE, (N_CAMERAS, 1)), "simple")
-    assert said == "no two cameras saw the board at the same moment in enough places"
+    assert said == "no two of them saw the board at the same moment"
+
+
+def test_cameras_keep_their_names_where_none_could_be_placed(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = SimpleNamespace(n_frames=7)
+    videos = [PlainVideo(name, source, SIZE, 30.0) for name in ("left {1}", "right")]  # type: ignore[arg-type]
+    monkeypatch.setattr("engine.calibration.boards.calibrating.board_views", lambda *_: [{}] * 7)
+    with pytest.raises(PreparationError) as caught:
+        calibrate_by_board(videos, BOARD, CalibrationOptions(), BoardProgress(lambda _: None, lambda _: None))
+    why = "the board was found in 0 pictures of it; 6 are needed"
+    assert caught.value.message == f"No two cameras could be placed: left {{1}}: {why}, right: {why}."
+
+
+def test_how_often_two_cameras_saw_the_board_together_is_said() -> None:
+    pose = np.eye(3), np.zeros(3)
+    assert (
+        _said_apart([{0: pose, 2: pose}] * 3)
+        == "{0} and {2} saw the board together most often, 3 times, and 4 have to agree"
+    )
 
 
 @pytest.mark.parametrize("style", [BoardStyle(), BoardStyle(is_inverted=True)])

@@ -23,13 +23,17 @@ def realitycapture(folder: Path) -> Path:
     return folder / "cam2.xmp"
 
 
-def test_what_is_not_aligned_or_switched_off_is_left_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize("word", ["false", "0"])
+def test_what_is_not_aligned_or_switched_off_is_left_out(tmp_path: Path, word: str) -> None:
     path = metashape(tmp_path)
     text = path.read_text()
     path.write_text(
-        text.replace('component_id="7" label="cam10.jpg"', 'component_id="7" label="cam10.jpg" enabled="false"')
+        text.replace('component_id="7" label="cam10.jpg"', f'component_id="7" label="cam10.jpg" enabled="{word}"')
     )
-    assert open_capture(tmp_path).rig.names == ("cam1", "cam2", "cam11")
+    capture = open_capture(tmp_path)
+    assert capture.rig.names == ("cam1", "cam2", "cam11")
+    said = "Videos of which the calibration has no camera are left out: videos/cam10.mp4."
+    assert said in capture.warnings
 
 
 @pytest.mark.parametrize(
@@ -69,9 +73,20 @@ def test_other_xml_and_the_metadata_of_photographs_are_no_calibrations(tmp_path:
         open_capture(tmp_path)
 
 
+def test_what_is_cut_off_or_has_no_camera_in_place_is_said(tmp_path: Path) -> None:
+    path = metashape(tmp_path / "m")
+    path.write_text(path.read_text()[:900])
+    with pytest.raises(CaptureError, match=r"cameras.xml, of which the file is not XML .* that cannot be read"):
+        open_capture(path.parent)
+    path.write_text(re.sub(r"<transform>[-+.e\d ]+</transform>", "", metashape(tmp_path / "m").read_text()))
+    with pytest.raises(CaptureError, match=r"No calibrated camera is in it.*placed and switched on"):
+        open_capture(path.parent)
+
+
 def test_a_camera_without_frames_is_left_out_and_named(tmp_path: Path) -> None:
     realitycapture(tmp_path)
     (tmp_path / "cam10.mp4").unlink()
     capture = open_capture(tmp_path)
     assert capture.rig.names == ("cam1", "cam2", "cam11")
     assert any("cam10" in warning for warning in capture.warnings)
+    assert not any(warning.startswith("Videos of which") for warning in capture.warnings)

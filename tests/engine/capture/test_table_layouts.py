@@ -208,3 +208,13 @@ def test_a_clock_survives_corrections(tmp_path: Path) -> None:
     assert shifted.n_frames == 3
     assert np.array_equal(shifted.frame(0, 0), before.frame(0, 1))
     assert np.array_equal(shifted.frame(3, 2), before.frame(3, 2))
+
+
+def test_a_video_whose_camera_is_not_in_the_toml_file_is_named(tmp_path: Path) -> None:
+    TABLES["anipose-opencv5"](tmp_path)
+    path = tmp_path / "Calib_scene.toml"
+    tables = path.read_text().split("\n\n")
+    path.write_text("\n\n".join(table for table in tables if 'name = "cam10"' not in table))
+    capture = open_capture(tmp_path)
+    assert "cam10" not in capture.rig.names
+    assert "Videos of which the calibration has no camera are left out: cam10.mp4." in capture.warnings

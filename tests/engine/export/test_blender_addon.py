@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from engine.assets import asset_path
-from engine.errors import DiskError
+from engine.errors import DiskError, ProjectError
 from engine.export.blender_addon import write_addon
 from engine.export.formats.table import FORMATS, FULL_PLY
 from tests.engine.export.scenes import chance_splats
@@ -76,6 +76,20 @@ def test_the_same_files_make_the_same_zip(tmp_path: Path):
     assert all(text.startswith(b"# SPDX-License-Identifier: MIT\n") for name, text in held.items() if ".py" in name)
     with pytest.raises(DiskError):
         write_addon(first)
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_an_installation_without_the_add_on_writes_no_empty_zip(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_there: bool
+):
+    lacking = tmp_path / "blender"
+    if is_there:
+        lacking.mkdir()
+    monkeypatch.setattr("engine.export.blender_addon.asset_path", lambda *_: lacking)
+    with pytest.raises(ProjectError, match=r"not in this installation\. Install the program again") as caught:
+        write_addon(tmp_path / "out")
+    assert not isinstance(caught.value, DiskError)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_description_becomes_a_sequence(addon: Any, tmp_path: Path):
