@@ -173,7 +173,7 @@ class Cluster:
             time.sleep(0.1)
         if not any(node.is_usable for node in self.nodes):
             error = self._nobody()
-            raise ProjectError(error.message)
+            raise ProjectError(error.message, hint="Change that there, or use other computers; see docs/cluster.md.")
 
     def _watch(self) -> None:
         while not self._is_closing.wait(WATCH_EVERY_S):

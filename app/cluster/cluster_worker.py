@@ -12,11 +12,13 @@ from app.cluster.cluster import Cluster
 from app.cluster.errands import CopiedProject, SharedProject
 from app.cluster.far_child import Errand, FarChild
 from app.cluster.nodes import Node, Seat
+from app.project.claims.holder_record import MachineLoad
 from app.project.project import Project
 from app.training.messages import (
     ENDINGS,
     Command,
     Event,
+    LoadReported,
     StageReported,
     Stop,
     TrainingFailed,
@@ -27,9 +29,11 @@ from app.training.messages import (
 )
 from app.training.process import BUILD, ProcessWorker, TrainTask
 from engine.children.kind import ChildKind
+from engine.clip_files.clip_state import read_clip_header
 from engine.errors import EngineError
 
 MAX_RETRIES = 3
+"""In a row, without a newer checkpoint in the project: a computer may be lost as often as a clip gets further."""
 WAITING = "Waiting for a computer"
 SENDING = "Copying the capture"
 _OF_THE_CAPTURE = ("CaptureError", "OutsideError", "ProjectGone")
@@ -62,7 +66,8 @@ class ClusterWorker:
         self._avoided: list[Node] = []
         self._said: list[Event] = []
         self._is_whole = self._is_waiting = False
-        self._n_retries = 0
+        self._n_retries, self._reached = 0, -1
+        self._load: MachineLoad | None = None
         self._has_ended = False
 
     def send(self, command: Command) -> None:
@@ -130,16 +135,29 @@ class ClusterWorker:
         if self._stop is not None and attempt.child.pid is None:
             attempt.worker.close(timeout_s=0.0)
             return [self._stopped(self._stop)]
-        events = attempt.worker.poll()
+        events = self._load_of(attempt) + attempt.worker.poll()
         if not events or not isinstance(ending := events[-1], TrainingFailed | WorkerDied):
             return events
         why = self._why_again(ending, attempt)
-        if why is None or self._n_retries == MAX_RETRIES:
+        if why is None or not self._may_retry():
             return events
-        self._n_retries += 1
         self._leave()
         title = f"Clip {self.job.clip_index} resumes, on another computer if there is one"
         return [*events[:-1], WarningRaised(title, f"{why.rstrip('.')}.")]
+
+    def _load_of(self, attempt: NodeAttempt) -> list[Event]:
+        if attempt.child.load is self._load or attempt.child.load is None:
+            return []
+        self._load = attempt.child.load
+        return [LoadReported(self._load)]
+
+    def _may_retry(self) -> bool:
+        """Whether another attempt is due: the last ones have got further, or there were few."""
+        header = read_clip_header(self._project.checkpoint_path(self.job.clip_index))
+        step = -1 if header is None else header.step
+        self._n_retries = 1 if step > self._reached else self._n_retries + 1
+        self._reached = max(step, self._reached)
+        return self._n_retries <= MAX_RETRIES
 
     def _why_again(self, ending: TrainingFailed | WorkerDied, attempt: NodeAttempt) -> str | None:
         """Why another attempt may succeed, elsewhere if possible; None where it would be the same."""

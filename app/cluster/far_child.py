@@ -12,6 +12,7 @@ from typing import Any, Literal, Protocol, TypeVar
 
 from app.cluster.nodes import Seat
 from app.cluster.ray_library import ray_library
+from app.project.claims.holder_record import MachineLoad
 from engine.children.kind import ChildFailed, ChildKind, Event, Job, Result
 from engine.children.messages import Refusal, decoded, encoded
 from engine.children.process import END_TIMEOUT_S, Child
@@ -120,6 +121,8 @@ class FarChild(Child[Job, Event, Result]):
         """Why it gave no answer: the other computer was lost, could not do something, or this one could not."""
         self.pid: int | None = None
         """Its process there; None before it runs."""
+        self.load: MachineLoad | None = None
+        """How busy the other computer was when it was last asked."""
         self._thread = threading.Thread(target=self._work, name=f"child on {self._name}", daemon=True)
         self._thread.start()
 
@@ -156,11 +159,13 @@ class FarChild(Child[Job, Event, Result]):
         job = self._errand.begin(self._remote)
         self.pid = self._remote.call("start", self.kind.place, encoded(job), self._environment)
         while True:
-            said, ending = self._remote.call("exchange", self._told(), EXCHANGE_EVERY_S)
+            said, ending, load = self._remote.call("exchange", self._told(), EXCHANGE_EVERY_S)
             events = [decoded(data, self.kind.event) for data in said]
             self._errand.receive(self._remote, events)
             for event in events:
                 self._say(event)
+            if load is not None:
+                self.load = decoded(load, MachineLoad)
             if ending is not None:
                 return self._ended(*ending)
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from app.cluster.mirror import Mirror
 from app.cluster.versions import versions
+from app.project.claims.holder_record import machine_load
 from engine.capture.capture import open_capture
 from engine.children.kind import ChildFailed, ChildKind, find
 from engine.children.messages import Refusal, decoded, encoded
@@ -26,6 +27,8 @@ from engine.portable import Processor, cpu_kind
 
 ALONE_AFTER_S = 120.0
 """A driver that has said nothing for so long has lost this computer."""
+LOAD_EVERY_S = 2.0
+"""Between two words on how busy this computer is."""
 _NEWEST_COUNTS = ("StepReported", "Progress")
 """Events of which only the last in a row is passed on."""
 
@@ -83,6 +86,7 @@ class Runner:
         self._child: ChildProcess[Any, Any, Any] | None = None
         self._mirror: Mirror | None = None
         self._asked_s = time.monotonic()
+        self._load_said_s = -LOAD_EVERY_S
         threading.Thread(target=self._watch, daemon=True).start()
 
     @_answered
@@ -99,12 +103,14 @@ class Runner:
         return self._child.pid
 
     @_answered
-    def exchange(self, messages: list[bytes], wait_s: float) -> tuple[list[bytes], tuple[str, Any, bool] | None]:
+    def exchange(
+        self, messages: list[bytes], wait_s: float
+    ) -> tuple[list[bytes], tuple[str, Any, bool] | None, bytes | None]:
         """Pass messages on to the child, and wait for its answers, which come together.
 
         Returns:
             Events, encoded; and once it is over its ending: "result", "refused" or "failed", encoded or in words, and
-            whether it would be so again.
+            whether it would be so again. And now and then how busy this computer is, a MachineLoad, encoded.
         """
         child = self._child
         assert child is not None
@@ -121,7 +127,10 @@ class Runner:
                 if events and name in _NEWEST_COUNTS and type(events[-1]).__name__ == name:
                     events.pop()
                 events.append(event)
-        return [encoded(event) for event in events], self._ending(child) if is_over else None
+        ending, load = self._ending(child) if is_over else None, None
+        if self._asked_s - self._load_said_s >= LOAD_EVERY_S:
+            self._load_said_s, load = self._asked_s, encoded(machine_load())
+        return [encoded(event) for event in events], ending, load
 
     def _ending(self, child: ChildProcess[Any, Any, Any]) -> tuple[str, Any, bool]:
         try:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from app.background.latest import nothing
 from app.project.claims.claims import lost_claim
-from app.project.claims.holder_record import ClipProgress
+from app.project.claims.holder_record import ClipProgress, MachineLoad
 from app.project.clips.clip_catalog import ClipRecord
 from app.project.clips.finished_clip import take_in
 from app.project.project import Project
@@ -24,6 +24,7 @@ from app.training.messages import (
     Command,
     Event,
     HeldOutMeasured,
+    LoadReported,
     Pause,
     Resume,
     SetSnapshots,
@@ -96,6 +97,7 @@ class ClipRun:
         stage, last_step: The worker's last reports.
         check: Raises ProjectError where a clip may no longer be put in its place by this process.
         pid, machine: Process of the worker, and its computer; None and empty before it has reported them.
+        load: Of that computer, where it is another one.
         worker_number: Which of the workers side by side it has, from 1.
         live_view: How often its worker writes snapshots now, one of LIVE_VIEWS.
         began_s: When it was started, by time.monotonic.
@@ -114,6 +116,7 @@ class ClipRun:
     last_step: StepReported | None = None
     pid: int | None = None
     machine: str = ""
+    load: MachineLoad | None = None
     worker_number: int = 1
     live_view: str = "live"
     began_s: float = field(default_factory=time.monotonic)
@@ -170,6 +173,7 @@ class ClipRun:
             self.eta_s,
             self.held_out_psnr,
             time.monotonic() - self.began_s,
+            self.load,
         )
 
     @property
@@ -268,6 +272,8 @@ class ClipRun:
         match event:
             case WorkerReady(pid=pid, machine=machine):
                 self.pid, self.machine = pid, machine
+            case LoadReported():
+                self.load = event.load
             case StageReported():
                 self.stage = event
             case StepReported():

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from msgspec import Struct, field
 
+from app.project.claims.holder_record import MachineLoad
 from engine.backends.table import chosen_name
 from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
@@ -119,6 +120,12 @@ class WorkerReady(Struct, frozen=True, tag=True):
     machine: str = ""
 
 
+class LoadReported(Struct, frozen=True, tag=True):
+    """How busy the computer of the worker is, where that is another one."""
+
+    load: MachineLoad
+
+
 class StageReported(Struct, frozen=True, tag=True):
     """How far a preparation stage is. done in 0..1"""
 
@@ -214,6 +221,7 @@ class WorkerDied(Struct, frozen=True, tag=True):
 Command = Pause | Resume | Stop | SnapshotNow | SnapshotConsumed | SetSnapshots
 Event = (
     WorkerReady
+    | LoadReported
     | StageReported
     | StepReported
     | HeldOutMeasured

@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from functools import partial
 from itertools import count
+from typing import NamedTuple
 
+from app.background.in_turn import InTurn
 from app.project.claims.asks import Ask
 from app.project.claims.claims import Claims, ClipClaimed, Elsewhere
 from app.project.claims.holder_record import ClipProgress
@@ -34,6 +37,7 @@ from app.training.process import ProcessWorker, Worker
 from app.training.runs.looked_at import LookedAt
 from app.training.train_queue import FINISHED, OwnSettings, TrainQueue, drop_hopeless, needed_clips
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import read_clip_header
 from engine.errors import DiskError, ProjectError
 from engine.portable import NATIVE, Processor
@@ -43,6 +47,20 @@ Launch = Callable[[TrainJob, Project], Worker]
 ClipEvent = tuple[int, Event]
 """A clip, and an event of its worker."""
 CLOSE_TIMEOUT_S = 5.0
+PATIENCE_S = 0.05
+"""For so long a window waits for a claim, which a disk nearby gives at once."""
+
+
+class Claimed(NamedTuple):
+    """What the disk says of a clip that is claimed now.
+
+    Attributes:
+        handed_over: Header of the trained clip that an earlier process has left; None without one.
+        n_holders: How many processes train clips of the project.
+    """
+
+    handed_over: ClipHeader | None
+    n_holders: int
 
 
 class TrainingService:
@@ -100,6 +118,8 @@ class TrainingService:
         self._next: int | None = None
         self._next_of: tuple[tuple[int, ...], object] = ((), None)
         self.claims = Claims(project.folder, describe=self._described) if claims is None else claims
+        self._disk = InTurn("claims of clips", is_apart=is_window_open)
+        self._claiming: tuple[int, int, Future[Claimed]] | None = None  # a clip, how many share the cores, its claim
         self._ended_elsewhere: list[ClipEvent] = []
         self._known_elsewhere: Mapping[str, Elsewhere] = self.claims.elsewhere
         self._elsewhere: tuple[Mapping[str, Elsewhere], dict[int, Elsewhere]] = ({}, {})
@@ -131,8 +151,8 @@ class TrainingService:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a clip trains."""
-        return bool(self.runs)
+        """Whether a clip trains, or is about to."""
+        return bool(self.runs) or self._claiming is not None
 
     @property
     def leading(self) -> ClipRun | None:
@@ -312,6 +332,7 @@ class TrainingService:
 
     def close(self, *, timeout_s: float = CLOSE_TIMEOUT_S) -> None:
         """End the workers, keeping progress."""
+        is_busy = self.is_busy
         self.queue.clear()
         for run in self.runs.values():
             run.stop()  # all of them at once
@@ -319,18 +340,46 @@ class TrainingService:
             run.close(timeout_s=timeout_s)
             self.catalog.update(clip_index)
         self.runs = {}
-        self.claims.close()
+        self._claiming = None
+        self._disk.do(self.claims.close, wait_s=timeout_s if is_busy else PATIENCE_S)
+        self._disk.close()
         if self._owns_curves:
             self.curves.close()
 
     # ---------------------------------------------------------------- starting and ending
 
     def _start_waiting(self) -> None:
-        while self.queue and not self.queue.is_held and len(self.runs) < self.n_workers:
+        """Claim clips, and train those that are claimed here. On a slow disk a window goes on meanwhile, and `poll`
+        takes up the claim."""
+        if self._claiming is not None and self._claiming[2].done():
+            (clip_index, n_beside, claim), self._claiming = self._claiming, None
+            self._start(clip_index, claim, n_beside=n_beside)
+        is_waiting = self._claiming is not None
+        while not is_waiting and self.queue and not self.queue.is_held and len(self.runs) < self.n_workers:
             ready = self._ready()
             if not ready:
                 return
-            self._start(ready[0], n_beside=min(len(self.runs) + len(ready), self.n_workers))  # or leave it to another
+            n_beside = min(len(self.runs) + len(ready), self.n_workers)
+            claim = self._disk.do(partial(self._claim, ready[0]), wait_s=PATIENCE_S)
+            if claim.done():
+                self._start(ready[0], claim, n_beside=n_beside)
+            else:
+                self._claiming, is_waiting = (ready[0], n_beside, claim), True
+
+    def _claim(self, clip_index: int) -> Claimed:
+        """On the thread for the disk. Raises ClipClaimed, DiskError."""
+        try:
+            self.claims.take(self.project.clip_name(clip_index))
+        except ClipClaimed:
+            self.claims.watch()
+            raise
+        files = self.project.files(clip_index)
+        for path in (files.clip, files.checkpoint):
+            self.project.headers.read(path)  # which then knows them
+        return Claimed(read_clip_header(files.handed_over), self.claims.n_holders)
+
+    def _release(self, key: str) -> None:
+        self._disk.do(partial(self.claims.release, key), wait_s=0.0)
 
     def _ready(self) -> list[int]:
         """Waiting clips that need none that trains or waits before them, as many as there is room for; but for those
@@ -346,18 +395,19 @@ class TrainingService:
                 break
         return ready
 
-    def _start(self, clip_index: int, *, n_beside: int) -> None:
-        """n_beside: How many trainings share the cores."""
+    def _start(self, clip_index: int, claim: Future[Claimed], *, n_beside: int) -> None:
+        """Train a clip, or leave it to another process. n_beside: How many trainings share the cores."""
         refused: ProjectError | None = None
+        claimed = Claimed(None, 1)
         try:
-            self.claims.take(self.project.clip_name(clip_index))
+            claimed = claim.result()
         except ClipClaimed:
-            self.claims.watch()
             return  # it is among those elsewhere now, and waits until they have finished it or given it up
         except DiskError as error:
             refused = error
-        if self._is_finished_since(clip_index):
-            self.claims.release(self.project.clip_name(clip_index))
+        is_wanted = clip_index in self.queue and not self.queue.is_held
+        if not is_wanted or self._is_finished_since(clip_index):
+            self._release(self.project.clip_name(clip_index))
             return
         own = self.queue.take(clip_index)
         if own is not None:
@@ -370,14 +420,14 @@ class TrainingService:
             is_window_open=self._is_window_open,
             live_view=self.looked_at.mode_of(clip_index),
             n_beside=n_beside,
-            n_everywhere=max(self.n_workers, self.claims.n_holders),
+            n_everywhere=max(self.n_workers, claimed.n_holders),
             claim=self.claims.token,
             cpu=self._cpu,
         )
-        header = read_clip_header(self.project.files(clip_index).handed_over)
         if refused is not None:
             worker = HandedOver(job, TrainingFailed(type(refused).__name__, *refused.parts()))
-        elif header is not None:
+        elif claimed.handed_over is not None:
+            header = claimed.handed_over
             worker = HandedOver(job, ClipTrained(header.step, header.figures.held_out_psnr))
         else:
             worker = self._launch(job, self.project)
@@ -403,6 +453,8 @@ class TrainingService:
             taken += [(clip_index, event) for event in run.poll(until_s)]
             if run.ending is not None:
                 self._end(run)
+        if self._claiming is not None:
+            self._start_waiting()
         return taken
 
     def _look_elsewhere(self) -> list[ClipEvent]:
@@ -452,7 +504,7 @@ class TrainingService:
         clip_index = run.clip_index
         run.worker.close(timeout_s=0.5)
         del self.runs[clip_index]
-        self.claims.release(run.worker.job.key)
+        self._release(run.worker.job.key)
         self.last = run
         self.catalog.update(clip_index)  # also finds clips that are out of date by it
         self.queue.note_end(run.n_steps)

@@ -76,7 +76,9 @@ def running_clips(service: TrainingService) -> tuple[RunningClip, ...]:
 
 
 def _running(progress: ClipProgress, **known: Any) -> RunningClip:
-    return RunningClip(**(asdict(progress) | known))
+    said = asdict(progress)
+    del said["load"]  # see `machines`
+    return RunningClip(**(said | known))
 
 
 def _elsewhere(clip_index: int, other: Elsewhere) -> RunningClip:
@@ -90,6 +92,7 @@ def machines(service: TrainingService, trainings: Sequence[RunningClip]) -> list
     here, known = machine_name(), dict[str, MachineLoad]()
     for holder in service.claims.others:
         known[holder.owner.host] = holder.load
+    known |= {clip.machine: clip.load for clip in service.progress.values() if clip.load is not None}
     known[here] = service.claims.load
     counts = Counter(clip.machine or here for clip in trainings)
     found = list[MachineStatus]()

@@ -18,6 +18,7 @@ from app.session.editing import kept_document
 from app.session.projects.project_commands import OpenCapture
 from app.session.projects.settings import Settings
 from app.session.session import Session
+from app.training import service
 from app.training.messages import TrainJob
 from app.training.worker.interface import MakeTraining
 from engine.capture.capture import open_capture
@@ -48,6 +49,12 @@ def known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed, "is_cache_warm", lambda: True)
     monkeypatch.setattr(speed, "_known", {})
     monkeypatch.setattr(speed, "run_child", lambda *_, **__: 0.0123)
+
+
+@pytest.fixture(autouse=True)
+def disk_nearby(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Claims are waited for however busy the computer is."""
+    monkeypatch.setattr(service, "PATIENCE_S", DEADLINE_S)
 
 
 def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:

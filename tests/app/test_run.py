@@ -29,14 +29,14 @@ from tests.clip_headers import make_header
 class Bench:
     """A run with a clock that the test turns and commands that the test queues."""
 
-    def __init__(self, folder, capture_folder, *, n_steps=100, change=None) -> None:
+    def __init__(self, folder, capture_folder, *, n_steps=100, change=None, starting_s=0.0) -> None:
         capture = open_capture(capture_folder)
         self.project = create_project(folder, default_settings(capture))
         self.job = train_job(self.project, self.project.clips(capture.n_frames)[0])
         self.commands, self.events, self.now_s = [], [], 0.0
         self.is_alone = False
         self.training = None
-        self._n_steps, self._change = n_steps, change
+        self._n_steps, self._change, self._starting_s = n_steps, change, starting_s
         self.start()
 
     def start(self) -> None:
@@ -48,6 +48,7 @@ class Bench:
             send=self.events.append,
             make_training=self._make,
             can_wait=False,
+            starting_s=self._starting_s,
             clock=lambda: self.now_s,
         )
 
@@ -340,6 +341,13 @@ def test_the_rate_follows_and_leaves_pauses_out():
         rate.update(done=240.0 + second, now_s=1001.0 + second)
     assert rate.per_s == pytest.approx(1.0, rel=0.01)  # exp(-39/5) of the old speed is left
     assert rate.eta_s(10) == pytest.approx(10.0, rel=0.01)
+
+
+def test_starting_the_process_is_part_of_the_preparation(bench):
+    it = bench(n_steps=2, starting_s=3.0)
+    assert it.steps(10, each_s=0.0) is False
+    figures = read_clip_state(it.handed_over).header.figures
+    assert (figures.stages_s["Starting"], figures.preparation_s) == (3.0, 3.0)
 
 
 def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_were(bench):

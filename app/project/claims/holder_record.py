@@ -21,6 +21,20 @@ MAX_HOLDER_BYTES = 4_000_000
 """A driver with a thousand clips in training says less; a longer file is something else."""
 
 
+class MachineLoad(Struct, frozen=True):
+    """How busy a computer is.
+
+    Attributes:
+        n_cores: Of it.
+        load: Processes that want to run, a mean over the last minute; None where the system does not say.
+        free_mb: Memory that can still be had, 10^6 bytes; None where the system does not say.
+    """
+
+    n_cores: int = 1
+    load: float | None = None
+    free_mb: float | None = None
+
+
 class ClipProgress(Struct, frozen=True):
     """How far one clip in training is.
 
@@ -34,6 +48,7 @@ class ClipProgress(Struct, frozen=True):
         eta_s: Seconds until it is finished; None where unknown.
         held_out_psnr: dB; None where not measured yet.
         since_s: For how long it trains already.
+        load: Of that computer, where it is not the holder's; None where it is, or is not known.
     """
 
     clip_index: int
@@ -46,20 +61,7 @@ class ClipProgress(Struct, frozen=True):
     eta_s: float | None = None
     held_out_psnr: float | None = None
     since_s: float = 0.0
-
-
-class MachineLoad(Struct, frozen=True):
-    """How busy a computer is.
-
-    Attributes:
-        n_cores: Of it.
-        load: Processes that want to run, a mean over the last minute; None where the system does not say.
-        free_mb: Memory that can still be had, 10^6 bytes; None where the system does not say.
-    """
-
-    n_cores: int = 1
-    load: float | None = None
-    free_mb: float | None = None
+    load: MachineLoad | None = None
 
 
 class HolderRecord(Struct, frozen=True):

@@ -69,6 +69,7 @@ class TrainingRun:
         send: Takes events.
         make_training: Builds the training; its report function stays valid for the whole run.
         can_wait: Whether to sit still while paused, as a process does, or to return at once.
+        starting_s: What starting the process took before; part of the preparation.
         clock: Seconds; tests bring their own.
     """
 
@@ -82,6 +83,7 @@ class TrainingRun:
         make_training: MakeTraining,
         can_wait: bool = True,
         n_threads: int = 1,
+        starting_s: float = 0.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._job, self._open_store, self._receive, self._send = job, open_store, receive, send
@@ -95,7 +97,7 @@ class TrainingRun:
         self._reported: tuple[str, str, float] = ("", "", -math.inf)
         self._n_at_once = 1
         """Steps until numbers are read: about as many as go into REPORT_EVERY_S."""
-        self._watch = StageWatch(clock)
+        self._watch = StageWatch(clock, {STARTING: starting_s})
         self._record = StepRecord()
         self._keeper: Keeper | None = None
         self._paused_stage: str | None = None

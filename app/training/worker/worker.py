@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -62,6 +63,7 @@ def main(task: TrainTask, parent: Parent[Event]) -> None:
         send=send,
         make_training=find(task.make),
         n_threads=n_threads,
+        starting_s=time.process_time(),  # imports, which are little else than computing
     )
     while run.advance():
         pass

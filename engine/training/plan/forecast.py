@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from engine.clip_files.clip_header import ClipHeader
 from engine.training.preparation.picture_store import Shape, bytes_of
 
-_START_S, _CAMERA_S, _PICTURE_S = {True: 2.5, False: 3.5}, 0.45, 5e-3
-"""Rough preparation: of a source clip or not; of a camera whose depths are found; of a picture."""
-_DEPTHS_S = 0.15
-"""Likewise of a picture whose depths start from those of the frame before."""
+_START_S, _PICTURE_S = {True: 2.5, False: 3.5}, 5e-3
+"""Rough preparation: of a source clip or not; of a picture that is read."""
+_CAMERA_CORE_S, _DEPTHS_CORE_S = 0.9, 0.3
+"""Likewise of one core: of a camera whose depths are found; of a picture whose depths start from those of the frame
+before."""
 _PROGRAM_MB, _CACHE_MB = 650.0, 537.0
 """Python, torch, numba and compiled kernels; decoded pictures that a capture keeps at most."""
 
@@ -77,16 +78,21 @@ def median_of(values: Sequence[float | None]) -> float | None:
     return statistics.median(known) if known else None
 
 
-def rough_preparation_s(*, n_cameras: int, n_pictures: int, is_source: bool, is_by_frame: bool = False) -> float:
+def rough_preparation_s(
+    *, n_cameras: int, n_pictures: int, is_source: bool, n_cores: int, is_by_frame: bool = False
+) -> float:
     """Seconds before the first step, and between the phases of a reference clip, give or take half; kernels are
     compiled.
 
     Args:
+        n_pictures: That are read, those for backgrounds included.
+        n_cores: That find depths, each those of some cameras.
         is_by_frame: Whether depths are found in every picture, as with cloud=frames.
     """
     if is_by_frame:
-        return _START_S[is_source] + (_DEPTHS_S + _PICTURE_S) * n_pictures
-    return _START_S[is_source] + (0.0 if is_source else _CAMERA_S * n_cameras) + _PICTURE_S * n_pictures
+        return _START_S[is_source] + (_DEPTHS_CORE_S / n_cores + _PICTURE_S) * n_pictures
+    depths_s = 0.0 if is_source else _CAMERA_CORE_S * n_cameras / min(n_cores, n_cameras)
+    return _START_S[is_source] + depths_s + _PICTURE_S * n_pictures
 
 
 def rough_memory_mb(shape: Shape, *, n_read: int) -> float:

@@ -17,6 +17,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
+from engine.parallel import n_cores
 from engine.training.config import QUALITIES, TrainConfig
 from engine.training.phases import phases_of
 from engine.training.plan.forecast import MeasuredClip, median_of, rough_memory_mb, rough_preparation_s
@@ -248,8 +249,9 @@ def make_plan(
     timed_s = _timed_s(phases, lambda phase: step_time(sizes, phase)) if step_s is None else step_s * n_steps
     preparation_s = median_of([known.preparation_s for known in same]) or rough_preparation_s(
         n_cameras=footage.n_cameras,
-        n_pictures=n_pictures,
+        n_pictures=n_read,
         is_source=is_source,
+        n_cores=n_cores(),
         is_by_frame=config.cloud == "frames",
     )
     memory_mb = median_of([known.memory_mb for known in same]) or rough_memory_mb(

@@ -81,6 +81,17 @@ def test_bad_arguments_end_with_2_and_leave_nothing_behind(run, capture_folder, 
     assert not (tmp_path / "p").exists()
 
 
+@pytest.mark.parametrize("more", [[], ["--workers", "2"], ["--cluster", "local:1"]])
+def test_a_second_driver_of_a_project_is_refused_and_changes_nothing(run, make_opened, more) -> None:
+    opened = make_opened()
+    folder = opened.project.folder
+    before = sorted(folder.rglob("*"))
+    code, out, err = run("train", opened.capture.path, "--project", folder, *more)
+    assert (code, out) == (2, "")
+    assert "has this project open for writing" in err
+    assert sorted(folder.rglob("*")) == before
+
+
 def test_a_damaged_picture_found_while_training_is_bad_input(run, tmp_path):
     folder = write_capture(tmp_path / "c")
     code, _, err = run("train", folder, "--project", tmp_path / "p", make_training=_reads_pictures)

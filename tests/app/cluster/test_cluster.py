@@ -69,6 +69,7 @@ def test_a_lost_node_costs_no_clip(ray_cluster, caches, make_opened, kind) -> No
         driver.poll_until(lambda: bool(driver.on_node(doomed.node_id)) and 0 not in driver.service.runs)
         (lost,) = driver.on_node(doomed.node_id)
         driver.poll_until(lambda: driver.service.runs[lost].step > 1)
+        assert driver.service.runs[lost].load is not None, "how busy its computer is"
         ray_cluster.remove_node(doomed, allow_graceful=False)
         driver.run_out()
         sent, received = driver.cluster.bytes_sent, driver.cluster.bytes_received

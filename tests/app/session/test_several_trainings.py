@@ -3,16 +3,18 @@ for the clip that is looked at alone."""
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from app.project.claims import claims
 from app.project.claims.asks import take_ask
 from app.project.claims.claim_files import CLAIMS, ClaimFile, holder_path, make_claim
-from app.project.claims.holder_record import ClipProgress, HolderRecord, MachineLoad, write_holder
+from app.project.claims.holder_record import ClipProgress, HolderRecord, MachineLoad, machine_name, write_holder
 from app.project.lock import this_process
 from app.project.opening.opened_project import OpenedProject
 from app.project.project import Project
@@ -33,11 +35,13 @@ from app.session.training.train_commands import (
     TrainClips,
     TrainNextClip,
 )
-from app.training.messages import SetSnapshots, SnapshotNow, TrainJob
+from app.training import service as training_service
+from app.training.messages import LoadReported, SetSnapshots, SnapshotNow, TrainJob
 from app.training.process import Worker
+from app.training.training_status import machines, running_clips
 from app.training.worker import keeper
 from engine.errors import ProjectError
-from tests.app.conftest import inline, poll_until
+from tests.app.conftest import DEADLINE_S, inline, poll_until
 from tests.app.fakes import make_fake, make_slow, write_trained
 
 Make = Callable[..., Session]
@@ -194,6 +198,21 @@ def tell_of(session: Session, *clips: ClipProgress, beat: int = 1) -> None:
         make_claim(ClaimFile(folder, key, 1), record.token)
 
 
+def test_computers_of_a_cluster_are_shown_with_their_own_load(session: Session) -> None:
+    service = session.live_training.service
+    assert service is not None
+    service.runs[1].machine, service.runs[2].machine = "node-1", "node-2"
+    service.runs[1]._take(LoadReported(MachineLoad(8, 3.0, 1e4)))
+    tell_of(session, ClipProgress(4, "running", "node-3", load=MachineLoad(4, 0.5, 2e4)))
+    service.claims.look()
+    found = {
+        one.name: (one.n_clips, one.n_cores, one.load, one.free_mb) for one in machines(service, running_clips(service))
+    }
+    del found[machine_name()]
+    assert found == {"node-1": (1, 8, 3.0, 1e4), "node-2": (1, 0, None, None), "node-3": (1, 4, 0.5, 2e4)}
+    assert service._described()[service.project.clip_name(1)].load == MachineLoad(8, 3.0, 1e4), "for other windows"
+
+
 def test_a_clip_that_trains_elsewhere_is_shown_like_an_own_one(shared: Session) -> None:
     (one,) = shared.training.trainings
     assert (one.clip_index, one.machine, one.is_elsewhere, one.step, one.steps_per_s) == (1, "render-7", True, 30, 3.0)
@@ -289,3 +308,56 @@ def test_clips_train_on_a_cluster_from_when_it_is_joined(session: Session) -> No
     session.dispatch(LeaveCluster())
     poll_until(session, lambda: cluster.is_closed)
     assert (session.joining.address, session.training.n_workers) == ("", 2)
+
+
+@pytest.fixture
+def blocked(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """The disk does not answer to claims that are taken and released before this is set."""
+    may_go_on = threading.Event()
+
+    def waiting(function: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda *arguments: may_go_on.wait(DEADLINE_S) and function(*arguments)
+
+    monkeypatch.setattr(training_service, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(claims, "make_claim", waiting(claims.make_claim))
+    monkeypatch.setattr(claims, "remove_claim", waiting(claims.remove_claim))
+    yield may_go_on
+    may_go_on.set()
+
+
+def test_a_disk_that_does_not_answer_a_claim_holds_up_no_window(make_session: Make, blocked) -> None:
+    made = make_session(make_training=make_fake)
+    made.dispatch(SetClipLength(1))
+    made.dispatch(TrainNextClip())
+    for _ in range(5):
+        made.poll()
+    assert (made.training.n_running, made.training.queue, made.live_training.is_busy) == (0, (0,), True)
+    blocked.set()
+    poll_until(made, lambda: bool(made.training.n_running))
+    blocked.clear()
+    poll_until(made, lambda: made.clip_states[0].state == "trained" and not made.training.n_running)
+    made.dispatch(TrainNextClip())
+    made.poll()
+    assert made.training.queue == (1,), "its claim waits for the release of the first"
+    blocked.set()
+    poll_until(made, lambda: made.clip_states[1].state == "trained")
+
+
+@pytest.mark.parametrize("ending", ["stopped", "closed"])
+def test_a_claim_that_comes_too_late_is_released(make_session: Make, blocked, ending: str) -> None:
+    made = make_session(make_training=make_fake)
+    project = made.live_training.opened_project.project
+    made.dispatch(TrainNextClip())
+    if ending == "stopped":
+        made.dispatch(StopTraining())
+        assert made.training.queue == ()
+        blocked.set()
+        poll_until(made, lambda: not made.live_training.is_busy)
+    else:
+        threading.Timer(0.2, blocked.set).start()
+        made.close()
+    until_s = time.monotonic() + DEADLINE_S
+    while list((project.folder / CLAIMS).iterdir()):
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
+    assert not project.is_trained(0)

@@ -15,6 +15,7 @@ from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
 from engine.training.config import TrainConfig
+from engine.training.plan import plan as plan_module
 from engine.training.plan.forecast import MeasuredClip, measured_clip
 from engine.training.plan.measured_steps import measured_step_s
 from engine.training.plan.plan import Footage, StepSizes, footage_of, make_plan, resumed_plan
@@ -22,6 +23,8 @@ from tests.clip_headers import make_header
 
 SAMPLE = Footage(width=320, height=240, n_cameras=18, n_held_out=2, n_frames=30)
 BASKETBALL = Footage(width=640, height=360, n_cameras=27, n_held_out=4, n_frames=40)
+HALF = Footage(width=320, height=180, n_cameras=27, n_held_out=4, n_frames=40)
+FIVE = Clip(clip_index=0, start=0, n_frames=5, clip_length=5)
 CLIP = Clip(clip_index=0, start=0, n_frames=10, clip_length=10)
 NEXT = Clip(clip_index=1, start=10, n_frames=10, clip_length=10)
 STEP_S = {"static": 0.01, "joint": 0.02, "moving": 0.02, "source": 0.03}
@@ -170,17 +173,20 @@ def test_steps_are_timed_at_the_sizes_of_the_reference_clip_or_expected_ones():
 
 
 @pytest.mark.parametrize(
-    ("footage", "is_source", "took"),
+    ("footage", "clip", "is_source", "cores", "took"),
     [
-        # preparation and memory of real trainings, two shared cores
-        (BASKETBALL, False, (21.8, 1400.0)),
-        (BASKETBALL, True, (4.7, 1205.0)),
-        (SAMPLE, False, (10.2, 831.0)),
-        (SAMPLE, True, (2.77, 745.0)),
+        # preparation and memory of real trainings
+        (BASKETBALL, CLIP, False, 2, (21.8, 1400.0)),
+        (BASKETBALL, CLIP, True, 2, (4.7, 1205.0)),
+        (SAMPLE, CLIP, False, 2, (10.2, 831.0)),
+        (SAMPLE, CLIP, True, 2, (2.77, 745.0)),
+        (HALF, CLIP, False, 2, (27.6, 1086.0)),
+        (HALF, FIVE, False, 1, (49.2, 1078.0)),
     ],
 )
-def test_rough_figures_lie_within_a_factor_of_one_and_a_half(footage, is_source, took):
-    found = plan(footage, is_source=is_source)
+def test_rough_figures_lie_within_a_factor_of_one_and_a_half(monkeypatch, footage, clip, is_source, cores, took):
+    monkeypatch.setattr(plan_module, "n_cores", lambda: cores)
+    found = plan(footage, clip, is_source=is_source)
     for expected, measured_value in zip((found.preparation_s, found.memory_mb), took, strict=True):
         assert 1 / 1.5 < expected / measured_value < 1.5
 
