@@ -80,7 +80,7 @@ class Browser:
         self._number, self._text = 0, b""
         from_us, self._to = _pipe()
         self._from, to_us = _pipe()
-        log = os.open(folder / "chromium.log", os.O_CREAT | os.O_WRONLY)
+        log = _moved_up(os.open(folder / "chromium.log", os.O_CREAT | os.O_WRONLY))
         arguments = [
             program,
             *FLAGS,
@@ -240,9 +240,12 @@ class Browser:
 
 
 def _pipe() -> tuple[int, int]:
-    """Ends that are not among the first few numbers, which the browser expects its own ends at."""
-    ends = []
-    for end in os.pipe():
-        ends.append(fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, _FIRST_FREE_FD))
-        os.close(end)
-    return ends[0], ends[1]
+    ours, theirs = map(_moved_up, os.pipe())
+    return ours, theirs
+
+
+def _moved_up(descriptor: int) -> int:
+    """The same, but not among the first few numbers, which the browser expects its own ends at."""
+    moved = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, _FIRST_FREE_FD)
+    os.close(descriptor)
+    return moved

@@ -101,7 +101,7 @@ def header(*, title: str = "A scene", names: Sequence[str] = ("a", "b", "c", "d"
         "background": list(BACKGROUND),
         "up": [0.0, -1.0, 0.0],
         "radius": 4.0,
-        "stage": {"floor": FLOOR, "meters_per_unit": METERS_PER_UNIT},
+        "stage": {"floor": FLOOR, "meters_per_unit": METERS_PER_UNIT, "is_measured": False},
         "home": home,
         "cameras": cameras,
         "clips": [],

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 import threading
+import time
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript", ".bin": "application/octet-stream"}
+
+PAUSE_S = 0.01
 
 
 class RangeServer:
@@ -19,6 +22,7 @@ class RangeServer:
         failing: How often each file of this name still ends in an error.
         failure: The status of these.
         held: By file name, what requests wait for before they are answered.
+        piece_bytes: What is sent at once, with a pause after each piece; None to send all at once.
         asked: File name and Range of every request, in order.
         n_sent: Bytes of bodies.
     """
@@ -27,6 +31,7 @@ class RangeServer:
         self.folder, self.has_ranges, self.failure = folder, True, 503
         self.failing: dict[str, int] = {}
         self.held: dict[str, threading.Event] = {}
+        self.piece_bytes: int | None = None
         self.asked: list[tuple[str, str]] = []
         self.n_sent = 0
         self._server = _Server(("127.0.0.1", 0), partial(_Handler, self))
@@ -88,7 +93,10 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header("Content-Range", f"bytes {found[1]}-{int(found[1]) + len(data) - 1}/{whole}")
         self.end_headers()
         try:
-            self.wfile.write(data)
+            size = owner.piece_bytes or max(len(data), 1)
+            for at in range(0, len(data), size):
+                self.wfile.write(data[at : at + size])
+                time.sleep(PAUSE_S if owner.piece_bytes else 0.0)
             owner.n_sent += len(data)
         except (BrokenPipeError, ConnectionResetError):
             self.close_connection = True

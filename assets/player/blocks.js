@@ -65,7 +65,7 @@ class Blocks {
         timer = setTimeout(stop, STALLED_MS);
         this.nReceived += value.length;
         const skipped = Math.min(Math.max(ends[first] - at, 0), value.length);
-        const from = at + skipped - ends[first], part = value.subarray(skipped, skipped + wanted.length - from);
+        const from = Math.max(at + skipped - ends[first], 0), part = value.subarray(skipped, skipped + wanted.length - from);
         wanted.set(part, from);
         at += value.length;
         while (level < upTo && at >= ends[level + 1]) {

@@ -8,8 +8,10 @@ const MARK_COLOR = [0.337, 0.706, 0.914, 0.9];
 const EYE_HEIGHT_M = 1.6; // where the floor is not known
 const SORT_TURN = 0.01, SORT_WAY = 0.002; // radians, and of the scene's radius: less does not change the order visibly
 const SLOW_FRAMES = 30, LATE = 1.4, LEAST_SHARE = 0.5; // fewer lines are drawn after so many frames that come so late
+const NEAREST_HANDS_M = 0.05; // nearer ones would resize by chance
 const BUTTON_A = 4, BUTTON_B = 5;
-const SAID_MS = 8000; // so long it is said why there is no session
+const SAID_MS = 8000; // so long words are there that nothing else takes away
+const WAY_TO_RESIZE = "Squeeze both controllers and pull them apart or together to change its size.";
 
 class Headset {
   constructor(player, button) {
@@ -17,6 +19,9 @@ class Headset {
     this.button = button;
     this.session = null;
     this.isPlaced = false; // in the scene
+    const { is_measured } = player.header.stage;
+    this.advice = `${is_measured ? "The scene has its true size at first." : "The size of the scene is a guess."} ${WAY_TO_RESIZE}`;
+    button.title = `Stand in the scene. ${this.advice}`;
     button.onclick = () => this.begin();
     if (!navigator.xr) return;
     this.look();
@@ -35,11 +40,11 @@ class Headset {
     try {
       this.session = await navigator.xr.requestSession("immersive-vr", { optionalFeatures: ["local-floor"] });
       await this.start();
+      player.pictures.interrupt(this.advice, SAID_MS);
     } catch (error) {
       if (this.session) await this.session.end().catch(() => {});
       this.session = null;
-      button.title = `The headset did not start: ${error.message}`;
-      player.pictures.interrupt(button.title, SAID_MS);
+      player.pictures.interrupt(`The headset did not start: ${error.message}`, SAID_MS);
     }
     button.disabled = false;
   }
@@ -55,7 +60,14 @@ class Headset {
     player.pictures.forget(); // the page may have been painted, or sorted elsewhere
     const { gl } = player.renderer;
     session.addEventListener("select", (event) => this.select(event));
-    session.addEventListener("squeeze", () => this.play());
+    this.squeezing = new Set();
+    this.apart = null; // how far from each other two squeezed controllers were
+    this.hasResized = false;
+    session.addEventListener("squeezestart", ({ inputSource }) => this.squeezing.add(inputSource));
+    session.addEventListener("squeezeend", ({ inputSource }) => {
+      this.squeezing.delete(inputSource);
+      if (!this.hasResized) this.play();
+    });
     await gl.makeXRCompatible();
     session.updateRenderState({ baseLayer: new XRWebGLLayer(session, gl, { antialias: false, depth: false, alpha: false }) });
     this.space = await this.floor(session);
@@ -109,6 +121,7 @@ class Headset {
     }
     const marks = [...session.inputSources].flatMap((source) => this.follow(source, frame) || []);
     if (!this.session) return; // a button ended it
+    this.resize(frame);
     this.sort(this.stage.worldToCamera(pose.transform.inverse.matrix).slice(8, 12));
     this.keepPace(nowMs);
     this.draw(pose, marks);
@@ -171,6 +184,18 @@ class Headset {
     const target = now.isAiming || was.isAiming ? this.aim(source, frame) : null;
     if (target && !now.isAiming && !now.isTurned) this.stage.go(target.point, this.head);
     return target && now.isAiming ? target.strips : null;
+  }
+
+  /** The scene grows and shrinks with the way from one squeezed controller to the other. */
+  resize(frame) {
+    const poses = [...this.squeezing].map((source) => frame.getPose(source.targetRaySpace, this.space)), before = this.apart;
+    if (!poses.length) this.hasResized = false;
+    this.apart = null;
+    if (poses.length < 2 || !poses.every(Boolean)) return;
+    const [a, b] = poses.map(({ transform }) => transform.position);
+    this.hasResized = true;
+    this.apart = Math.max(NEAREST_HANDS_M, Math.hypot(a.x - b.x, a.y - b.y, a.z - b.z));
+    if (before !== null) this.stage.resize(this.apart / before, this.head);
   }
 
   /** Where an arc from a hand lands, and the strips of triangles that show it. */

@@ -1,4 +1,5 @@
-// Loads what is needed, the most urgent first. What is not needed any more is given up, and what fails is tried again.
+// Loads what is needed, the most urgent first. What is not needed any more is given up, and what fails is tried again;
+// until then it is in nobody's way.
 
 const MAX_REQUESTS = 2; // at once; more would only share the line
 const MAX_TRIES = 6;
@@ -24,9 +25,13 @@ class Loader {
     return this.failures.get(key) || null;
   }
 
-  /** needs: [{key, upTo, rank}] the most urgent first; those of a rank wait until all of lower ones are there. */
+  /** needs: [{key, upTo, rank}] the most urgent first; those of a rank wait until all of lower ones are there or have failed. */
   ask(needs) {
-    const open = needs.filter((need) => this.nArrived(need.key) < need.upTo && !this.failure(need.key)?.isFinal);
+    const missing = needs.filter((need) => this.nArrived(need.key) < need.upTo && !this.failure(need.key)?.isFinal);
+    const waits = missing.map(({ key }) => (this.failure(key)?.againMs ?? 0) - performance.now());
+    const open = missing.filter((_, i) => waits[i] <= 0);
+    clearTimeout(this.timer);
+    if (open.length < missing.length) this.timer = setTimeout(this.onChange, Math.min(...waits.filter((wait) => wait > 0)));
     const rank = Math.min(...open.map((need) => need.rank));
     const now = open.filter((need) => need.rank === rank);
     for (const [key, request] of this.running) {
@@ -39,11 +44,9 @@ class Loader {
   }
 
   async start({ key, upTo }) {
-    const failure = this.failure(key), wait = failure ? failure.againMs - performance.now() : 0;
     const controller = new AbortController(), { signal } = controller;
     this.running.set(key, controller);
     try {
-      if (wait > 0) await waited(wait, signal);
       const begunMs = performance.now(), nBefore = this.blocks.nReceived; // of all requests: they share the line
       await this.blocks.load(key, this.nArrived(key), upTo, signal, (first, data) => {
         if (signal.aborted) return;
@@ -71,6 +74,11 @@ class Loader {
     this.onChange();
   }
 
+  /** What failed is asked for now, once; for what has come to be wanted most. */
+  hurry(key) {
+    if (this.failures.has(key)) Object.assign(this.failure(key), { isFinal: false, againMs: 0 });
+  }
+
   /** The worker does not have a block any more. */
   forget(key) {
     this.running.get(key)?.abort(); // what it would bring belongs to what is gone
@@ -82,11 +90,4 @@ class Loader {
     const rate = nBytes / (tookMs / 1000);
     this.bytesPerS = this.bytesPerS === null ? rate : 0.7 * this.bytesPerS + 0.3 * rate;
   }
-}
-
-function waited(ms, signal) {
-  return new Promise((resolve, reject) => {
-    const timer = setTimeout(resolve, ms);
-    signal.addEventListener("abort", () => (clearTimeout(timer), reject(signal.reason)));
-  });
 }

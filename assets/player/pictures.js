@@ -44,7 +44,9 @@ class Pictures {
    * atMost: so many levels are enough; view: to have it painted, as of Painter.paint. */
   want(frame, row, atMost = Infinity, view = null) {
     const { quality } = this, few = { auto: atMost, low: Math.min(COARSE, atMost), full: Infinity }[quality];
-    this.wish = { frame, row, view, clipIndex: this.clipOf(frame), nLevels: Math.min(few, this.nLevels) };
+    const clipIndex = this.clipOf(frame);
+    if (this.wish && this.wish.clipIndex !== clipIndex) this.loader.hurry(clipIndex);
+    this.wish = { frame, row, view, clipIndex, nLevels: Math.min(few, this.nLevels) };
     this.go();
   }
 
@@ -139,7 +141,7 @@ class Pictures {
       if (answer.of === "levels" && key !== "shared") {
         this.loader.forget(key); // so that trying again asks for it again
         this.loader.fail(key, `A clip is damaged: ${answer.message}`, true);
-      } else this.stop(answer.message);
+      } else this.stop(`The scene cannot be shown: ${answer.message} Load the page again.`);
     }
     if (answer.kind === "picture") {
       this.isBusy = false;

@@ -31,26 +31,76 @@ class Player {
     followAddress(this);
     followEmbedder(this);
     this.pictures.want(this.stored(this.clock.frame), [0, 0, 1, 0]); // loads while shaders are compiled
+    notify("Loading \u2026");
     this.shaders = shaders;
     this.nLines = lines(nStill) + lines(nMoving);
+    this.followCanvas();
+    this.device = device && GpuRenderer.canHold(device, this.nLines) ? device : null;
     try {
-      this.renderer = device && GpuRenderer.canHold(device, this.nLines)
-        ? new GpuRenderer(device, this.canvas, shaders["splats.wgsl"], header.background, this.nLines, (text) => this.pictures.stop(text))
-        : new Renderer(this.canvas, shaders, header.background, this.nLines);
+      if (this.device) this.useGpu();
+      else this.useGl();
     } catch (error) {
       this.pictures.stop(error.message);
       throw error;
     }
     this.pictures.wish = null; // until the next tick says how it is drawn
     this.headset = new Headset(this, document.getElementById("headset"));
-    this.fillControls();
-    followPointer(this.canvas, this.view, () => this.moved());
+    fillControls(this);
     const table = keyTable(this);
     fillKeySheet(table);
     followKeys(table);
-    this.followContext(this.canvas);
-    this.followSize();
-    notify("Loading \u2026");
+    this.changed();
+  }
+
+  // ---- what draws
+
+  useGl() {
+    const renderer = new Renderer(this.canvas, this.shaders, this.header.background, this.nLines);
+    if (this.headset?.session) this.headset.pageRenderer = renderer; // which draws with another one
+    else this.renderer = renderer;
+  }
+
+  useGpu() {
+    const { device, canvas, shaders, header, nLines } = this;
+    this.attempt(() => {
+      this.renderer = new GpuRenderer(device, canvas, shaders["splats.wgsl"], header.background, nLines, (error) => this.leaveGpu(error));
+    });
+  }
+
+  /** Does it succeed? What WebGPU throws is a reason to leave it. */
+  attempt(act) {
+    const { device } = this;
+    try {
+      act();
+    } catch (error) {
+      if (!device) throw error;
+      this.leaveGpu(error);
+    }
+    return this.device === device;
+  }
+
+  /** WebGPU has failed, for whatever reason: WebGL goes on with the same frame and view, on a canvas that was not WebGPU's. */
+  leaveGpu(error) {
+    const { device, canvas, pictures } = this;
+    if (!device) return; // one reason makes several errors
+    console.warn(error);
+    this.device = null;
+    device.destroy();
+    const hasFocus = document.activeElement === canvas;
+    this.canvas = canvas.cloneNode();
+    canvas.replaceWith(this.canvas);
+    if (hasFocus) this.canvas.focus({ preventScroll: true });
+    this.followCanvas();
+    try {
+      this.useGl();
+    } catch (reason) {
+      pictures.stop(reason.message);
+      return;
+    }
+    pictures.interrupt("WebGPU has failed in this browser, so the page draws with WebGL 2.", SAID_MS);
+    if (this.headset?.session) return; // everything is sent again when it ends
+    pictures.forget();
+    this.shown = this.onScreen = null;
     this.changed();
   }
 
@@ -67,8 +117,10 @@ class Player {
     this.isDrawn = false;
   }
 
-  /** The size changes with the window, with zooming, and from screen to screen. */
-  followSize() {
+  /** What is done to the canvas, and its size, which changes with the window, with zooming, and from screen to screen. */
+  followCanvas() {
+    followPointer(this.canvas, this.view, () => this.moved());
+    this.followContext(this.canvas);
     const observer = new ResizeObserver(() => this.changed());
     try {
       observer.observe(this.canvas, { box: "device-pixel-content-box" });
@@ -117,8 +169,7 @@ class Player {
     const atMost = this.share === 1 ? Infinity : this.renderer.fullMs > VERY_SLOW_MS ? 1 : 2;
     this.pictures.want(this.stored(this.clock.frame), row, atMost, isSoftware ? view : null);
     const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
-    if (isWanted && isReady) {
-      this.renderer.draw(lens, this.header.near_plane, this.share === 1);
+    if (isWanted && isReady && this.attempt(() => this.renderer.draw(lens, this.header.near_plane, this.share === 1))) {
       this.isDrawn = true;
       document.getElementById("poster")?.remove();
       this.onScreen = this.shown;
@@ -130,8 +181,7 @@ class Player {
   }
 
   take(answer) {
-    if (this.isLost) return;
-    this.renderer.take(answer);
+    if (this.isLost || !this.attempt(() => this.renderer.take(answer))) return;
     const { take } = this.header, now = this.clock.frame;
     this.shown = take ? (take[now] === answer.frame ? now : take.indexOf(answer.frame)) : answer.frame;
     this.changed();
@@ -218,45 +268,15 @@ class Player {
   }
 
   help() {
-    document.getElementById("keys").showModal();
-  }
-
-  fillControls() {
-    const title = document.getElementById("title"), by = (id) => document.getElementById(id);
-    title.textContent = this.header.title;
-    document.title = this.header.title;
-    const option = (value, text) => {
-      const made = document.createElement("option");
-      made.value = value;
-      made.textContent = text;
-      return made;
-    };
-    by("speed").append(...SPEEDS.map((speed) => option(speed, `${speed}\u00d7`)));
-    by("camera").append(option("", "Free"), ...this.header.cameras.map((camera, i) => option(i, camera.name)));
-    by("play").onclick = () => this.play(!this.clock.isPlaying);
-    by("loop").onclick = () => this.loop(!this.clock.isLooping);
-    by("home").onclick = () => this.look(null, true);
-    by("full").onclick = () => this.fillScreen();
-    by("help").onclick = () => this.help();
-    by("speed").onchange = (event) => {
-      this.clock.speed = Number(event.target.value);
-      this.changed();
-    };
-    by("quality").append(...["auto", "low", "full"].map((name) => option(name, name[0].toUpperCase() + name.slice(1))));
-    by("quality").onchange = ({ target }) => {
-      this.pictures.quality = target.value;
-      this.changed();
-    };
-    by("again").onclick = () => this.pictures.loader.again();
-    addEventListener("online", () => this.pictures.loader.again());
-    for (const id of ["speed", "camera", "quality"]) leaveWhenChosen(by(id), this.canvas);
-    by("camera").onchange = ({ target }) => this.look(target.value === "" ? null : Number(target.value));
+    const sheet = document.getElementById("keys");
+    sheet.showModal();
+    sheet.scrollTop = 0; // on a low screen the button at its end, which has the focus, was scrolled to
   }
 
   /** A driver may take the context away, as when a laptop wakes up; everything is sent again then. */
   followContext(canvas) {
     canvas.addEventListener("webglcontextlost", (event) => {
-      if (this.renderer.canvas !== canvas) return; // of a headset that was put down
+      if (this.renderer?.canvas !== canvas) return; // of a headset that was put down
       event.preventDefault();
       this.isLost = true;
       this.shown = this.onScreen = null;
@@ -270,14 +290,6 @@ class Player {
       this.changed();
     });
   }
-}
-
-/** A list that was used with the pointer gives the keys back; one that was reached by keys keeps them. */
-function leaveWhenChosen(list, canvas) {
-  let isPointed = false;
-  list.addEventListener("pointerdown", () => (isPointed = true));
-  list.addEventListener("keydown", () => (isPointed = false));
-  list.addEventListener("change", () => isPointed && canvas.focus());
 }
 
 /** Words over the picture, which screen readers are told too; canRetry: with a button to try again. */

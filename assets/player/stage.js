@@ -1,6 +1,8 @@
 // Where somebody in a headset stands in the scene. The scene has its own unit and up; a headset has metres, x to the right,
 // y up and z backward, with the floor at y = 0.
 
+const RESIZED = 20; // times smaller or larger than it was made, at most
+
 class Stage {
   /** header: up and stage, as in docs/player_format.md; levelAxes: two directions that lie level, as of View. */
   constructor(header, levelAxes) {
@@ -8,7 +10,7 @@ class Stage {
     this.levelAxes = levelAxes;
     const { floor, meters_per_unit } = header.stage;
     this.floor = floor;
-    this.metersPerUnit = meters_per_unit;
+    this.metersPerUnit = this.madeMeters = meters_per_unit;
     this.yaw = 0; // of the headset's forward axis, as of View
     this.origin = scaled(this.up, floor); // what lies under the headset's origin
   }
@@ -40,6 +42,13 @@ class Stage {
   turn(angle, head) {
     const here = sum(this.origin, this.way(head));
     this.yaw += angle;
+    this.origin = sum(here, this.way(head), -1);
+  }
+
+  /** Become so many times larger around where one stands. head: m */
+  resize(factor, head) {
+    const here = sum(this.origin, this.way(head)), { madeMeters } = this;
+    this.metersPerUnit = Math.max(madeMeters / RESIZED, Math.min(madeMeters * RESIZED, this.metersPerUnit * factor));
     this.origin = sum(here, this.way(head), -1);
   }
 

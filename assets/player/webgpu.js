@@ -3,15 +3,22 @@
 
 const GROUP = 256, PAIR_BYTES = 8, ROW_BYTES = 16 * TEXELS_PER_ROW, ELLIPSE_BYTES = 48, STEP_BYTES = 256;
 const VIEW_FLOATS = 28;
+const ANSWER_MS = 4000; // later than that, a device is not waited for
 
-/** A device of WebGPU, or null where there is none, or where the processor plays it, which is slower than to paint. */
-async function graphicsDevice() {
+/** A device of WebGPU, or nothing where there is none. */
+function graphicsDevice() {
+  const late = new Promise((done) => setTimeout(done, ANSWER_MS));
+  return Promise.race([askedDevice(), late]).catch(() => null);
+}
+
+/** The same; it may reject, or never answer. Where the processor plays the device, there is none: to paint is faster. */
+async function askedDevice() {
   const gl = navigator.gpu && document.createElement("canvas").getContext("webgl2");
   if (!gl || isSoftware(gl)) return null; // nothing is asked for in vain, which browsers warn about
-  const adapter = await navigator.gpu.requestAdapter({ powerPreference: "high-performance" }).catch(() => null);
+  const adapter = await navigator.gpu.requestAdapter({ powerPreference: "high-performance" });
   if (!adapter || (adapter.info?.isFallbackAdapter ?? adapter.isFallbackAdapter)) return null; // older browsers have it there
   const { maxBufferSize, maxStorageBufferBindingSize } = adapter.limits;
-  return adapter.requestDevice({ requiredLimits: { maxBufferSize, maxStorageBufferBindingSize } }).catch(() => null);
+  return adapter.requestDevice({ requiredLimits: { maxBufferSize, maxStorageBufferBindingSize } });
 }
 
 class GpuRenderer {
@@ -21,10 +28,16 @@ class GpuRenderer {
     return nRows * ROW_BYTES <= limits.maxStorageBufferBindingSize && pairsOf(nRows) <= GROUP * limits.maxComputeWorkgroupsPerDimension;
   }
 
-  /** device: as of graphicsDevice; nLines: as of Renderer, so many that it can hold. onLost(text) */
-  constructor(device, canvas, source, background, nLines, onLost) {
+  /** device: as of graphicsDevice; nLines: as of Renderer, so many that it can hold. May throw, and calls
+   * onFailed(error) whenever the device refuses something or goes away: then nothing that it draws is to be trusted. */
+  constructor(device, canvas, source, background, nLines, onFailed) {
     const nRows = ROWS_PER_LINE * Math.max(nLines, 1);
     Object.assign(this, { device, canvas, background });
+    device.lost.then(({ message }) => onFailed(new Error(message)));
+    device.addEventListener("uncapturederror", (event) => {
+      event.preventDefault();
+      onFailed(event.error);
+    });
     this.sortsItself = true;
     this.isSoftware = this.isBusy = false;
     this.fullMs = this.nStill = this.firstMoving = this.nMoving = 0;
@@ -35,7 +48,6 @@ class GpuRenderer {
     this.nPairs = pairsOf(nRows);
     this.buffers(nRows);
     this.pipelines(device.createShaderModule({ code: source }), format);
-    device.lost.then(({ reason }) => reason !== "destroyed" && onLost("The graphics card has gone away. Load the page again."));
   }
 
   buffers(nRows) {

@@ -33,6 +33,7 @@ SCRIPTS = (
     "pictures.js",
     "timeline.js",
     "keys.js",
+    "controls.js",
     "stage.js",
     "headset.js",
     "embedding.js",

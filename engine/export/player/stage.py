@@ -11,7 +11,9 @@ from engine.export.splats import Splats
 PERSON_M = 1.7
 """What moves is taken to be so tall where the length of a scene unit is not known."""
 CAMERAS_M = 2.5
-"""Where nothing moves either, cameras are taken to be so far from what they look at."""
+"""Where that says nothing, cameras are taken to be so far from what they look at."""
+FARTHEST_CAMERAS_M = 10.0
+"""If a person's height puts them farther away, what moves is too flat or too small for a person."""
 FEWEST_MOVING = 50
 """Gaussians; fewer are chance."""
 ENDS_PERCENT = 2.0
@@ -24,7 +26,8 @@ class Stage(TypedDict):
     Attributes:
         floor: How far up the ground is: a coordinate along the scene's up direction, scene units.
         meters_per_unit: Length of a scene unit, m.
-        is_measured: Whether that was set by the user; otherwise it is a guess from the height of what moves.
+        is_measured: Whether that was set by the user; otherwise it is a guess from the height of what moves, or from
+            the cameras where that is not a person's.
     """
 
     floor: float
@@ -55,7 +58,8 @@ def stage_of(
     low, high = _ends(moving if has_moving else still, up, focus, radius)
     is_measured = meters_per_unit is not None
     if meters_per_unit is None:
-        meters_per_unit = PERSON_M / (high - low) if has_moving and high > low else CAMERAS_M / radius
+        is_person = has_moving and PERSON_M * radius <= FARTHEST_CAMERAS_M * (high - low)
+        meters_per_unit = PERSON_M / (high - low) if is_person else CAMERAS_M / radius
     return {"floor": low, "meters_per_unit": float(meters_per_unit), "is_measured": is_measured}
 
 

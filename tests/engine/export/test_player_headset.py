@@ -124,9 +124,9 @@ def expected(eye_m: np.ndarray, *, facing: np.ndarray, frame: int = 0) -> np.nda
     return rendering.image[0].clamp(0.0, 1.0).numpy()
 
 
-def eyes(head: np.ndarray, facing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def eyes(head: np.ndarray, facing: np.ndarray, *, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Places of both eyes in the scene, of a head there."""
-    half = np.cross(facing, [0.0, -1.0, 0.0]) * EYES_APART / 2.0 / METERS_PER_UNIT
+    half = np.cross(facing, [0.0, -1.0, 0.0]) * EYES_APART / 2.0 / (scale * METERS_PER_UNIT)
     return head - half, head + half
 
 
@@ -161,6 +161,13 @@ def assert_seen(browser: Browser, head: np.ndarray, facing: np.ndarray) -> None:
 def stick(browser: Browser, x: float, y: float) -> None:
     """Push the right thumbstick, and hold it."""
     browser.value(f"void device.controllers.right.updateAxes('thumbstick', {x}, {y})")
+    frames(browser, 3)
+
+
+def hands(browser: Browser, *, apart: float) -> None:
+    """Hold the controllers so far from each other, m."""
+    for hand, side in (("left", -0.5), ("right", 0.5)):
+        browser.value(f"void device.controllers.{hand}.position.set({side * apart}, 1.2, -0.4)")
     frames(browser, 3)
 
 
@@ -209,6 +216,31 @@ def test_one_stands_where_the_arc_lands(browser: Browser):
     level, down = 7.0 * np.cos(np.pi / 9), 7.0 * np.sin(np.pi / 9)  # thrown from 1.2 m at 7 m/s, down at 20 degrees
     way_m = level * (np.sqrt(down**2 + 2.0 * 9.81 * 1.2) - down) / 9.81
     assert_seen(browser, place + way_m * facing / METERS_PER_UNIT, facing)
+
+
+def test_two_squeezed_hands_pull_the_scene_larger_around_where_one_stands(browser: Browser):
+    place, facing = at_the_start()
+    hands(browser, apart=0.3)
+    for hand in ("left", "right"):
+        browser.value(f"void device.controllers.{hand}.updateButtonValue('squeeze', 1)")
+        frames(browser, 3)
+    hands(browser, apart=0.6)
+    for hand in ("left", "right"):
+        browser.value(f"void device.controllers.{hand}.updateButtonValue('squeeze', 0)")
+        frames(browser, 3)
+    assert not state(browser, "clock.isPlaying"), "pulling does not play"
+    place[1] = -(FLOOR + HEAD[1] / (2.0 * METERS_PER_UNIT))
+    assert state(browser, "headset.stage.metersPerUnit") == pytest.approx(2.0 * METERS_PER_UNIT)
+    for eye, found in zip(eyes(place, facing, scale=2.0), seen(browser), strict=True):
+        assert psnr(found, expected(eye, facing=facing)) > LEAST_PSNR
+    press(browser, "squeeze")
+    assert state(browser, "clock.isPlaying")
+
+
+def test_how_large_the_scene_is_said_to_be_a_guess_where_it_is_one(browser: Browser):
+    words = browser.value("document.getElementById('notice').innerText")
+    assert words.startswith("The size of the scene is a guess. Squeeze both controllers")
+    assert words in browser.value("document.getElementById('headset').title")
 
 
 def test_buttons_play_and_leave(browser: Browser):

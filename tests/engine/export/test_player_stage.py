@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.export.player.stage import CAMERAS_M, PERSON_M, stage_of
+from engine.export.player.stage import CAMERAS_M, FARTHEST_CAMERAS_M, PERSON_M, stage_of
 from engine.export.splats import Splats
 from tests.engine.export.scenes import chance_splats
 
@@ -42,6 +42,14 @@ def test_a_known_unit_is_kept():
 def test_where_nothing_moves_still_parts_are_the_ground():
     found = stage_of(FLOOR, NOTHING, up=UP, focus=FOCUS, radius=RADIUS)
     assert found["floor"] == 2.0
+    assert found["meters_per_unit"] == CAMERAS_M / RADIUS
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-6, 0.1, 0.99 * PERSON_M * RADIUS / FARTHEST_CAMERAS_M])
+def test_what_is_too_flat_for_a_person_does_not_make_the_scene_gigantic(height: float):
+    flat = splats(np.linspace(2.2, 2.2 + height, 1001))
+    found = stage_of(FLOOR, flat, up=UP, focus=FOCUS, radius=RADIUS)
+    assert found["floor"] == pytest.approx(2.2, abs=0.05)
     assert found["meters_per_unit"] == CAMERAS_M / RADIUS
 
 

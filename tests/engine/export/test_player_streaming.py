@@ -131,8 +131,9 @@ def test_the_quality_says_how_much_is_drawn(browser: Browser, server: RangeServe
     assert browser.console == []
 
 
-def test_a_server_without_ranges_sends_whole_files(browser: Browser, server: RangeServer):
-    server.has_ranges = False
+@pytest.mark.parametrize("piece_bytes", [None, 500])
+def test_a_server_without_ranges_sends_whole_files(browser: Browser, server: RangeServer, piece_bytes: int | None):
+    server.has_ranges, server.piece_bytes = False, piece_bytes
     go_to(browser, server.url("scene.html"))
     fit(browser)
     browser.value("void clipgstreamPlayer.go(4); void clipgstreamPlayer.look(1)")
@@ -212,6 +213,30 @@ def test_a_leap_outranks_what_was_needed_before(browser: Browser, server: RangeS
     browser.wait(SETTLED)
     assert label(browser).startswith(f"Frame {N_FRAMES - 1} of")
     assert not state(browser, "pictures.loaded.has(1)")
+
+
+def test_clips_that_fail_are_in_nobodys_way(browser: Browser, server: RangeServer):
+    server.failing.update({"clip1.bin": 99, "clip2.bin": 99})
+    go_to(browser, server.url("scene.html"), until=SETTLED)
+    browser.wait("clipgstreamPlayer.pictures.loaded.has(3)", timeout_s=5.0)  # while both are tried again
+    assert not state(browser, "pictures.loader.failure(1).isFinal")
+    assert not state(browser, "pictures.loader.failure(2).isFinal")
+
+
+@pytest.mark.parametrize("is_final", ["true", "false"])
+def test_a_clip_that_failed_is_asked_for_as_soon_as_it_is_wanted(browser: Browser, server: RangeServer, is_final: str):
+    server.failing["clip3.bin"] = 99
+    go_to(browser, server.url("scene.html"), until=SETTLED)
+    browser.wait("clipgstreamPlayer.pictures.loader.failure(3)")
+    browser.value(
+        "void Object.assign(clipgstreamPlayer.pictures.loader.failure(3),"
+        f" {{isFinal: {is_final}, againMs: performance.now() + 60000}})"
+    )
+    del server.failing["clip3.bin"]
+    browser.value(f"void clipgstreamPlayer.go({N_FRAMES - 1})")
+    browser.wait(SETTLED, timeout_s=5.0)
+    assert label(browser).startswith(f"Frame {N_FRAMES - 1} of")
+    assert browser.value("document.getElementById('notice').hidden")
 
 
 def test_memory_is_bounded_while_one_scrubs(browser: Browser, server: RangeServer):
@@ -347,3 +372,20 @@ def test_the_poster_is_seen_before_anything_runs(browser: Browser, server: Range
         assert grey.min() > 60
     finally:
         browser.call("Emulation.setScriptExecutionDisabled", value=False)
+
+
+@pytest.mark.parametrize("size", [(960, 600), (780, 360)])
+def test_the_buttons_take_one_row_and_their_sheet_begins_at_its_top(
+    browser: Browser, server: RangeServer, size: tuple[int, int]
+):
+    browser.resize(*size)
+    go_to(browser, server.url("scene.html"))
+    browser.value("void (document.getElementById('headset').hidden = innerHeight < 480)")  # phones have none
+    tops = browser.value(
+        "[...document.querySelectorAll('#buttons > :not([hidden])')].map(b => b.getBoundingClientRect().bottom)"
+    )
+    assert np.ptp(tops) < 12
+    assert browser.value("[...document.querySelectorAll('select')].every(one => one.getAttribute('aria-label'))")
+    browser.key("?", modifiers=8)
+    assert browser.value("document.getElementById('keys').scrollTop") == 0
+    browser.value("void document.getElementById('keys').close()")
