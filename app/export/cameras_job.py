@@ -8,6 +8,7 @@ import numpy as np
 
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
+from app.export.gaussians.file_place import file_meters_per_unit, file_world
 from app.export.jobs.cameras import CamerasJob
 from app.export.staging import check_target, staged_folder
 from app.export.usd_cameras import write_usd_cameras
@@ -15,6 +16,8 @@ from engine.camera.corrections import corrected_camera
 from engine.capture.frames import ImageFrames
 from engine.capture.layout.format_result import CameraEntry, Layout
 from engine.capture.writers.conversion import convert
+from engine.export.sequences.table import SEQUENCES
+from engine.export.world import FileWorld
 
 ROW_BYTES = {"colmap": 240, "transforms": 720, "usd": 900}
 SAMPLE_BYTES = 400
@@ -23,14 +26,17 @@ WORLD = (
     "Cameras are in the coordinates and units of the capture, as are Gaussians that were neither turned nor scaled; "
     "frames are not copied."
 )
+USD_WORLD = "Cameras stand where USD files of the Gaussians have the scene ({})."
 
 
 def estimate(opened: TrainedProject, job: CamerasJob) -> ExportEstimate:
-    """See `JobModule`."""
+    """See `JobModule`. Raises ProjectError where its entries do not go together."""
+    job.check()
     layout = opened.capture.layout
     if job.format == "usd":
         n_samples = layout.n_frames * len(opened.project.document.camera_paths)
-        return ExportEstimate(1, len(layout.cameras) * ROW_BYTES["usd"] + n_samples * SAMPLE_BYTES, (WORLD,))
+        lines = (USD_WORLD.format(_usd_world(opened, job).text),)
+        return ExportEstimate(1, len(layout.cameras) * ROW_BYTES["usd"] + n_samples * SAMPLE_BYTES, lines)
     points = layout.points.stat().st_size if layout.points is not None and layout.points.is_file() else 0
     has_images = all(isinstance(entry.source, ImageFrames) for entry in layout.cameras)
     n_rows = len(layout.cameras) * (layout.n_frames if job.format == "transforms" and has_images else 1)
@@ -46,25 +52,30 @@ def run(opened: TrainedProject, job: CamerasJob, report: Report) -> ExportResult
         ProjectError: The folder cannot be written, or USD's library is missing.
     """
     n_cameras = len(opened.capture.layout.cameras)
-    check_target(job.out, opened=opened, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
+    expected = estimate(opened, job)
+    check_target(job.out, opened=opened, n_bytes=expected.n_bytes, is_folder=True)
     report(ExportProgress(0, n_cameras, "cameras"))
     layout, lines = _as_trained(opened)
     if job.format == "usd":
-        document = opened.project.document
+        world = _usd_world(opened, job)
         with staged_folder(job.out, what="The export") as folder:
             notes = write_usd_cameras(
                 folder,
                 layout.cameras,
-                document.camera_paths,
+                opened.project.document.camera_paths,
                 n_frames=layout.n_frames,
                 fps=layout.fps,
-                up=opened.up,
-                meters_per_unit=document.world.meters_per_unit,
+                world=world,
+                meters_per_unit=file_meters_per_unit(opened, world),
             )
     else:
         notes = convert(layout, job.out, job.format).lines
     report(ExportProgress(n_cameras, n_cameras, "cameras"))
-    return written(job.out, lines=(WORLD, *lines, *notes))
+    return written(job.out, lines=(*expected.lines, *lines, *notes))
+
+
+def _usd_world(opened: TrainedProject, job: CamerasJob) -> FileWorld:
+    return file_world(opened, job, usual_up=SEQUENCES["usd"].up)
 
 
 def _as_trained(opened: TrainedProject) -> tuple[Layout, tuple[str, ...]]:

@@ -15,6 +15,7 @@ import numpy as np
 from engine.camera.camera_path import CameraPath
 from engine.capture.layout.format_result import CameraEntry
 from engine.export.usd_library import state_unit, usd_module, writing_usd
+from engine.export.world import FileWorld
 
 FILE = "cameras.usda"
 FILM = 36.0
@@ -32,7 +33,7 @@ def write_usd_cameras(
     *,
     n_frames: int,
     fps: float,
-    up: np.ndarray,
+    world: FileWorld,
     meters_per_unit: float | None,
 ) -> tuple[str, ...]:
     """Write cameras.usda. Time codes are frames of the capture.
@@ -42,8 +43,8 @@ def write_usd_cameras(
         cameras: Of the capture, which stand still.
         paths: With a sample at each frame.
         n_frames, fps: Of the capture.
-        up: Which way is up in the scene. [3]
-        meters_per_unit: Of the scene; None where unknown.
+        world: Where the scene lies in the stage.
+        meters_per_unit: Of the stage; None where unknown.
     Returns:
         Sentences about what USD does not hold.
     Raises:
@@ -53,7 +54,7 @@ def write_usd_cameras(
     Usd, UsdGeom = usd_module("Usd"), usd_module("UsdGeom")
     with writing_usd():
         stage = Usd.Stage.CreateNew(str(folder / FILE))
-    axis, lines = _up_axis(up)
+    axis, lines = _up_axis(np.array(world.up))
     UsdGeom.SetStageUpAxis(stage, axis)
     state_unit(stage, meters_per_unit)
     stage.SetFramesPerSecond(fps)
@@ -65,10 +66,10 @@ def write_usd_cameras(
     moving = [path for path in paths if path.keys]
     names = _names([*(entry.name for entry in cameras), *(path.name for path in moving)])
     for entry, name in zip(cameras, names, strict=False):
-        _write_camera(UsdGeom.Camera.Define(stage, f"/cameras/{name}"), entry)
+        _write_camera(UsdGeom.Camera.Define(stage, f"/cameras/{name}"), entry, world)
     frames = np.arange(n_frames, dtype=np.float64)
     for path, name in zip(moving, names[len(cameras) :], strict=True):
-        _write_path(UsdGeom.Camera.Define(stage, f"/cameras/{name}"), path, frames)
+        _write_path(UsdGeom.Camera.Define(stage, f"/cameras/{name}"), path, frames, world)
     with writing_usd():
         stage.GetRootLayer().Save()
     n_bent = sum(not entry.lens.is_pinhole for entry in cameras)
@@ -80,13 +81,13 @@ def write_usd_cameras(
 
 
 def _up_axis(up: np.ndarray) -> tuple[str, tuple[str, ...]]:
-    """Y or Z, whichever is nearer to up, and a sentence where neither is near."""
+    """Y or Z, whichever is nearer to up in the stage, and a sentence where neither is near."""
     axis = "Y" if abs(up[1]) >= abs(up[2]) else "Z"
     along = float(up["XYZ".index(axis)])
     if along > 0.99:
         return axis, ()
     direction = ", ".join(f"{value:.3g}" for value in up)
-    said = f"Up in the scene is ({direction}), and the stage says {axis}: turn it there, cameras and scene alike."
+    said = f"USD knows y and z as the way up. Up is ({direction}) here, and the stage says {axis}."
     return axis, (said,)
 
 
@@ -103,15 +104,15 @@ def _names(wanted: Sequence[str]) -> list[str]:
     return found
 
 
-def _matrix(world_to_camera: np.ndarray) -> Any:
+def _matrix(world_to_camera: np.ndarray, world: FileWorld) -> Any:
     Gf = usd_module("Gf")
-    to_world = np.linalg.inv(world_to_camera) @ _TO_USD
+    to_world = world.placed_cameras(world_to_camera[None])[0] @ _TO_USD
     return Gf.Matrix4d(*to_world.T.ravel().tolist())
 
 
-def _write_camera(camera: Any, entry: CameraEntry) -> None:
+def _write_camera(camera: Any, entry: CameraEntry, world: FileWorld) -> None:
     Gf = usd_module("Gf")
-    camera.AddTransformOp().Set(_matrix(entry.world_to_camera))
+    camera.AddTransformOp().Set(_matrix(entry.world_to_camera, world))
     (width, height), K = entry.image_size, entry.K
     per_pixel = FILM / width
     camera.CreateHorizontalApertureAttr(FILM)
@@ -123,7 +124,7 @@ def _write_camera(camera: Any, entry: CameraEntry) -> None:
     camera.CreateClippingRangeAttr(Gf.Vec2f(*CLIPPING))
 
 
-def _write_path(camera: Any, path: CameraPath, frames: np.ndarray) -> None:
+def _write_path(camera: Any, path: CameraPath, frames: np.ndarray, world: FileWorld) -> None:
     Gf = usd_module("Gf")
     poses, fovs_rad = path.poses(frames)
     place = camera.AddTransformOp()
@@ -133,5 +134,5 @@ def _write_path(camera: Any, path: CameraPath, frames: np.ndarray) -> None:
     camera.CreateClippingRangeAttr(Gf.Vec2f(*CLIPPING))
     focal = camera.CreateFocalLengthAttr()
     for frame, pose, fov_rad in zip(frames, poses, fovs_rad, strict=True):
-        place.Set(_matrix(pose), frame)
+        place.Set(_matrix(pose, world), frame)
         focal.Set(float(height / 2 / np.tan(fov_rad / 2)), frame)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 from app.export.jobs.job import option
-from engine.export.sequences.table import SEQUENCES
+from app.export.jobs.question import Question
+from engine.export.sequences.table import SEQUENCES, SequenceFormat
 from engine.export.world import AXES
 from engine.setting import Flag, Writing, value_text
 
@@ -28,17 +32,28 @@ def _usual_up() -> str:
     return "; ".join(["as in the capture", *(f"{up} in {', '.join(names)}" for up, names in turned.items())])
 
 
-UP = option(
-    "Turns the scene so that up points along this axis of the files",
-    "Up axis",
-    none=_usual_up(),
-    choices=dict.fromkeys(AXES, ""),
-    titles={"": "As in the capture", "+y": "+y", "-y": "-y", "+z": "+z", "-z": "-z"},
-    flags=(
-        Flag("--up", "Turns the scene so that this axis points up", prefix="+"),
-        Flag("--down", "Turns the scene so that this axis points down", prefix="-"),
-    ),
-)
+def _up(usual: str) -> Any:
+    return option(
+        "Turns the scene so that up points along this axis of the files",
+        "Up axis",
+        none=usual,
+        choices=dict.fromkeys(AXES, ""),
+        titles={"": "As in the capture", "+y": "+y", "-y": "-y", "+z": "+z", "-z": "-z"},
+        flags=(
+            Flag("--up", "Turns the scene so that this axis points up", prefix="+"),
+            Flag("--down", "Turns the scene so that this axis points down", prefix="-"),
+        ),
+    )
+
+
+def asked_up(question: Question, kind: SequenceFormat) -> Question:
+    """The question about the axis, whose usual answer is that of a format."""
+    if kind.up is None:
+        return question
+    return replace(question, values=(("", f"As {kind.title} has it: {kind.up}"), *question.values[1:]))
+
+
+UP, USD_UP = _up(_usual_up()), _up(f"{SEQUENCES['usd'].up}, as USD files of Gaussians")
 SCALE = option(
     "Units of the files per unit of the capture",
     "Scale",

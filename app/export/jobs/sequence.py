@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from app.export.jobs.job import EDITS, FRAMES, OBJECT, SOUND, TIMING, ExportJob, option
-from app.export.jobs.placing import SCALE, SCENE_UP, UP, Vector
+from app.export.jobs.placing import SCALE, SCENE_UP, UP, Vector, asked_up
 from app.export.jobs.question import Question
 from app.export.picked_frames import PickedFrames
 from engine.errors import ProjectError
@@ -46,11 +45,10 @@ class SequenceJob(ExportJob, frozen=True):
     @classmethod
     def asked(cls, questions: dict[str, Question], answers: Answers) -> dict[str, Question]:
         """Sound is asked for where the format holds some and there is some; the usual axis is that of the format."""
-        kind, up = SEQUENCES[questions["format"].chosen(answers.choices)], questions["up"]
+        kind = SEQUENCES[questions["format"].chosen(answers.choices)]
         if not (answers.context.has_videos and kind.has_sound):
             del questions["sound"]
-        if kind.up is not None:
-            questions["up"] = replace(up, values=(("", f"As {kind.title} has it: {kind.up}"), *up.values[1:]))
+        questions["up"] = asked_up(questions["up"], kind)
         return questions
 
     def check(self) -> None:

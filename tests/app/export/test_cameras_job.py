@@ -13,6 +13,8 @@ import pytest
 from app.evaluation.headless import TrainedProject
 from app.export.cameras_job import WORLD, CamerasJob, estimate, run
 from app.export.export_progress import ExportProgress
+from app.export.gaussians.file_place import file_world
+from app.export.jobs.sequence import SequenceJob
 from app.export.usd_cameras import write_usd_cameras
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.corrections import N_VALUES, corrected
@@ -21,6 +23,8 @@ from engine.children.kind import Unwanted
 from engine.clip_files.array_names import CORRECTIONS
 from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
+from engine.export.sequences.table import SEQUENCES
+from engine.export.world import AXES, world
 
 
 def nothing(progress: ExportProgress) -> None:
@@ -95,6 +99,7 @@ def test_usd_has_cameras_and_paths_that_see_what_they_see_here(opened: TrainedPr
     """A point falls where K and pose put it, through the window that USD's own camera computes; times are frames."""
     Usd, UsdGeom, Gf = (pytest.importorskip(f"pxr.{name}") for name in ("Usd", "UsdGeom", "Gf"))
     layout = opened.capture.layout
+    placed = world(np.array([0.1, -0.9, 0.2]), up="+z", scale=2.5)
     moved_K = np.array([[0, 0, 1.5], [0, 0.7, -2.0], [0, 0, 0]])
     cameras = tuple(replace(entry, K=entry.K + moved_K) for entry in layout.cameras)
     moved = np.eye(4)
@@ -107,7 +112,7 @@ def test_usd_has_cameras_and_paths_that_see_what_they_see_here(opened: TrainedPr
         [CameraPath("Way in", keys), CameraPath("way in")],
         n_frames=6,
         fps=25.0,
-        up=np.array([0.0, 0.0, 1.0]),
+        world=placed,
         meters_per_unit=0.5,
     )
     assert lines == ("The camera path 'way in' has no keys and is left out.",)
@@ -122,7 +127,7 @@ def test_usd_has_cameras_and_paths_that_see_what_they_see_here(opened: TrainedPr
         """From -1 to 1 across the picture, x to the right and y up."""
         frustum = UsdGeom.Camera(prim).GetCamera(frame).frustum
         matrix = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
-        return np.array(matrix.Transform(Gf.Vec3d(*point)))[:2]
+        return np.array(matrix.Transform(Gf.Vec3d(*(placed.scale * placed.rotation @ point))))[:2]
 
     points = opened.capture.rig.centers.mean(0) + np.random.default_rng(0).normal(0, 0.2, (8, 3))
     for prim, entry in zip(prims, cameras, strict=False):
@@ -137,6 +142,30 @@ def test_usd_has_cameras_and_paths_that_see_what_they_see_here(opened: TrainedPr
         x, y, z = pose[:3, :3] @ points[0] + pose[:3, 3]
         expected = np.array([x / z * 9 / 16, -y / z]) / np.tan(fov_rad / 2)
         np.testing.assert_allclose(seen(prims[-1], frame, points[0]), expected, atol=1e-5)
+
+
+def test_usd_cameras_stand_where_usd_files_have_the_scene(opened, tmp_path: Path):
+    Usd, UsdGeom, Gf = (pytest.importorskip(f"pxr.{name}") for name in ("Usd", "UsdGeom", "Gf"))
+    entry, point = opened.capture.layout.cameras[0], opened.capture.rig.centers.mean(0)
+    x, y, z = entry.K @ (entry.world_to_camera[:3, :3] @ point + entry.world_to_camera[:3, 3])
+    width, height = entry.image_size
+    for name, chosen in (("usual", {}), ("chosen", {"up": "+z", "scale": 100.0, "scene_up": (0.2, 0.0, 1.0)})):
+        result = run(opened, CamerasJob(tmp_path / name, "usd", **chosen), nothing)
+        placed = file_world(opened, SequenceJob(tmp_path / "s.usda", "usda", **chosen), usual_up=SEQUENCES["usda"].up)
+        assert any(placed.text in line for line in result.lines)
+        stage = Usd.Stage.Open(str(tmp_path / name / "cameras.usda"))
+        assert AXES["+" + UsdGeom.GetStageUpAxis(stage).lower()] == pytest.approx(placed.up)
+        frustum = UsdGeom.Camera(stage.GetDefaultPrim().GetChildren()[0]).GetCamera(0).frustum
+        matrix = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
+        seen = np.array(matrix.Transform(Gf.Vec3d(*(placed.scale * placed.rotation @ point))))[:2]
+        np.testing.assert_allclose(seen, [2 * x / z / width - 1, 1 - 2 * y / z / height], atol=1e-5)
+
+
+def test_other_formats_keep_the_coordinates_of_the_capture(tmp_path: Path):
+    for format_ in ("colmap", "transforms"):
+        with pytest.raises(ProjectError, match=f"--up does not apply to cameras-{format_}"):
+            CamerasJob(tmp_path / "c", format_, up="+y").check()
+    CamerasJob(tmp_path / "c", "usd", up="+y").check()
 
 
 def test_usd_is_exported_and_a_missing_library_is_said_with_the_remedy(opened, tmp_path: Path, monkeypatch):

@@ -6,6 +6,7 @@ import msgspec
 import pytest
 
 from app.export.export_choices import ExportChoices, ExportContext
+from app.export.jobs.answers import Answers
 from app.export.picked_frames import PickedFrames
 from engine.children.messages import decoded, encoded
 
@@ -71,3 +72,11 @@ def test_untrained_runs():
     nothing = msgspec.structs.replace(CONTEXT, trained=())
     assert nothing.untrained(range(10)) == [(0, 9)]
     assert list(nothing.frames("all", 1)) == []
+
+
+def test_where_cameras_lie_is_asked_for_usd_only():
+    placed = {"up", "scale", "scene_up"}
+    for format_, is_asked in (("colmap", False), ("usd", True)):
+        choices = ExportChoices("cameras").with_answer("format", format_)
+        asked = {question.name for question in Answers(CONTEXT, choices).questions}
+        assert asked & placed == (placed if is_asked else set())

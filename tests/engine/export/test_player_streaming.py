@@ -220,7 +220,8 @@ def test_clips_that_fail_are_in_nobodys_way(browser: Browser, server: RangeServe
     go_to(browser, server.url("scene.html"), until=SETTLED)
     browser.value(  # what fails is tried again, but not within anybody's patience
         "const { loader } = clipgstreamPlayer.pictures;"
-        "loader.fail = (key) => loader.failures.set(key, { tries: 1, isFinal: false, againMs: performance.now() + 1e9 });"
+        "const againMs = performance.now() + 1e9;"
+        "loader.fail = (key) => loader.failures.set(key, { tries: 1, isFinal: false, againMs });"
         "loader.again()"
     )
     browser.wait("clipgstreamPlayer.pictures.loaded.has(3)")
