@@ -15,11 +15,13 @@ from app.cluster.ray_library import ray_library
 from app.project.claims.holder_record import MachineLoad
 from engine.children.kind import ChildFailed, ChildKind, Event, Job, Result
 from engine.children.messages import Refusal, decoded, encoded
-from engine.children.process import END_TIMEOUT_S, Child
+from engine.children.process import Child
 from engine.errors import EngineError
 
 logger = logging.getLogger(__name__)
 
+LAST_WORDS_S = 2.0
+"""A computer that does not answer within this time is not waited for at the end."""
 EXCHANGE_EVERY_S = 0.5
 _LOOK_EVERY_S = 0.2
 JobThere = TypeVar("JobThere", covariant=True)
@@ -130,7 +132,7 @@ class FarChild(Child[Job, Event, Result]):
         """See `Child`."""
         self._grace_s = grace_s
         self._remote.is_ending.set()
-        self._thread.join(grace_s + END_TIMEOUT_S)
+        self._thread.join(grace_s + LAST_WORDS_S)
 
     # ---------------------------------------------------------------- on the thread
 
@@ -189,7 +191,7 @@ class FarChild(Child[Job, Event, Result]):
         until_s = time.monotonic() + self._grace_s
         with suppress(NodeLost, NodeRefused, EngineError):
             self._remote.call("end", self._grace_s, timeout_s=self._grace_s)
-            self._errand.keep(self._remote, timeout_s=max(until_s - time.monotonic(), END_TIMEOUT_S))
+            self._errand.keep(self._remote, timeout_s=max(until_s - time.monotonic(), LAST_WORDS_S))
 
 
 def lost_words(error: Exception) -> str:
