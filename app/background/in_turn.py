@@ -12,7 +12,8 @@ T = TypeVar("T")
 
 
 class InTurn:
-    """Methods are for one thread. The thread that works starts with the first piece and holds up no end of the program.
+    """Methods are for one thread. The thread that works starts with the first piece. Unlike one of ThreadPoolExecutor,
+    it is not waited for when the program ends: a disk may never answer.
 
     Args:
         name: Of the thread.

@@ -92,7 +92,7 @@ class ClipRequests:
         return is_open and is_edited_so and state is not None and (str(state.file), state.revision) == (path, revision)
 
     def edits(self) -> EditStack:
-        """Those of the document as it is now; frames that a change of them leaves alone stay as they are."""
+        """The document's current edits; frames that a change of them does not touch are kept."""
         document = None if self._opened is None else self._opened.project.document
         known = self._copies.stack
         if document is None:

@@ -1,4 +1,4 @@
-"""Replay: the document of a project as it is now, put together from project.json, its history and the journal.
+"""Replay: the current document of a project, put together from project.json, its history and the journal.
 
 project.json is the document at some step. Each file of the journal continues from the step in its name; those that are
 needed are replayed one after the other. Nothing is written here, so that any process may read a project.
@@ -59,7 +59,7 @@ def journal_steps(folder: Path) -> list[int]:
 
 
 def replayed(folder: Path) -> Replayed:
-    """The document as it is now. Another process may write meanwhile.
+    """The current document. Another process may be writing.
 
     Raises:
         ProjectError: Something is damaged or missing; nothing was changed.

@@ -38,7 +38,7 @@ def take_sound(capture: Capture, camera: str, first: int, timing: TakeTiming | N
         timing: Of the take; None where it plays as captured.
         seconds: How long.
     Raises:
-        CaptureError: There is no such camera, or it has no sound.
+        CaptureError: The camera does not exist, or has no sound.
         ProjectError: It is too long for a WAV file.
     """
     n_samples = round(seconds * RATE)

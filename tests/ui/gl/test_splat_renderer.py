@@ -470,5 +470,8 @@ def test_rows_that_are_left_out_may_stand_still(ctx: moderngl.Context, keep: Kee
 def test_release_frees_and_can_be_repeated(ctx: moderngl.Context) -> None:
     renderer = SplatRenderer(ctx)
     renderer.upload(make_splats(10))
+    program = renderer._program
+    assert not isinstance(program.mglo, moderngl.InvalidObject)
     renderer.release()
     renderer.release()
+    assert isinstance(program.mglo, moderngl.InvalidObject)
